@@ -1,0 +1,72 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The two block checks of DF1: BCC and CRC-16."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Checksum(Enum):
+    """The check behind DLE ETX; the value is what the net CSV calls it (S0, Error_Code)."""
+
+    BCC = 'BCC'
+    CRC = 'CRC'
+
+    @property
+    def size(self) -> int:
+        """Return the number of check bytes: 1 or 2."""
+        return 1 if self is Checksum.BCC else 2
+
+    def of_message(self, data: bytes | bytearray, station: int | None = None) -> int:
+        """
+        Return the check of a message frame as a number.
+
+        ``data`` is the unstuffed link data. ``station`` is the STN of a master frame, or None
+        for a slave's or a full-duplex frame. A BCC covers STN and data (M 5-4, 5-5). A CRC
+        covers STN, STX, data and ETX in a master frame, data and ETX in any other (M 5-6, 5-7;
+        the example of M 14-2 comes out right only this way).
+        """
+        if self is Checksum.BCC:
+            return bcc(data, station or 0)
+        seed = 0 if station is None else crc16(bytes((station, 0x02)))
+        return crc16(b'\x03', crc16(data, seed))
+
+    def encode(self, value: int) -> bytes:
+        """Return the check as it stands on the line: the CRC low byte first (M 5-6)."""
+        return value.to_bytes(self.size, 'little')
+
+
+def bcc(data: bytes | bytearray, start: int = 0) -> int:
+    """Return the two's complement of the 8-bit sum of ``start`` and ``data`` (M 5-2)."""
+    return -(start + sum(data)) & 0xFF
+
+
+def _table_entry(value: int) -> int:
+    for _ in range(8):
+        value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return value
+
+
+_CRC_TABLE = tuple(_table_entry(value) for value in range(256))
+
+
+def crc16(data: bytes | bytearray, start: int = 0) -> int:
+    """Return CRC-16 x^16+x^15+x^2+1, reflected (A001), continued from ``start`` (M 5-6)."""
+    crc = start
+    table = _CRC_TABLE
+    for byte in data:
+        crc = crc >> 8 ^ table[(crc ^ byte) & 0xFF]
+    return crc

@@ -1,0 +1,328 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Frames and symbols: what stands on the line.
+
+Encoding is three functions; decoding is ``FrameDecoder``, which turns any bytes, in any
+chunks, into symbols and never raises. A control symbol is a pair DLE x; a data byte equal to
+DLE is doubled (M 2-7); check bytes are never doubled (M 3-5, 5-5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+from abdf1_ros.df1.checksum import bcc, Checksum
+from abdf1_ros.df1.packet import HEADER_SIZE
+
+# Bytes of unstuffed link data that we take: the largest reply is 244 bytes behind a header
+# (M 7-33), and no known device sends more than this.
+MAX_LINK_DATA = 261
+
+
+class Code(IntEnum):
+    """Control characters (M 2-6; NAK is 15 as in M 14-4, tables 2.A and 2.B misprint it)."""
+
+    SOH = 0x01
+    STX = 0x02
+    ETX = 0x03
+    EOT = 0x04
+    ENQ = 0x05
+    ACK = 0x06
+    DLE = 0x10
+    NAK = 0x15
+
+
+DLE = bytes((Code.DLE,))
+STX = bytes((Code.DLE, Code.STX))
+ETX = bytes((Code.DLE, Code.ETX))
+ACK = bytes((Code.DLE, Code.ACK))
+NAK = bytes((Code.DLE, Code.NAK))
+EOT = bytes((Code.DLE, Code.EOT))
+ENQ = bytes((Code.DLE, Code.ENQ))
+_SOH = bytes((Code.DLE, Code.SOH))
+
+
+def stuff(data: bytes) -> bytes:
+    """Double every DLE of ``data`` (M 2-7)."""
+    return data.replace(DLE, DLE + DLE)
+
+
+def message_frame(data: bytes, checksum: Checksum) -> bytes:
+    """Return the frame of a slave's or a full-duplex message around link ``data`` (M 5-2)."""
+    check = checksum.encode(checksum.of_message(data))
+    return STX + stuff(data) + ETX + check
+
+
+def master_frame(station: int, data: bytes, checksum: Checksum) -> bytes:
+    """Return the frame of a master's message to ``station`` (0-255) around ``data`` (M 5-2)."""
+    check = checksum.encode(checksum.of_message(data, station))
+    return _SOH + stuff(bytes((station,))) + STX + stuff(data) + ETX + check
+
+
+def poll_frame(station: int) -> bytes:
+    """Return the poll of ``station`` (0-254): its check is a BCC on every line (M 5-3)."""
+    return ENQ + stuff(bytes((station,))) + bytes((bcc(b'', station),))
+
+
+class Fault(Enum):
+    """Why a received frame is not to be used."""
+
+    BAD_CHECK = 'wrong check'
+    TOO_SHORT = 'shorter than a header'
+    TOO_LONG = 'longer than any message'
+    NO_ETX = 'broken off before DLE ETX'
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """DLE ACK, DLE NAK, DLE EOT, or (full duplex) DLE ENQ."""
+
+    code: Code
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """A pair DLE x that is no symbol of the protocol; ``byte`` is x."""
+
+    byte: int
+
+
+@dataclass(frozen=True, slots=True)
+class Poll:
+    """DLE ENQ STN BCC; ``valid`` tells whether the BCC is right."""
+
+    station: int
+    valid: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """
+    A message frame, good or bad.
+
+    ``data`` is the unstuffed link data, ``station`` the STN of a master's frame (None for
+    any other). ``fault`` is None for a good frame. ``received`` and ``expected`` are the check
+    as read and as computed; they mean something only for a good frame or a BAD_CHECK.
+    """
+
+    data: bytes
+    station: int | None = None
+    fault: Fault | None = None
+    received: int = 0
+    expected: int = 0
+
+
+Symbol = Control | Unknown | Poll | Frame
+
+
+class Duplex(Enum):
+    """Which line discipline gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8)."""
+
+    HALF = 'half duplex'
+    FULL = 'full duplex'
+
+
+class _State(Enum):
+    IDLE = 'between symbols'
+    SOH_STATION = 'STN of a master frame'
+    SOH_STX = 'DLE STX behind STN'
+    POLL_STATION = 'STN of a poll'
+    POLL_CHECK = 'BCC of a poll'
+    DATA = 'link data'
+    CHECK = 'check bytes'
+
+
+class FrameDecoder:
+    """
+    Turn bytes into symbols.
+
+    ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
+    everything heard. Bytes outside of any symbol are noise: they are skipped, and the last
+    byte heard stays in ``last_byte`` for whoever reports it.
+    """
+
+    def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
+        self._checksum = checksum
+        self._duplex = duplex
+        self._buffer = bytearray()
+        self._data = bytearray()
+        self._state = _State.IDLE
+        self._station: int | None = None
+        self.last_byte = 0
+
+    @property
+    def in_message(self) -> bool:
+        """Tell whether a message has begun and not ended."""
+        return self._state in (_State.DATA, _State.CHECK)
+
+    def reset(self) -> None:
+        """Forget everything heard so far."""
+        self._buffer.clear()
+        self._state = _State.IDLE
+        self.last_byte = 0
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes from the line, in any chunks."""
+        if data:
+            self._buffer += data
+            self.last_byte = data[-1]
+
+    def next_symbol(self) -> Symbol | None:
+        """Return the next whole symbol, or None when more bytes are needed."""
+        while self._buffer:
+            before = self._state, len(self._buffer)
+            symbol = self._STEPS[self._state](self)
+            if symbol is not None:
+                return symbol
+            if before == (self._state, len(self._buffer)):
+                return None  # a step that neither moved nor ate needs more bytes
+        return None
+
+    def _idle(self) -> Symbol | None:
+        start = self._buffer.find(Code.DLE)
+        if start < 0:
+            self._buffer.clear()
+            return None
+        del self._buffer[:start]
+        if len(self._buffer) < 2:
+            return None
+        code = self._buffer[1]
+        del self._buffer[:2]
+        return self._begin(code)
+
+    def _begin(self, code: int) -> Symbol | None:
+        half = self._duplex is Duplex.HALF
+        if code == Code.DLE:
+            return None  # a data byte of a message whose beginning we missed
+        if code == Code.STX:
+            self._begin_data(None)
+        elif code == Code.SOH and half:
+            self._state = _State.SOH_STATION
+        elif code == Code.ENQ and half:
+            self._state = _State.POLL_STATION
+        elif code in (Code.ACK, Code.NAK, Code.EOT, Code.ENQ):
+            return Control(Code(code))
+        else:
+            return Unknown(code)
+        return None
+
+    def _begin_data(self, station: int | None) -> None:
+        self._state = _State.DATA
+        self._station = station
+        self._data.clear()
+
+    def _take_station(self, following: _State) -> None:
+        """Read STN, which is stuffed like data (M 3-4), and go on to ``following``."""
+        if self._buffer[0] != Code.DLE:
+            self._station = self._buffer[0]
+            del self._buffer[:1]
+        elif len(self._buffer) < 2:
+            return
+        elif self._buffer[1] == Code.DLE:
+            self._station = int(Code.DLE)
+            del self._buffer[:2]
+        else:  # another symbol broke in
+            self._state = _State.IDLE
+            return
+        self._state = following
+
+    def _soh_station(self) -> Symbol | None:
+        self._take_station(_State.SOH_STX)
+        return None
+
+    def _poll_station(self) -> Symbol | None:
+        # A master that does not double STN 10: DLE ENQ 10 F0 (F0 being its BCC).
+        if self._buffer[:2] == bytes((Code.DLE, bcc(DLE))):
+            del self._buffer[:1]
+            self._station = int(Code.DLE)
+            self._state = _State.POLL_CHECK
+        else:
+            self._take_station(_State.POLL_CHECK)
+        return None
+
+    def _poll_check(self) -> Symbol | None:
+        check = self._buffer.pop(0)
+        self._state = _State.IDLE
+        assert self._station is not None
+        return Poll(self._station, check == bcc(b'', self._station))
+
+    def _soh_stx(self) -> Symbol | None:
+        if self._buffer[0] != Code.DLE:
+            self._state = _State.IDLE
+        elif len(self._buffer) > 1:
+            if self._buffer[1] == Code.STX:
+                del self._buffer[:2]
+                self._begin_data(self._station)
+            else:
+                self._state = _State.IDLE
+        return None
+
+    def _link_data(self) -> Symbol | None:
+        end = self._buffer.find(Code.DLE)
+        if end < 0:
+            return self._store(len(self._buffer))
+        if end > 0:
+            return self._store(end)
+        if len(self._buffer) < 2:
+            return None
+        code = self._buffer[1]
+        if code == Code.DLE:
+            del self._buffer[:1]
+            return self._store(1)
+        if code == Code.ETX:
+            del self._buffer[:2]
+            self._state = _State.CHECK
+            return None
+        if self._duplex is Duplex.FULL and code in (Code.ACK, Code.NAK):
+            del self._buffer[:2]
+            return Control(Code(code))  # an embedded response (M 4-3)
+        self._state = _State.IDLE  # the code that broke in is read again as a symbol
+        return self._frame(Fault.NO_ETX)
+
+    def _store(self, count: int) -> Symbol | None:
+        self._data += self._buffer[:count]
+        del self._buffer[:count]
+        if len(self._data) <= MAX_LINK_DATA:
+            return None
+        self._state = _State.IDLE
+        return self._frame(Fault.TOO_LONG)
+
+    def _check(self) -> Symbol | None:
+        size = self._checksum.size
+        if len(self._buffer) < size:
+            return None
+        received = int.from_bytes(self._buffer[:size], 'little')
+        del self._buffer[:size]
+        self._state = _State.IDLE
+        expected = self._checksum.of_message(self._data, self._station)
+        if received != expected:
+            return self._frame(Fault.BAD_CHECK, received, expected)
+        fault = Fault.TOO_SHORT if len(self._data) < HEADER_SIZE else None
+        return self._frame(fault, received, expected)
+
+    def _frame(self, fault: Fault | None, received: int = 0, expected: int = 0) -> Frame:
+        return Frame(bytes(self._data), self._station, fault, received, expected)
+
+    _STEPS = {
+        _State.IDLE: _idle,
+        _State.SOH_STATION: _soh_station,
+        _State.SOH_STX: _soh_stx,
+        _State.POLL_STATION: _poll_station,
+        _State.POLL_CHECK: _poll_check,
+        _State.DATA: _link_data,
+        _State.CHECK: _check,
+    }

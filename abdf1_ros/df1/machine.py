@@ -1,0 +1,229 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The engine under every link procedure: bytes and a clock value in, bytes and a deadline out.
+
+A procedure is a generator with one effect. ``symbol = yield Step(frame, timeout)`` means "put
+this frame on the line, then give me the next symbol, or None when the time is up". What the
+manual writes as a program is written here as the same program, and composed with ``yield
+from``. The machine alone knows of TX_Delay and of the time that characters take.
+
+The machine never reads a clock: every call brings ``now``, seconds of any monotonic clock. A
+driving loop (a thread with a port, or a test with a virtual line) does this::
+
+    machine.start(now)
+    while ...:
+        port.write(machine.data_to_send())
+        data = port.read(until=machine.deadline)
+        machine.receive_data(data, now) if data else machine.handle_timeout(now)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+import math
+from typing import NamedTuple
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex, FrameDecoder, Symbol
+
+
+class Step(NamedTuple):
+    """
+    What a procedure asks of the machine.
+
+    ``frame`` goes on the line (empty: only listen; None: rest, deaf to the line, until the
+    time is up or ``Machine.wake``). ``timeout`` is in seconds from the moment the last byte
+    has left (0: do not wait, None: no limit). ``delay`` seconds pass before the frame goes out.
+    """
+
+    frame: bytes | None
+    timeout: float | None
+    delay: float = 0.0
+
+
+LISTEN_ON = Step(b'', math.nan)
+"""Give me the next symbol within what is left of the time of the last step."""
+
+Procedure = Generator[Step, Symbol | None, None]
+
+
+@dataclass(frozen=True, slots=True)
+class LineTiming:
+    """
+    What the machine must know of the line.
+
+    ``char_time`` is seconds per character, start and stop bits included (0 where the line
+    has no speed of its own); ``tx_delay`` seconds pass before each transmission (S0, TX_Delay).
+    """
+
+    char_time: float = 0.0
+    tx_delay: float = 0.0
+
+
+class Machine:
+    """
+    Run one procedure over one line.
+
+    ``procedure`` makes the generator, afresh at every ``start``. With ``forget_on_send`` what
+    was heard before a transmission is dropped: for the master of a half-duplex line it cannot
+    be the answer. ``counters`` gets the characters in both directions.
+    """
+
+    def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
+                 duplex: Duplex = Duplex.HALF, timing: LineTiming | None = None,
+                 counters: Counters | None = None, forget_on_send: bool = False) -> None:
+        self.decoder = FrameDecoder(checksum, duplex)
+        self.counters = counters or Counters()
+        self.now = 0.0
+        self.deadline: float | None = None
+        self._make_procedure = procedure
+        self._timing = timing or LineTiming()
+        self._forget_on_send = forget_on_send
+        self._procedure: Procedure | None = None
+        self._out = bytearray()
+        self._pending: Step | None = None  # waits for its delay before it goes out
+        self._resting = False
+        self._line_free = -math.inf
+
+    def start(self, now: float) -> None:
+        """Begin the procedure from its beginning."""
+        self.stop()
+        self.now = now
+        self._line_free = now
+        self._procedure = self._make_procedure(self)
+        self._resume(None)
+
+    def stop(self, error: Exception | None = None) -> None:
+        """
+        End the procedure; with ``error``, raise that inside it first.
+
+        A procedure handles the error like the end of its transaction, so nothing it was doing
+        is left without a result.
+        """
+        procedure, self._procedure = self._procedure, None
+        self._out.clear()
+        self.decoder.reset()
+        self._pending, self._resting, self.deadline = None, False, None
+        if procedure is None:
+            return
+        if error is not None:
+            try:
+                procedure.throw(error)
+            except (StopIteration, type(error)):
+                pass
+        procedure.close()
+
+    def receive_data(self, data: bytes, now: float) -> None:
+        """Take bytes from the line."""
+        self.now = now
+        self.counters.chars_received += len(data)
+        if self._forget_on_send and not self._listening:
+            return
+        self.decoder.feed(data)
+        self._deliver_symbols()
+        if self._listening and self.decoder.in_message and self.deadline is not None:
+            # An answer that has begun may take its time on the line, but not pause.
+            self.deadline = max(self.deadline, now + self._pause_limit)
+
+    def handle_timeout(self, now: float) -> None:
+        """Take note that the clock reads ``now``; does nothing before the deadline."""
+        self.now = now
+        if self.deadline is None or now < self.deadline:
+            return
+        if self._pending is not None:
+            self._transmit(self._pending)
+        else:
+            self._resume(None)
+        self._deliver_symbols()
+
+    def wake(self, now: float) -> None:
+        """End a rest early: there may be something new to do."""
+        self.now = now
+        if self._resting:
+            self._resume(None)
+            self._deliver_symbols()
+
+    def data_to_send(self) -> bytes:
+        """Return, once, the bytes to put on the line now."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    @property
+    def _listening(self) -> bool:
+        return self._procedure is not None and not self._resting and self._pending is None
+
+    @property
+    def _pause_limit(self) -> float:
+        # Longest pause inside a frame: 20 characters, and what an operating system or a
+        # device server may hold bytes back.
+        return 20 * self._timing.char_time + 0.1
+
+    def _deliver_symbols(self) -> None:
+        while self._listening:
+            symbol = self.decoder.next_symbol()
+            if symbol is None:
+                return
+            self._resume(symbol)
+
+    def _resume(self, symbol: Symbol | None) -> None:
+        """Run the procedure up to a step that has to wait."""
+        procedure = self._procedure
+        while procedure is not None:
+            try:
+                step = procedure.send(symbol)
+            except StopIteration:
+                self._procedure, self.deadline = None, None
+                return
+            symbol = None
+            if not self._take_step(step):
+                return
+
+    def _take_step(self, step: Step) -> bool:
+        """Carry out a step; return whether the procedure goes on at once."""
+        if step is LISTEN_ON:
+            return False
+        self._resting = step.frame is None
+        if self._resting:
+            self._set_deadline(step.timeout, self.now)
+            return False
+        delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
+        if delay:
+            self._pending = step
+            self.deadline = max(self.now, self._line_free) + delay
+            return False
+        return self._put_on_line(step)
+
+    def _put_on_line(self, step: Step) -> bool:
+        if step.frame:
+            self._out += step.frame
+            self.counters.chars_sent += len(step.frame)
+            left = max(self.now, self._line_free) + len(step.frame) * self._timing.char_time
+            self._line_free = left
+            if self._forget_on_send:
+                self.decoder.reset()
+        self._set_deadline(step.timeout, max(self.now, self._line_free))
+        return step.timeout == 0
+
+    def _transmit(self, step: Step) -> None:
+        self._pending = None
+        if self._put_on_line(step):
+            self._resume(None)
+
+    def _set_deadline(self, timeout: float | None, start: float) -> None:
+        self.deadline = None if timeout is None else start + timeout

@@ -1,0 +1,76 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The message that a frame carries: the header all commands and replies share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import struct
+
+from abdf1_ros.errors import FormatError
+
+_HEADER = struct.Struct('<BBBBH')
+HEADER_SIZE = _HEADER.size
+REPLY_BIT = 0x40
+BROADCAST = 255
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """
+    DST SRC CMD STS TNS and what follows them (M 6-3).
+
+    ``dst`` and ``src`` are station addresses (0-255), ``cmd`` has bit 6 set in a reply (M 6-5),
+    ``tns`` is the 16-bit transaction number, low byte first on the line (M 6-7). ``data`` is
+    all that follows: FNC and parameters of a command, EXT STS or data of a reply.
+    """
+
+    dst: int
+    src: int
+    cmd: int
+    sts: int
+    tns: int
+    data: bytes = b''
+
+    @classmethod
+    def decode(cls, link_data: bytes) -> Packet:
+        """Read link data; raise FormatError when it is shorter than a header (M 3-7, 4-4)."""
+        if len(link_data) < HEADER_SIZE:
+            raise FormatError(f'{len(link_data)} bytes of link data, a header has {HEADER_SIZE}')
+        dst, src, cmd, sts, tns = _HEADER.unpack_from(link_data)
+        return cls(dst, src, cmd, sts, tns, link_data[HEADER_SIZE:])
+
+    def encode(self) -> bytes:
+        """Return the unstuffed link data."""
+        return _HEADER.pack(self.dst, self.src, self.cmd, self.sts, self.tns) + self.data
+
+    @property
+    def is_reply(self) -> bool:
+        """Tell a reply from a command."""
+        return bool(self.cmd & REPLY_BIT)
+
+    @property
+    def duplicate_key(self) -> tuple[int, int, int]:
+        """Return SRC, CMD and TNS, by which a repeated message is known (M 3-4, 4-4)."""
+        return self.src, self.cmd, self.tns
+
+    def answers(self, command: Packet) -> bool:
+        """Tell whether this is a reply to ``command``, whatever its command code says."""
+        return self.is_reply and (self.src, self.dst, self.tns) == (
+            command.dst, command.src, command.tns)
+
+    def reply(self, data: bytes = b'', sts: int = 0) -> Packet:
+        """Return the reply to this command: DST and SRC swapped, TNS copied (M 6-3..6-8)."""
+        return Packet(self.src, self.dst, self.cmd | REPLY_BIT, sts, self.tns, data)

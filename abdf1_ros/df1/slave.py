@@ -1,0 +1,179 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The half-duplex slave: a station that answers a master (M 3-4, 3-5, 3-9..3-11; KF2 4-31).
+
+It is reactive, so it is one method: ``handle`` takes a symbol and returns the bytes to send.
+A slave never sends DLE NAK: what it cannot accept it passes over in silence, and the master
+tries again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol
+from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.packet import BROADCAST, Packet
+
+
+@dataclass(frozen=True, slots=True)
+class SlaveSettings:
+    """
+    The settings of a slave, with the defaults of Allen-Bradley's.
+
+    ``retries`` is how often a message is sent again before it is given up; ``queue_size`` how
+    many replies may wait for a poll before the sink is full.
+    """
+
+    station: int
+    checksum: Checksum = Checksum.CRC
+    retries: int = 3
+    queue_size: int = 4
+
+
+@dataclass(slots=True)
+class _Held:
+    """A message sent and not yet acknowledged, and how often it has been sent."""
+
+    packet: Packet
+    sent: int = 0
+
+
+class HalfDuplexSlave:
+    """
+    One station on a half-duplex line.
+
+    ``serve`` executes a command and returns its reply. It is called after the command has been
+    accepted, once for each command, never for a repetition.
+    """
+
+    def __init__(self, settings: SlaveSettings, serve: Callable[[Packet], Packet],
+                 counters: Counters | None = None) -> None:
+        self.counters = counters or Counters()
+        self._settings = settings
+        self._serve = serve
+        self._queue: deque[Packet] = deque()
+        self._held: _Held | None = None
+        self._just_sent = False
+        self._last_key: tuple[int, int, int] | None = None
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Return what this station puts on the line when it hears ``symbol``; mostly nothing."""
+        just_sent, self._just_sent = self._just_sent, False
+        if isinstance(symbol, Poll):
+            return self._polled(symbol)
+        if isinstance(symbol, Frame):
+            return self._received(symbol)
+        if symbol == Control(Code.ACK) and just_sent:
+            # An ACK names no station: it is ours only straight after our own message.
+            self.counters.acks_received += 1
+            self._held = None
+        elif symbol == Control(Code.NAK):
+            self.counters.naks_received += 1
+            self._held = None
+            self._queue.clear()  # the reset of the whole line (M 2-7, 3-11)
+        return b''
+
+    def _received(self, frame: Frame) -> bytes:
+        """Take a master's frame (KF2 4-31)."""
+        if frame.station not in (self._settings.station, BROADCAST):
+            return b''
+        if frame.fault is not None:
+            self._count_fault(frame.fault)
+            return b''
+        packet = Packet.decode(frame.data)
+        self.counters.messages_received += 1
+        if packet.duplicate_key == self._last_key:
+            self.counters.duplicate_messages += 1
+            return self._ack(frame)
+        if len(self._queue) >= self._settings.queue_size:
+            return b''  # sink full: neither acknowledged nor remembered
+        self._last_key = packet.duplicate_key
+        self._execute(packet, wants_reply=frame.station != BROADCAST)
+        return self._ack(frame)
+
+    def _execute(self, packet: Packet, wants_reply: bool) -> None:
+        if packet.is_reply:
+            self.counters.replies_received += 1
+            return
+        self.counters.commands_received += 1
+        reply = self._serve(packet)
+        if wants_reply:
+            self._queue.append(reply)
+
+    def _ack(self, frame: Frame) -> bytes:
+        if frame.station == BROADCAST:
+            return b''  # everyone would answer at once (M 3-4)
+        self.counters.acks_sent += 1
+        return frames.ACK
+
+    def _polled(self, poll: Poll) -> bytes:
+        """Answer a poll: the held message again, the next one, or EOT (KF2 4-31)."""
+        if not poll.valid or poll.station != self._settings.station:
+            return b''
+        self.counters.polls_received += 1
+        if self._held is not None and self._held.sent > self._settings.retries:
+            self.counters.nak_limit_exceeded += 1
+            self._held = None
+        if self._held is None and self._queue:
+            self._held = _Held(self._queue.popleft())
+        if self._held is None:
+            self.counters.eots_sent += 1
+            return frames.EOT
+        return self._send(self._held)
+
+    def _send(self, held: _Held) -> bytes:
+        if held.sent:
+            self.counters.nak_retries += 1
+        else:
+            self.counters.replies_sent += 1
+            self.counters.error_messages_sent += held.packet.sts != 0
+        held.sent += 1
+        self.counters.messages_sent += 1
+        self._just_sent = True
+        return frames.message_frame(held.packet.encode(), self._settings.checksum)
+
+    def _count_fault(self, fault: Fault) -> None:
+        if fault is not Fault.BAD_CHECK:
+            self.counters.invalid_messages += 1
+        elif self._settings.checksum is Checksum.BCC:
+            self.counters.bcc_errors += 1
+        else:
+            self.counters.crc_errors += 1
+
+
+class Station(Protocol):
+    """Anything that answers symbols on a line: a slave, or one that misbehaves on purpose."""
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Return the bytes to send in answer to ``symbol``."""
+
+
+def multidrop(stations: Sequence[Station]) -> Callable[[Machine], Procedure]:
+    """Return the procedure of a machine that is all of ``stations`` on one line."""
+    def listen(machine: Machine) -> Procedure:
+        answer = b''
+        while True:
+            symbol = yield Step(answer, None)
+            assert symbol is not None  # there is no time limit
+            answer = b''.join(station.handle(symbol) for station in stations)
+    return listen

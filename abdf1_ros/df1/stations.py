@@ -1,0 +1,100 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The Active Station List: what the master knows of each station on its line (S0)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.messages import Event
+
+MAX_STATION = 254
+
+
+@dataclass(slots=True)
+class Station:
+    """
+    One station: its place in the list and the last transaction received from it.
+
+    ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
+    first. ``last_key`` is the duplicate key of the last message accepted.
+    """
+
+    number: int
+    active: bool = True
+    last_heard: float | None = None
+    last_key: tuple[int, int, int] | None = None
+    last_tns: int | None = None
+    last_event: Event | None = None
+    replies: int = 0
+    failures: int = 0
+    remote_errors: int = 0
+    silent_since: float | None = field(default=None)
+
+    def accepts(self, packet: Packet) -> bool:
+        """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""
+        if packet.duplicate_key == self.last_key:
+            return False
+        self.last_key = packet.duplicate_key
+        return True
+
+
+class ActiveStationList:
+    """
+    All stations the master talks to.
+
+    Every station counts as active at start (S0). ``on_change`` is called with a station
+    whenever it becomes active or inactive.
+    """
+
+    def __init__(self, numbers: Iterable[int] = (),
+                 on_change: Callable[[Station], None] = lambda station: None) -> None:
+        self._stations = {number: Station(number) for number in sorted(set(numbers))}
+        self._on_change = on_change
+
+    def __iter__(self) -> Iterator[Station]:
+        """Iterate over the stations by number."""
+        return iter(self._stations.values())
+
+    def __getitem__(self, number: int) -> Station:
+        """Return a station, taking it into the list at the first use."""
+        if number not in self._stations:
+            self._stations[number] = Station(number)
+            self._stations = dict(sorted(self._stations.items()))
+        return self._stations[number]
+
+    def heard(self, number: int, now: float) -> None:
+        """Note an answer of any kind: the station is active."""
+        station = self[number]
+        station.last_heard = now
+        if not station.active:
+            station.active, station.silent_since = True, None
+            self._on_change(station)
+
+    def lost(self, number: int, now: float) -> None:
+        """Take a station out of the active ones."""
+        station = self[number]
+        if station.active:
+            station.active, station.silent_since = False, now
+            self._on_change(station)
+
+    def words(self) -> list[int]:
+        """Return the Active Node Table: 16 words, bit n % 16 of word n // 16 = station n."""
+        table = [0] * 16
+        for station in self:
+            table[station.number // 16] |= station.active << station.number % 16
+        return table

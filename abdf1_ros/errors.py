@@ -1,0 +1,105 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The exceptions of the package: one tree, so that callers can catch by what went wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from abdf1_ros.messages import Message
+
+
+class Abdf1Error(Exception):
+    """Anything this package raises on purpose."""
+
+
+class FormatError(Abdf1Error, ValueError):
+    """Bytes, or values to become bytes, that break a format."""
+
+
+class LinkError(Abdf1Error):
+    """
+    A transaction that ended without a reply.
+
+    ``message`` is the numbered error, ``args`` fill its text.
+    """
+
+    message = Message.ERR_COMMAND_TIMEOUT
+
+    def __str__(self) -> str:
+        """Return the numbered text."""
+        return self.message.line(*self.args)
+
+
+class CommandTimeout(LinkError):
+    """The station is there, but its reply did not come within Cmd_Timeout (2508)."""
+
+
+class StationInactive(LinkError):
+    """The station does not answer (2509); the argument is its number."""
+
+    message = Message.ERR_INACTIVE_STATION
+
+
+class WrongCommandCode(LinkError):
+    """A reply to our transaction carries another command's code (2505)."""
+
+    message = Message.ERR_BAD_FUNCTION_CODE
+
+
+class PortLost(LinkError):
+    """The port failed or was closed while the transaction ran; the argument says how."""
+
+    def __str__(self) -> str:
+        """Return what happened to the port; the specification has no number for it."""
+        return f'port lost: {self.args[0]}'
+
+
+class RemoteError(Abdf1Error):
+    """
+    A reply that says the station did not do what was asked.
+
+    ``sts`` and ``ext_sts`` (None where the reply has none) are the codes of the reply.
+    """
+
+    def __init__(self, sts: int, ext_sts: int | None, text: str) -> None:
+        super().__init__(text)
+        self.sts = sts
+        self.ext_sts = ext_sts
+
+
+class Problem(Abdf1Error):
+    """
+    One fault in a file or parameter that a user wrote.
+
+    ``where`` is "file:line:column" (or the parameter's name), ``text`` what is wrong and what
+    would be right, ``message`` its numbered entry, or None where the specification has none.
+    """
+
+    def __init__(self, where: str, text: str, message: Message | None = None,
+                 args: tuple[Any, ...] = ()) -> None:
+        head = f'{message.line(*args)}; ' if message else ''
+        super().__init__(f'{where}: {head}{text}')
+        self.where = where
+        self.text = text
+        self.message = message
+
+
+class ConfigurationError(Abdf1Error):
+    """All the faults that keep the driver from starting."""
+
+    def __init__(self, problems: list[Problem]) -> None:
+        super().__init__('\n'.join(str(problem) for problem in problems))
+        self.problems = problems

@@ -1,0 +1,90 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The data table of an emulated PLC: files of words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from abdf1_ros.errors import Abdf1Error
+from abdf1_ros.pccc.address import Address, Area
+from abdf1_ros.pccc.file_types import FileType, PlcType
+
+
+class NoSuchFile(Abdf1Error):
+    """The table has no such file, or a file of that number and another type."""
+
+
+class OutOfRange(Abdf1Error):
+    """The file is shorter than what was asked for."""
+
+
+class DataTable:
+    """
+    Words by address, each low byte first.
+
+    A file is as long as ``create`` has made it; reads and writes past its end raise
+    OutOfRange, those of a missing file NoSuchFile, and neither changes anything.
+    """
+
+    def __init__(self, plc_type: PlcType) -> None:
+        self.plc_type = plc_type
+        self._words: dict[Area, bytearray] = {}
+        self._types: dict[int, FileType] = {}
+
+    def __iter__(self) -> Iterator[Area]:
+        """Iterate over the files (for SLC I/O, the slots)."""
+        return iter(self._words)
+
+    def create(self, address: Address, words: int) -> None:
+        """Make the file of ``address`` long enough for ``words`` words from there on."""
+        known = self._types.setdefault(address.file, address.file_type)
+        if known is not address.file_type:
+            raise NoSuchFile(f'file {address.file} is of type {known.value} already')
+        store = self._words.setdefault(address.area, bytearray())
+        per_element = address.file_type.layout.words
+        end = -(-(address.offset + words) // per_element) * per_element  # whole elements
+        store.extend(bytes(max(0, 2 * end - len(store))))
+
+    def file_type(self, file: int) -> FileType:
+        """Return the type of a file by its number."""
+        try:
+            return self._types[file]
+        except KeyError:
+            raise NoSuchFile(f'there is no file {file}') from None
+
+    def read(self, address: Address, words: int) -> bytes:
+        """Return ``words`` words."""
+        store, start = self._find(address, words)
+        return bytes(store[start:start + 2 * words])
+
+    def write(self, address: Address, data: bytes) -> None:
+        """Store whole words."""
+        store, start = self._find(address, len(data) // 2)
+        store[start:start + len(data)] = data
+
+    def write_bits(self, address: Address, mask: int, bits: int) -> None:
+        """Change the bits of ``mask`` in one word to ``bits``."""
+        old = int.from_bytes(self.read(address, 1), 'little')
+        self.write(address, (old & ~mask | bits & mask).to_bytes(2, 'little'))
+
+    def _find(self, address: Address, words: int) -> tuple[bytearray, int]:
+        store = self._words.get(address.area)
+        if store is None:
+            raise NoSuchFile(f'there is no {address}')
+        start = 2 * address.offset
+        if start + 2 * words > len(store):
+            raise OutOfRange(f'{words} words at {address} end behind the file')
+        return store, start

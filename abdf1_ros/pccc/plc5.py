@@ -1,0 +1,175 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands of a PLC-5: typed read, typed write, read-modify-write (M 7-20, 7-28..7-31)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.fields import number, Reader, word
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.typed_data import TypedData
+
+CMD = 0x0F
+READ_MODIFY_WRITE = 0x26
+TYPED_WRITE = 0x67
+TYPED_READ = 0x68
+
+# What a reply may carry is 240 bytes of descriptor and data, what a write may carry the same
+# with the address (M 7-28, 7-30). 220 bytes of data fit both with the longest of all.
+MAX_DATA = 220
+MAX_REPLY = 240
+
+_AREA, _FILE, _ELEMENT, _SUB_ELEMENT = 1, 2, 4, 8
+_ASCII_PREFIX = b'\x00$'
+_MAX_SETS = 243
+
+
+@dataclass(frozen=True, slots=True)
+class SystemAddress:
+    """A PLC-5 system address: file, element and, for one word of a structure, sub-element."""
+
+    file: int
+    element: int
+    sub_element: int | None = None
+
+    def encode(self) -> bytes:
+        """Return the logical binary form with the memory area spelled out (M 13-10..13-12)."""
+        mask = _AREA | _FILE | _ELEMENT
+        levels = number(0) + number(self.file) + number(self.element)
+        if self.sub_element is not None:
+            mask |= _SUB_ELEMENT
+            levels += number(self.sub_element)
+        return bytes((mask,)) + levels
+
+    @classmethod
+    def read(cls, reader: Reader) -> SystemAddress:
+        """Take an address off ``reader``, logical binary or logical ASCII (M 13-10..13-15)."""
+        mask = reader.byte()
+        if mask == 0:
+            return cls._read_ascii(reader)
+        if mask & ~(_AREA | _FILE | _ELEMENT | _SUB_ELEMENT):
+            raise FormatError(f'address mask {mask:02X} has more levels than a PLC-5')
+        area = reader.number() if mask & _AREA else 0
+        if area:
+            raise FormatError(f'memory area {area} is not the data table')
+        file = reader.number() if mask & _FILE else 0
+        element = reader.number() if mask & _ELEMENT else 0
+        return cls(file, element, reader.number() if mask & _SUB_ELEMENT else None)
+
+    @classmethod
+    def _read_ascii(cls, reader: Reader) -> SystemAddress:
+        text = bytearray()
+        if reader.byte() != _ASCII_PREFIX[1]:
+            raise FormatError('a symbolic address has to begin with "$"')
+        while (byte := reader.byte()) != 0:
+            text.append(byte)
+        address = Address.parse(text.decode('ascii', 'replace'), PlcType.PLC5)
+        if address.bit is not None:
+            raise FormatError('a system address names no bit')
+        return cls(address.file, address.element, address.word or None)
+
+
+@dataclass(frozen=True, slots=True)
+class TypedRead:
+    """
+    Typed read, 0F/68 (M 7-28).
+
+    ``size`` elements are asked for in this packet, ``offset`` elements into a transaction of
+    ``total`` elements that begins at ``address``.
+    """
+
+    address: SystemAddress
+    size: int
+    offset: int
+    total: int
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters."""
+        return (bytes((TYPED_READ,)) + word(self.offset) + word(self.total)
+                + self.address.encode() + word(self.size))
+
+    @classmethod
+    def read(cls, reader: Reader) -> TypedRead:
+        """Take the parameters off ``reader``."""
+        offset, total = reader.word(), reader.word()
+        address = SystemAddress.read(reader)
+        size = reader.word()
+        reader.end()
+        return cls(address, size, offset, total)
+
+
+@dataclass(frozen=True, slots=True)
+class TypedWrite:
+    """Typed write, 0F/67 (M 7-30); ``offset`` and ``total`` as in TypedRead."""
+
+    address: SystemAddress
+    values: TypedData
+    offset: int
+    total: int
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters."""
+        return (bytes((TYPED_WRITE,)) + word(self.offset) + word(self.total)
+                + self.address.encode() + self.values.encode())
+
+    @classmethod
+    def read(cls, reader: Reader) -> TypedWrite:
+        """Take the parameters off ``reader``."""
+        offset, total = reader.word(), reader.word()
+        address = SystemAddress.read(reader)
+        return cls(address, TypedData.decode(reader.rest()), offset, total)
+
+
+@dataclass(frozen=True, slots=True)
+class BitSet:
+    """One word to modify: new = (old AND ``and_mask``) OR ``or_mask``."""
+
+    address: SystemAddress
+    and_mask: int
+    or_mask: int
+
+    def encode(self) -> bytes:
+        """Return address and masks."""
+        return self.address.encode() + word(self.and_mask) + word(self.or_mask)
+
+    @classmethod
+    def read(cls, reader: Reader) -> BitSet:
+        """Take address and masks off ``reader``."""
+        return cls(SystemAddress.read(reader), reader.word(), reader.word())
+
+
+@dataclass(frozen=True, slots=True)
+class ReadModifyWrite:
+    """Read-modify-write, 0F/26: one or more words, each by its masks (M 7-20)."""
+
+    sets: tuple[BitSet, ...]
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters; FormatError when they are more than 243 bytes."""
+        body = b''.join(entry.encode() for entry in self.sets)
+        if len(body) > _MAX_SETS:
+            raise FormatError(f'{len(body)} bytes of words to modify, {_MAX_SETS} are allowed')
+        return bytes((READ_MODIFY_WRITE,)) + body
+
+    @classmethod
+    def read(cls, reader: Reader) -> ReadModifyWrite:
+        """Take the parameters off ``reader``."""
+        sets = [BitSet.read(reader)]
+        while not reader.is_empty:
+            sets.append(BitSet.read(reader))
+        return cls(tuple(sets))

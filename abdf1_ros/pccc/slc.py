@@ -1,0 +1,128 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The commands of an SLC 500 or MicroLogix: protected typed logical read and write (M 7-17, 7-18).
+
+All with three address fields: file number, file type, element, and sub-element, the word
+inside an element at which the data begin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import number, Reader, word
+
+CMD = 0x0F
+LOGICAL_READ = 0xA2
+LOGICAL_WRITE = 0xAA
+MASKED_WRITE = 0xAB
+
+# Bytes of data in one packet of an SLC 5/03 or later (M 7-17, 7-18).
+MAX_READ = 236
+MAX_WRITE = 234
+
+
+@dataclass(frozen=True, slots=True)
+class LogicalAddress:
+    """File number, file type code (M 7-17), element, and word inside the element."""
+
+    file: int
+    type_code: int
+    element: int
+    sub_element: int
+
+    def encode(self) -> bytes:
+        """Return the four fields."""
+        return (number(self.file) + bytes((self.type_code,)) + number(self.element)
+                + number(self.sub_element))
+
+    @classmethod
+    def read(cls, reader: Reader) -> LogicalAddress:
+        """Take the four fields off ``reader``."""
+        return cls(reader.number(), reader.byte(), reader.number(), reader.number())
+
+
+@dataclass(frozen=True, slots=True)
+class LogicalRead:
+    """Protected typed logical read, 0F/A2 (M 7-17); ``size`` is bytes, 1-255."""
+
+    address: LogicalAddress
+    size: int
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters."""
+        return bytes((LOGICAL_READ, self.size)) + self.address.encode()
+
+    @classmethod
+    def read(cls, reader: Reader) -> LogicalRead:
+        """Take the parameters off ``reader``."""
+        size = reader.byte()
+        address = LogicalAddress.read(reader)
+        reader.end()
+        return cls(address, size)
+
+
+@dataclass(frozen=True, slots=True)
+class LogicalWrite:
+    """Protected typed logical write, 0F/AA (M 7-18)."""
+
+    address: LogicalAddress
+    data: bytes
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters."""
+        return bytes((LOGICAL_WRITE, len(self.data))) + self.address.encode() + self.data
+
+    @classmethod
+    def read(cls, reader: Reader) -> LogicalWrite:
+        """Take the parameters off ``reader``."""
+        size = reader.byte()
+        address = LogicalAddress.read(reader)
+        return cls(address, _sized(reader, size))
+
+
+@dataclass(frozen=True, slots=True)
+class MaskedWrite:
+    """
+    Protected typed logical write with mask, 0F/AB (M 7-18).
+
+    In every word of ``data`` only the bits set in ``mask`` change.
+    """
+
+    address: LogicalAddress
+    mask: int
+    data: bytes
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters; the size counts the data, not the mask."""
+        return (bytes((MASKED_WRITE, len(self.data))) + self.address.encode()
+                + word(self.mask) + self.data)
+
+    @classmethod
+    def read(cls, reader: Reader) -> MaskedWrite:
+        """Take the parameters off ``reader``."""
+        size = reader.byte()
+        address = LogicalAddress.read(reader)
+        mask = reader.word()
+        return cls(address, mask, _sized(reader, size))
+
+
+def _sized(reader: Reader, size: int) -> bytes:
+    data = reader.rest()
+    if len(data) != size:
+        raise FormatError(f'{len(data)} bytes of data, the size field says {size}')
+    return data

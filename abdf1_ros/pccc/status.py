@@ -1,0 +1,117 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""STS and EXT STS of a reply, in words (M 8-2..8-4)."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import RemoteError
+
+EXTENDED = 0xF0
+
+STS_ILLEGAL_COMMAND = 0x10
+STS_ADDRESS = 0x50
+
+EXT_ILLEGAL_FIELD = 0x01
+EXT_TOO_MANY_LEVELS = 0x03
+EXT_BAD_ADDRESS = 0x06
+EXT_WRONG_SIZE = 0x07
+EXT_TOO_LARGE = 0x0A
+EXT_TYPE_MISMATCH = 0x17
+
+_LOCAL = {
+    0x01: 'destination has no buffer space',
+    0x02: 'destination does not acknowledge, delivery not guaranteed',
+    0x03: 'duplicate token holder seen',
+    0x04: 'local port is disconnected',
+    0x05: 'no reply in time (application timeout)',
+    0x06: 'duplicate node address',
+    0x07: 'station is off line',
+    0x08: 'hardware fault',
+}
+
+_REMOTE = {
+    0x10: 'illegal command, format or length',
+    0x20: 'host has a problem and does not communicate',
+    0x30: 'remote host is missing, disconnected or shut down',
+    0x40: 'hardware fault in the host',
+    0x50: 'address not there, or memory protected',
+    0x60: 'function disallowed by a protection setting',
+    0x70: 'processor is in program mode',
+    0x80: 'compatibility file missing, or communication zone problem',
+    0x90: 'remote node cannot buffer the command',
+    0xA0: 'wait for acknowledge (buffer full)',
+    0xB0: 'problem because of a download',
+    0xC0: 'wait for acknowledge (buffer full)',
+    0xF0: 'extended status missing from the reply',
+}
+
+_EXTENDED = {
+    0x01: 'a field has an illegal value',
+    0x02: 'fewer address levels than this needs',
+    0x03: 'more address levels than the system has',
+    0x04: 'symbol not found',
+    0x05: 'symbol is badly formed',
+    0x06: 'address does not point to something usable',
+    0x07: 'file has the wrong size',
+    0x08: 'situation has changed since the transaction began',
+    0x09: 'data or file too large',
+    0x0A: 'transaction size plus word address too large',
+    0x0B: 'no access: privilege missing',
+    0x0C: 'condition cannot be produced, resource not available',
+    0x0D: 'condition exists already, resource in use',
+    0x0E: 'command cannot be executed',
+    0x0F: 'histogram overflow',
+    0x10: 'no access',
+    0x11: 'data type does not fit the request',
+    0x12: 'bad parameter or data',
+    0x13: 'address points into a deleted area',
+    0x14: 'failed for an unknown reason',
+    0x15: 'data conversion error',
+    0x16: 'scanner cannot reach the rack adapter',
+    0x17: 'type mismatch',
+    0x18: 'bad response from the module',
+    0x19: 'duplicate label',
+    0x1A: 'file is open, another node owns it',
+    0x1B: 'program is owned by another node',
+    0x1E: 'data table element is protected',
+    0x1F: 'temporary internal problem',
+    0x22: 'remote rack fault',
+    0x23: 'timeout on the way to the remote rack',
+    0x24: 'unknown error',
+}
+
+
+def status_text(sts: int, ext_sts: int | None = None) -> str:
+    """Return codes and meaning, e.g. "STS 50: address not there, or memory protected"."""
+    if sts & EXTENDED == EXTENDED and ext_sts is not None:
+        meaning = _EXTENDED.get(ext_sts, 'unknown code')
+        return f'STS {sts:02X} EXT STS {ext_sts:02X}: {meaning}'
+    parts = [_REMOTE.get(sts & 0xF0), _LOCAL.get(sts & 0x0F)]
+    meaning = '; '.join(part for part in parts if part) or 'unknown code'
+    return f'STS {sts:02X}: {meaning}'
+
+
+def check_status(reply: Packet) -> bytes:
+    """
+    Return the data of a reply that reports success.
+
+    Raises RemoteError for any other; a reply that breaks off before its EXT STS counts too.
+    """
+    if reply.sts == 0:
+        return reply.data
+    extended = reply.sts & EXTENDED == EXTENDED and len(reply.data) > 0
+    ext_sts = reply.data[0] if extended else None
+    raise RemoteError(reply.sts, ext_sts, status_text(reply.sts, ext_sts))
