@@ -32,7 +32,7 @@ def _counter(number: int, mnemonic: str, description: str) -> int:
 @dataclass(slots=True)
 class Counters:
     """
-    Counts since start or the last reset.
+    Counts since start.
 
     Only the thread that runs the link adds to them; any thread may read them.
     """
@@ -83,11 +83,6 @@ class Counters:
         2551, 'CNT_COM_READ_ERRORS', 'failures to read from the port')
     chars_sent: int = _counter(2560, 'CRD_CHAR_SENT', 'characters transmitted')
     chars_received: int = _counter(2561, 'CRD_CHAR_RECV', 'characters received')
-
-    def reset(self) -> None:
-        """Set every counter to zero."""
-        for entry in fields(self):
-            setattr(self, entry.name, 0)
 
     def by_mnemonic(self) -> dict[str, int]:
         """Return every counter by its mnemonic, in the order of the numbers."""

@@ -294,6 +294,7 @@ class FrameDecoder:
         return self._frame(Fault.NO_ETX)
 
     def _store(self, count: int) -> Symbol | None:
+        count = min(count, MAX_LINK_DATA + 1 - len(self._data))
         self._data += self._buffer[:count]
         del self._buffer[:count]
         if len(self._data) <= MAX_LINK_DATA:

@@ -310,9 +310,7 @@ class HalfDuplexMaster:
         return message
 
     def _note(self, message: Message, *args: int, station: int) -> None:
-        event = Event(message, args, station)
-        self._stations[station].last_event = event
-        self._report(event)
+        self._report(Event(message, args, station))
 
 
 def _is_good(answer: Symbol | None) -> TypeGuard[Control | Frame]:

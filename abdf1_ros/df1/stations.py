@@ -17,10 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.messages import Event
 
 MAX_STATION = 254
 
@@ -39,11 +38,10 @@ class Station:
     last_heard: float | None = None
     last_key: tuple[int, int, int] | None = None
     last_tns: int | None = None
-    last_event: Event | None = None
     replies: int = 0
     failures: int = 0
     remote_errors: int = 0
-    silent_since: float | None = field(default=None)
+    silent_since: float | None = None
 
     def accepts(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""

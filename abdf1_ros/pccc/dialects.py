@@ -49,6 +49,9 @@ class Dialect(Protocol):
         More than one word of a structure file has to be whole elements.
         """
 
+    def reply_size(self, address: Address, words: int) -> int:
+        """Return the bytes behind the header of the reply to that read."""
+
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Return the words in the reply to that read; FormatError when they are not there."""
 
@@ -78,6 +81,13 @@ class Plc5Dialect:
         """Return a typed read; one word of a structure is read as an integer (M 13-12)."""
         count = self._count(address, words)
         return plc5.TypedRead(self._address(address, words), count, 0, count).encode()
+
+    def reply_size(self, address: Address, words: int) -> int:
+        """Return descriptors and elements of the reply's array."""
+        layout = address.file_type.layout
+        size = 2 if words == 1 else 2 * (layout.plc5_words or layout.words)
+        elements = bytes(size * self._count(address, words))
+        return len(TypedData(layout.plc5_id or 0, size, elements).encode())
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Check type and length of a typed read's reply and return its words."""
@@ -146,6 +156,10 @@ class SlcDialect:
     def read(self, address: Address, words: int) -> bytes:
         """Return a protected typed logical read."""
         return slc.LogicalRead(self._address(address), words * 2).encode()
+
+    def reply_size(self, address: Address, words: int) -> int:
+        """Return the bytes asked for."""
+        return words * 2
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Check the length of the reply and return it."""

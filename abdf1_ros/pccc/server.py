@@ -209,3 +209,5 @@ class _Slc:
 
 _FAMILIES: dict[PlcType, Callable[[DataTable], _Family]] = {
     PlcType.PLC5: _Plc5, PlcType.SLC: _Slc}
+
+SERVED_FAMILIES = tuple(_FAMILIES)

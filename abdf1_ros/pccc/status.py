@@ -29,7 +29,12 @@ EXT_TOO_MANY_LEVELS = 0x03
 EXT_BAD_ADDRESS = 0x06
 EXT_WRONG_SIZE = 0x07
 EXT_TOO_LARGE = 0x0A
+EXT_DELETED_AREA = 0x13
 EXT_TYPE_MISMATCH = 0x17
+
+_ADDRESS_FAULTS = (
+    EXT_ILLEGAL_FIELD, EXT_TOO_MANY_LEVELS, EXT_BAD_ADDRESS, EXT_WRONG_SIZE, EXT_TOO_LARGE,
+    EXT_DELETED_AREA, EXT_TYPE_MISMATCH)
 
 _LOCAL = {
     0x01: 'destination has no buffer space',
@@ -115,3 +120,10 @@ def check_status(reply: Packet) -> bytes:
     extended = reply.sts & EXTENDED == EXTENDED and len(reply.data) > 0
     ext_sts = reply.data[0] if extended else None
     raise RemoteError(reply.sts, ext_sts, status_text(reply.sts, ext_sts))
+
+
+def is_address_fault(error: RemoteError) -> bool:
+    """Tell whether the station refused the address or extent, not the time or the sender."""
+    if error.ext_sts is not None:
+        return error.ext_sts in _ADDRESS_FAULTS
+    return error.sts in (STS_ILLEGAL_COMMAND, STS_ADDRESS)

@@ -1,0 +1,298 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The driver of one line: carries out jobs one after the other and hands on what comes of them.
+
+It is sans-IO like the link layer below it: ``Driver.machine`` takes bytes and a clock value,
+and a ``Listener`` gets values, results and events. ``abdf1_ros.port.LinkThread`` gives it a
+port and a clock; the tests give it a virtual line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.frames import Symbol
+from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList, Station
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
+from abdf1_ros.driver.scheduler import ReadJob, Scheduler
+from abdf1_ros.driver.values import Values
+from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.messages import Event
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.status import check_status, is_address_fault
+
+# What a station takes to answer, for the estimate of the scan time (M 14-2 counts two answers
+# for each transaction; PLCs serve the port once per program scan).
+_USUAL_RESPONSE = 0.01
+
+
+class Listener(Protocol):
+    """Who wants to know; called in the link thread, ``written`` also in that of ``write``."""
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take the values of a good read that are to be published."""
+
+    def written(self, result: WriteResult) -> None:
+        """Take the one result of a write."""
+
+    def happened(self, event: Event) -> None:
+        """Take a numbered error or notice."""
+
+    def station_changed(self, station: Station) -> None:
+        """Take note that a station has become active or inactive."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSettings:
+    """
+    What is not in the net CSV; times in seconds.
+
+    ``stale_after`` counts periods; ``first_tns`` is the transaction number to begin with, which
+    should be random, or a restarted driver repeats itself and is taken for a duplicate.
+    """
+
+    default_period: float = 0.1
+    stale_after: float = 3.0
+    write_timeout: float = 2.0
+    read_only: bool = False
+    nak_on_command_timeout: bool = True
+    first_tns: int = 0
+
+
+class Driver:
+    """Read and write the mapped addresses over one half-duplex line."""
+
+    def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
+                 listener: Listener) -> None:
+        self.network = network
+        self.mappings = tuple(mappings)
+        self.counters = Counters()
+        self.stations = ActiveStationList(
+            (mapping.station for mapping in mappings), listener.station_changed)
+        self.machine = Machine(
+            lambda machine: self._run(), checksum=network.checksum, timing=network.timing,
+            counters=self.counters, forget_on_send=True)
+        self.is_online = False
+        self.transactions = 0
+        self._writing: Write | None = None
+        self._settings = settings
+        self._listener = listener
+        self._master = HalfDuplexMaster(
+            self.machine, _master_settings(network, settings), self.stations, listener.happened)
+        self._tns = settings.first_tns
+        self._last_tns: dict[int, int] = {}
+        self._planner = Planner(
+            network.checksum, network.timing.char_time, settings.default_period)
+        blocks = self._planner.plan(mappings)
+        self.expected_scan_time = sum(
+            block.line_time + 2 * _USUAL_RESPONSE * len(block.requests) for block in blocks)
+        self.points = {mapping: self._point(mapping) for mapping in mappings if mapping.reads}
+        self._scheduler = Scheduler(
+            self.stations, probe_time=network.timeout / 1000,
+            write_timeout=settings.write_timeout, report=listener.written)
+        self._scheduler.add_reads(map(self._job, blocks), 0.0)
+
+    @property
+    def scan_time(self) -> float | None:
+        """Return how long (s) the slowest mapping has waited between its last two reads."""
+        return self._scheduler.scan_time
+
+    @property
+    def blocks(self) -> list[Block]:
+        """Return what is read together."""
+        return [job.block for job in self._scheduler.jobs]
+
+    def write(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
+        """
+        Ask for a write; may be called from any thread, followed by ``LinkThread.wake``.
+
+        Exactly one WriteResult follows, at once when the request is refused.
+        """
+        try:
+            if self._settings.read_only:
+                raise FormatError('this node is read_only')
+            if not self.is_online:
+                raise FormatError('the port is not open')
+            if self._scheduler.is_full:
+                raise FormatError('too many writes are waiting')
+            self._scheduler.add_write(Write(mapping, values, now))
+        except FormatError as error:
+            self.refuse(mapping, str(error), values)
+
+    def refuse(self, mapping: Mapping, reason: str, values: Sequence[float] | str) -> None:
+        """Report that a request to write was not taken."""
+        self._listener.written(
+            WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
+
+    def _point(self, mapping: Mapping) -> ReadPoint:
+        period = self._settings.default_period if mapping.period is None \
+            else mapping.period / 1000
+        stale_time = self._settings.stale_after * max(period, self.expected_scan_time)
+        return ReadPoint(mapping, period, stale_time)
+
+    def _job(self, block: Block) -> ReadJob:
+        return ReadJob(block, [self.points[mapping] for mapping in block.mappings])
+
+    def _run(self) -> Procedure:
+        """Take jobs and carry them out, as long as there is a port."""
+        self._scheduler.drop_writes('requested while the port was not open', self.machine.now)
+        self.is_online = True
+        end = 'internal error, see the log'
+        try:
+            while True:
+                now = self.machine.now
+                job = self._scheduler.next_job(now)
+                if isinstance(job, Write):
+                    yield from self._do_write(job)
+                elif job is not None:
+                    yield from self._do_read(job)
+                else:
+                    due = self._scheduler.next_due()
+                    yield Step(None, None if due is None else max(due - now, 0.0))
+        except PortLost as error:
+            end = str(error)
+            raise
+        finally:
+            self._went_down(end)
+
+    def _went_down(self, reason: str) -> None:
+        """Leave nothing without a result, and no old command to be sent later."""
+        self.is_online = False
+        for point in self.points.values():
+            point.fail(reason)
+        if self._writing is not None:
+            self._finish_write(self._writing, Outcome.UNKNOWN, reason, 0)
+        self._scheduler.drop_writes(reason, self.machine.now)
+
+    def _do_read(self, job: ReadJob) -> Generator[Step, Symbol | None, None]:
+        started = self.machine.now
+        try:
+            data = yield from self._read_block(job.block)
+        except RemoteError as error:
+            self.stations[job.station].remote_errors += 1
+            self._read_failed(job, str(error), is_address_fault(error))
+        except FormatError as error:
+            self._read_failed(job, f'unusable reply: {error}', divisible=False)
+        except LinkError as error:
+            self._link_failed(job.station, job.points, error)
+        else:
+            job.done(self.machine.now)
+            self._distribute(job, data)
+        if job in self._scheduler.jobs:
+            self._scheduler.finished(job, started, self.machine.now)
+
+    def _read_block(self, block: Block) -> Generator[Step, Symbol | None, bytes]:
+        data = b''
+        for request in block.requests:
+            if data:  # a write does not have to wait for all packets of a long mapping
+                write = self._scheduler.next_write(self.machine.now)
+                if write is not None:
+                    yield from self._do_write(write)
+            command = block.dialect.read(request.start, request.words)
+            reply = yield from self._exchange(block.station, block.dialect.cmd, command)
+            data += block.dialect.read_data(request.start, request.words, reply)
+        return data
+
+    def _distribute(self, job: ReadJob, data: bytes) -> None:
+        for point in job.points:
+            try:
+                words = job.block.words_of(point.mapping, data)
+                values = point.update(words, self.machine.now)
+            except FormatError as error:
+                point.fail(str(error))
+            else:
+                if values is not None:
+                    self._listener.read(point.mapping, values)
+
+    def _read_failed(self, job: ReadJob, reason: str, divisible: bool) -> None:
+        """Fail the points; a block with a bad address is divided until that one is alone."""
+        for point in job.points:
+            point.fail(reason)
+        if divisible and len(job.points) > 1:
+            parts = map(self._job, self._planner.split(job.block))
+            self._scheduler.replace(job, parts, self.machine.now)
+
+    def _link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
+        """Fail what the end of a transaction without a reply concerns."""
+        self.stations[station].failures += 1
+        if not self.stations[station].active:
+            points = (point for point in self.points.values()
+                      if point.mapping.station == station)
+        for point in points:
+            point.fail(str(error))
+        if isinstance(error, PortLost):
+            raise error
+
+    def _do_write(self, write: Write) -> Generator[Step, Symbol | None, None]:
+        station = write.mapping.station
+        cmd = DIALECTS[write.mapping.plc_type].cmd
+        self._writing = write
+        done = 0
+        try:
+            for command in write.commands:
+                yield from self._exchange(station, cmd, command)
+                done += 1
+        except RemoteError as error:
+            self.stations[station].remote_errors += 1
+            self._finish_write(write, Outcome.FAILED, str(error), done)
+        except LinkError as error:
+            sent = self._master.command_sent
+            outcome = Outcome.UNKNOWN if sent or done else Outcome.NOT_SENT
+            self._finish_write(write, outcome, str(error), done)
+            self._link_failed(station, (), error)
+        else:
+            self._finish_write(write, Outcome.WRITTEN, '', done)
+        if done:
+            self._scheduler.hasten(write, self.machine.now)
+
+    def _finish_write(self, write: Write, outcome: Outcome, detail: str, done: int) -> None:
+        self._writing = None
+        if 0 < done < len(write.commands):
+            detail += f' (after {done} of {len(write.commands)} packets were written)'
+        self._listener.written(write.result(outcome, detail, self.machine.now))
+
+    def _exchange(self, station: int, cmd: int,
+                  data: bytes) -> Generator[Step, Symbol | None, bytes]:
+        """Return the data of the reply; RemoteError or LinkError when there are none."""
+        command = Packet(station, self.network.station, cmd, 0, self._next_tns(station), data)
+        reply = yield from self._master.exchange(command)
+        self.transactions += 1
+        return check_status(reply)
+
+    def _next_tns(self, station: int) -> int:
+        """Return the next transaction number, never the one this station had last."""
+        self._tns = self._tns + 1 & 0xFFFF
+        if self._tns == self._last_tns.get(station):
+            self._tns = self._tns + 1 & 0xFFFF
+        self._last_tns[station] = self._tns
+        return self._tns
+
+
+def _master_settings(network: Network, settings: DriverSettings) -> MasterSettings:
+    return MasterSettings(
+        station=network.station, checksum=network.checksum, nak_retries=network.nak_retries,
+        enq_retries=network.enq_retries, timeout=network.timeout / 1000,
+        cmd_timeout=network.cmd_timeout / 1000,
+        nak_on_command_timeout=settings.nak_on_command_timeout)

@@ -1,0 +1,39 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""ROS names made of tags: what ``rcl`` accepts, and nothing that surprises."""
+
+from __future__ import annotations
+
+import re
+
+# A topic name of 247 characters is the longest that DDS takes; 150 leave room for the
+# namespace, the node and "/write/".
+MAX_LENGTH = 150
+
+
+def sanitise(text: str) -> str:
+    """
+    Return ``text`` as a relative topic name, or '' where nothing is left of it.
+
+    "/" separates parts; any other character that ROS does not allow becomes "_", runs of "_"
+    become one, and a part that begins with a digit gets a "t" in front.
+    """
+    parts = (_part(part) for part in text.split('/'))
+    return '/'.join(part for part in parts if part)
+
+
+def _part(text: str) -> str:
+    name = re.sub(r'_+', '_', re.sub(r'[^A-Za-z0-9_]', '_', text)).strip('_')
+    return f't{name}' if name[:1].isdigit() else name

@@ -1,0 +1,209 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The net CSV: one serial link and how its driver behaves (S0, "Network Configuration")."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.driver.csv_table import read_rows, whole_number
+from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.messages import Message
+
+MODES = ('Master', 'Slave', 'Peer')
+SUPPORTED_MODES = ('Master',)
+PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
+BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+
+
+@dataclass(frozen=True, slots=True)
+class NetField:
+    """
+    One field of the net CSV.
+
+    A number lies from ``low`` to ``high`` or is one of ``choices``; a text is one of
+    ``choices`` in any letter case, or anything where there are none. A bad value is reported
+    with ``message``, whose places after the value are filled from ``message_args``.
+    """
+
+    column: str
+    default: int | str
+    description: str
+    low: int | None = None
+    high: int | None = None
+    choices: tuple[int | str, ...] = ()
+    message: Message | None = None
+    message_args: tuple[Any, ...] = ()
+
+    @property
+    def parameter(self) -> str:
+        """Return the name of the node's parameter."""
+        return f'net.{self.column.lower()}'
+
+    def parse(self, text: str, where: str) -> int | str:
+        """Return the value of a cell; raise Problem when it is not allowed."""
+        value = self._number(text) if isinstance(self.default, int) else self._choice(text)
+        if value is None:
+            args = (text, *self.message_args)
+            raise Problem(where, self.advice(text), self.message, args if self.message else ())
+        return value
+
+    def advice(self, text: str) -> str:
+        """Return what is wrong with a value and what would be right."""
+        if self.choices:
+            right = f'one of {", ".join(map(str, self.choices))}'
+        else:
+            right = f'a whole number from {self.low} to {self.high}'
+        return f'{self.column} = "{text}" should be {right}'
+
+    def _number(self, text: str) -> int | None:
+        value = whole_number(text)
+        if value is None or self.choices:
+            return value if value in self.choices else None
+        assert self.low is not None and self.high is not None
+        return value if self.low <= value <= self.high else None
+
+    def _choice(self, text: str) -> str | None:
+        if not self.choices:
+            return text
+        return next((str(choice) for choice in self.choices
+                     if str(choice).lower() == text.lower()), None)
+
+
+def _net(column: str, default: int | str, description: str, *, low: int | None = None,
+         high: int | None = None, choices: tuple[int | str, ...] = (),
+         message: Message | None = None, message_args: tuple[Any, ...] = ()) -> Any:
+    entry = NetField(column, default, description, low, high, choices, message, message_args)
+    return field(default=default, metadata={'net': entry})
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A checked net CSV; times in milliseconds, as in the file."""
+
+    station: int = _net(
+        'Station', 5, 'DF1 address of this node', low=0, high=254,
+        message=Message.CRT_BAD_STATION_ID, message_args=(255,))
+    mode: str = _net(
+        'Mode', 'Master', 'driver mode', choices=MODES,
+        message=Message.CRT_BAD_DRIVER_MODE, message_args=MODES)
+    plc_type: str = _net(
+        'PLC_Type', 'PLC5', 'PLC that this node emulates', choices=PLC_TYPES,
+        message=Message.CRT_BAD_PLC_TYPE, message_args=PLC_TYPES)
+    error_code: str = _net(
+        'Error_Code', 'CRC', 'check of every message', choices=('BCC', 'CRC'),
+        message=Message.CRT_BAD_ERROR_CODE, message_args=('BCC', 'CRC'))
+    nak_retries: int = _net(
+        'NAK_Retries', 3, 'repetitions of a command that is not acknowledged', low=0, high=10,
+        message=Message.CRT_BAD_NAK_RETRIES, message_args=(10,))
+    enq_retries: int = _net(
+        'ENQ_Retries', 3, 'repetitions of a poll that is not answered', low=0, high=10,
+        message=Message.CRT_BAD_ENQ_RETRIES, message_args=(10,))
+    cmd_timeout: int = _net(
+        'Cmd_Timeout', 1000, 'ms until a reply is no longer polled for', low=500, high=5000,
+        message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
+    com_port: str = _net(
+        'Com_Port', '1', 'n for /dev/ttyS(n-1), a device path, or a pyserial URL')
+    baud: int = _net('Baud', 9600, 'bits per second', choices=BAUD_RATES)
+    data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
+    stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
+    parity: str = _net(
+        'Parity', 'None', 'parity bit per character', choices=('None', 'Even', 'Odd'))
+    timeout: int = _net(
+        'Timeout', 1000, 'ms to wait for each answer of a station', low=0, high=360000)
+    tx_delay: int = _net(
+        'TX_Delay', 0, 'ms to wait before each transmission', low=0, high=65535)
+    handshake: str = _net(
+        'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
+
+    @property
+    def checksum(self) -> Checksum:
+        """Return the check of messages."""
+        return Checksum(self.error_code)
+
+    @property
+    def port(self) -> str:
+        """Return the device path or URL that Com_Port stands for."""
+        if self.com_port.isdigit():
+            return f'/dev/ttyS{int(self.com_port) - 1}'
+        return self.com_port
+
+    @property
+    def timing(self) -> LineTiming:
+        """Return character time and TX_Delay in seconds."""
+        bits = 1 + self.data_bits + (self.parity != 'None') + self.stop_bits
+        return LineTiming(bits / self.baud, self.tx_delay / 1000)
+
+
+FIELDS: dict[str, NetField] = {
+    entry.name: entry.metadata['net'] for entry in fields(Network)}
+
+
+def load_network(path: str) -> Network:
+    """
+    Read a net CSV.
+
+    Raises ConfigurationError with every fault found; any fault is critical (S0).
+    """
+    rows = read_rows(path, [entry.column for entry in FIELDS.values()])
+    if len(rows) != 1:
+        where = f'{path}:{rows[1].line}' if rows else path
+        raise ConfigurationError([Problem(
+            where, f'a net file has one data row, this one has {len(rows)}')])
+    row = rows[0]
+    cells = {name: (row.get(entry.column), row.where(entry.column))
+             for name, entry in FIELDS.items() if row.get(entry.column)}
+    return make_network(cells)
+
+
+def make_network(values: MappingType[str, tuple[str, str]],
+                 base: Network | None = None) -> Network:
+    """
+    Check ``values`` (by field name: text, and where it comes from) and make a network of them.
+
+    What is not among them is taken from ``base``. Raises ConfigurationError.
+    """
+    base = base or Network()
+    checked: dict[str, Any] = {entry.name: getattr(base, entry.name) for entry in fields(base)}
+    problems: list[Problem] = []
+    for name, (text, where) in values.items():
+        try:
+            checked[name] = FIELDS[name].parse(text, where)
+            _check_mode(name, checked[name], where)
+            _check_port(name, checked[name], where)
+        except Problem as problem:
+            problems.append(problem)
+    if problems:
+        raise ConfigurationError(problems)
+    return Network(**checked)
+
+
+def _check_mode(name: str, value: int | str, where: str) -> None:
+    if name == 'mode' and value not in SUPPORTED_MODES:
+        supported = ', '.join(SUPPORTED_MODES)
+        raise Problem(where, f'Mode = "{value}" is not available yet',
+                      Message.CRT_UNSUPPORTED_MODE, (MODES.index(str(value)), supported))
+
+
+def _check_port(name: str, value: int | str, where: str) -> None:
+    text = str(value)
+    named = text.startswith('/') or '://' in text
+    if name == 'com_port' and not named and not (text.isdigit() and int(text) >= 1):
+        raise Problem(where, f'Com_Port = "{text}" should be a number from 1, a device path '
+                             'such as /dev/ttyUSB0, or a URL such as socket://host:port')

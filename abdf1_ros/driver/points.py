@@ -1,0 +1,188 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The two ends of a mapping: the point that is read, and the write that is to be done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from abdf1_ros.driver.mapping import Mapping, Publish
+from abdf1_ros.driver.values import Values, ValueType
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.dialects import DIALECTS
+
+_SHOWN_VALUES = 16
+
+
+class Freshness(Enum):
+    """How good the last value of a point is."""
+
+    FRESH = 'fresh'
+    LATE = 'late'
+    STALE = 'stale'
+    FAILED = 'failed'
+    WAITING = 'waiting for the first read'
+
+
+class ReadPoint:
+    """
+    What is known of one mapping that reads.
+
+    ``period`` and ``stale_time`` are in seconds: a value older than one and a half periods is
+    late, one older than ``stale_time`` stale. ``error`` says why the last read gave no value.
+    """
+
+    def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
+        self.mapping = mapping
+        self.period = period
+        self.stale_time = stale_time
+        self.last_good: float | None = None
+        self.error: str | None = None
+        self.failures = 0
+        self._codec = mapping.codec
+        self._published: bytes | None = None
+
+    def update(self, words: bytes, now: float) -> Values | None:
+        """
+        Take the words of a good read; return the values to publish, or None when unchanged.
+
+        Raises FormatError when the words are no value of the mapping's type.
+        """
+        values = self._codec.decode(words)
+        changed = words != self._published or self.error is not None
+        self.last_good, self.error = now, None
+        self._published = words
+        if self.mapping.publish is Publish.CHANGE and not changed:
+            return None
+        return values
+
+    def fail(self, error: str) -> None:
+        """Take note that a read gave no value."""
+        self.error = error
+        self.failures += 1
+
+    def age(self, now: float) -> float | None:
+        """Return the seconds since the last good read, None before the first."""
+        return None if self.last_good is None else now - self.last_good
+
+    def freshness(self, now: float) -> Freshness:
+        """Judge the last value."""
+        age = self.age(now)
+        if self.error is not None:
+            return Freshness.FAILED
+        if age is None:
+            return Freshness.WAITING
+        if age > self.stale_time:
+            return Freshness.STALE
+        usual = max(1.5 * self.period, self.stale_time / 2)
+        return Freshness.LATE if age > usual else Freshness.FRESH
+
+
+class Outcome(Enum):
+    """How a write ended."""
+
+    WRITTEN = 'written'
+    SUPERSEDED = 'not written: superseded by a newer value'
+    REFUSED = 'not written: refused'
+    NOT_SENT = 'not written: not sent'
+    FAILED = 'not written: the PLC refused it'
+    UNKNOWN = 'unknown whether written'
+
+
+@dataclass(frozen=True, slots=True)
+class WriteResult:
+    """
+    The one result of one write to one mapping.
+
+    ``detail`` is empty for a write that went well; ``latency`` is seconds from the request.
+    """
+
+    mapping: Mapping
+    outcome: Outcome
+    detail: str
+    value: str
+    latency: float
+
+    def __str__(self) -> str:
+        """Return outcome and detail."""
+        return f'{self.outcome.value}: {self.detail}' if self.detail else self.outcome.value
+
+
+class Write:
+    """
+    Values on their way to one mapping.
+
+    Raises FormatError, saying what is wrong, when they cannot or must not be written.
+    ``commands`` are FNC and parameters of each command it takes.
+    """
+
+    def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
+        self.mapping = mapping
+        self.requested = now
+        self.value = show(values)
+        mapping.codec.check(values)
+        _check_limits(mapping, values)
+        self.commands = _commands(mapping, values)
+
+    @property
+    def is_pulse(self) -> bool:
+        """Tell whether each write counts by itself, not only the newest."""
+        return self.mapping.type is ValueType.BOOL
+
+    def result(self, outcome: Outcome, detail: str, now: float) -> WriteResult:
+        """Return how this write ended."""
+        return WriteResult(self.mapping, outcome, detail, self.value, now - self.requested)
+
+
+def show(values: Sequence[float] | str) -> str:
+    """Return values as text for people, cut short when there are many."""
+    if isinstance(values, str):
+        return repr(values)
+    text = ', '.join(f'{value:g}' for value in values[:_SHOWN_VALUES])
+    rest = len(values) - _SHOWN_VALUES
+    return f'[{text}, and {rest} more]' if rest > 0 else f'[{text}]'
+
+
+def _check_limits(mapping: Mapping, values: Sequence[float] | str) -> None:
+    if isinstance(values, str):
+        return
+    for index, value in enumerate(values):
+        if not mapping.minimum <= value <= mapping.maximum:
+            raise FormatError(f'value {value:g} at index {index} is outside '
+                              f'Min {mapping.minimum:g}, Max {mapping.maximum:g}')
+
+
+def _commands(mapping: Mapping, values: Sequence[float] | str) -> list[bytes]:
+    address, codec = mapping.address, mapping.codec
+    dialect = DIALECTS[mapping.plc_type]
+    if mapping.type is ValueType.BOOL:
+        assert not isinstance(values, str)
+        return [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
+                for n, (mask, bits) in enumerate(codec.bit_changes(values))]
+    data = codec.encode(values)
+    packets = _packets(mapping, len(data) // 2)
+    return [dialect.write(address.at_offset(address.offset + first),
+                          data[2 * first:2 * (first + count)])
+            for first, count in packets]
+
+
+def _packets(mapping: Mapping, words: int) -> list[tuple[int, int]]:
+    """Return first word and number of words of each packet that a write takes."""
+    kind = mapping.address.file_type
+    # Members of structures are written one by one: between them lie words not ours.
+    step = 1 if kind.is_structure else DIALECTS[mapping.plc_type].max_write(kind)
+    return [(first, min(step, words - first)) for first in range(0, words, step)]

@@ -1,0 +1,232 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The scheduler: which job has the line next.
+
+Writes go first, but after four in a row a read that is due has its turn. Reads go by their due
+time, so that on a saturated line all of one period fall behind alike and a slow one is still
+never left out. The reads of an inactive station are set aside; every now and then one of them
+goes out as a probe, at a pace that leaves seven eighths of the line to the living.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+import heapq
+import itertools
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.planner import Block
+from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
+
+MAX_WRITES_IN_A_ROW = 4
+MAX_WAITING_WRITES = 1000
+_LIVING_SHARE = 7  # times as long as for one probe
+
+
+class ReadJob:
+    """
+    A block to be read again and again, and the points it serves.
+
+    ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
+    between its last two good reads. ``ticket`` is the scheduler's: the queue entry that counts.
+    """
+
+    def __init__(self, block: Block, points: Sequence[ReadPoint]) -> None:
+        self.block = block
+        self.points = tuple(points)
+        self.due = 0.0
+        self.interval: float | None = None
+        self.ticket = 0
+        self._last_done: float | None = None
+
+    @property
+    def station(self) -> int:
+        """Return the station to read from."""
+        return self.block.station
+
+    def done(self, now: float) -> None:
+        """Take note of a good read."""
+        if self._last_done is not None:
+            self.interval = now - self._last_done
+        self._last_done = now
+
+    def covers(self, write: Write) -> bool:
+        """Tell whether the block shows what ``write`` has changed."""
+        mapping, start = write.mapping, self.block.start
+        if (self.station, start.area) != (mapping.station, mapping.address.area):
+            return False
+        end = start.offset + sum(request.words for request in self.block.requests)
+        first = mapping.address.offset
+        return first < end and start.offset < first + mapping.codec.words
+
+
+class Scheduler:
+    """
+    Keep all jobs.
+
+    ``probe_time`` is the seconds that a probe of a silent station takes; a write that has
+    waited longer than ``write_timeout`` seconds is not sent any more. ``report`` gets the
+    results of writes that end here. Only ``add_write`` may be called from another thread.
+    """
+
+    def __init__(self, stations: ActiveStationList, *, probe_time: float, write_timeout: float,
+                 report: Callable[[WriteResult], None]) -> None:
+        self._stations = stations
+        self._probe_interval = probe_time * _LIVING_SHARE
+        self._write_timeout = write_timeout
+        self._report = report
+        self._inbox: deque[Write] = deque()
+        self._writes: deque[Write] = deque()
+        self._writes_in_a_row = 0
+        self._jobs: set[ReadJob] = set()
+        self._heap: list[tuple[float, int, ReadJob]] = []
+        self._tickets = itertools.count(1)
+        self._parked: dict[int, deque[ReadJob]] = {}
+        self._next_probe = 0.0
+
+    @property
+    def jobs(self) -> frozenset[ReadJob]:
+        """Return all read jobs."""
+        return frozenset(self._jobs)
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether so many writes wait that no more are taken."""
+        return len(self._inbox) + len(self._writes) >= MAX_WAITING_WRITES
+
+    @property
+    def scan_time(self) -> float | None:
+        """Return the longest time (s) between the last two good reads of any job."""
+        return max((job.interval for job in self._jobs if job.interval is not None),
+                   default=None)
+
+    def add_reads(self, jobs: Iterable[ReadJob], now: float) -> None:
+        """Take new jobs, all due at once."""
+        for job in jobs:
+            self._jobs.add(job)
+            self._push(job, now)
+
+    def replace(self, job: ReadJob, parts: Iterable[ReadJob], now: float) -> None:
+        """Put ``parts`` in the place of ``job``, which has just been taken."""
+        self._jobs.discard(job)
+        self.add_reads(parts, now)
+
+    def add_write(self, write: Write) -> None:
+        """Queue a write; may be called from any thread."""
+        self._inbox.append(write)
+
+    def next_job(self, now: float) -> ReadJob | Write | None:
+        """Return what has the line now, or None when nothing is due."""
+        write = self._take_write(now)
+        if write is not None:
+            return write
+        self._writes_in_a_row = 0
+        return self._take_probe(now) or self._take_read(now)
+
+    def next_write(self, now: float) -> Write | None:
+        """Return a waiting write, if it is a write's turn."""
+        return self._take_write(now)
+
+    def next_due(self) -> float | None:
+        """Return when the next read or probe is due (clock value in s), None for never."""
+        due = self._heap[0][0] if self._heap else None
+        if not self._parked:
+            return due
+        return self._next_probe if due is None else min(due, self._next_probe)
+
+    def finished(self, job: ReadJob, started: float, now: float) -> None:
+        """Take a job back, whether it went well or not."""
+        if not self._stations[job.station].active:
+            nobody_else = not self._heap
+            self._next_probe = now + (job.block.period if nobody_else else self._probe_interval)
+            self._park(job)
+            return
+        self._release(job.station, now)
+        self._push(job, max(job.due + job.block.period, started))
+
+    def hasten(self, write: Write, now: float) -> None:
+        """Make the reads that show what ``write`` changed due at once."""
+        self._release(write.mapping.station, now)
+        for job in self._jobs:
+            if job.covers(write) and job.due > now:
+                self._push(job, now)
+
+    def drop_writes(self, detail: str, now: float) -> None:
+        """End every waiting write without sending it."""
+        waiting = [*self._writes, *self._inbox]
+        self._writes.clear()
+        self._inbox.clear()
+        for write in waiting:
+            self._report(write.result(Outcome.NOT_SENT, detail, now))
+
+    def _take_write(self, now: float) -> Write | None:
+        while self._inbox:
+            self._queue(self._inbox.popleft(), now)
+        while self._writes:
+            if self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and self._is_read_due(now):
+                return None
+            write = self._writes.popleft()
+            if now - write.requested <= self._write_timeout:
+                self._writes_in_a_row += 1
+                return write
+            detail = f'waited longer than {self._write_timeout:g} s for the line'
+            self._report(write.result(Outcome.NOT_SENT, detail, now))
+        return None
+
+    def _queue(self, write: Write, now: float) -> None:
+        if not write.is_pulse:
+            for other in [old for old in self._writes if old.mapping is write.mapping]:
+                self._writes.remove(other)
+                self._report(other.result(Outcome.SUPERSEDED, '', now))
+        self._writes.append(write)
+
+    def _take_probe(self, now: float) -> ReadJob | None:
+        if not self._parked or now < self._next_probe:
+            return None
+        station = next(iter(self._parked))
+        jobs = self._parked.pop(station)
+        job = jobs.popleft()
+        if jobs:
+            self._parked[station] = jobs  # to the end: the next probe is another station's
+        return job
+
+    def _take_read(self, now: float) -> ReadJob | None:
+        while self._is_read_due(now):
+            job = heapq.heappop(self._heap)[2]
+            if self._stations[job.station].active:
+                return job
+            self._park(job)
+        return None
+
+    def _is_read_due(self, now: float) -> bool:
+        while self._heap:
+            due, ticket, job = self._heap[0]
+            if ticket == job.ticket and job in self._jobs:
+                return due <= now
+            heapq.heappop(self._heap)  # an entry that a later one has replaced
+        return False
+
+    def _push(self, job: ReadJob, due: float) -> None:
+        job.due, job.ticket = due, next(self._tickets)
+        heapq.heappush(self._heap, (due, job.ticket, job))
+
+    def _release(self, station: int, now: float) -> None:
+        for job in self._parked.pop(station, ()):
+            self._push(job, now)
+
+    def _park(self, job: ReadJob) -> None:
+        self._parked.setdefault(job.station, deque()).append(job)

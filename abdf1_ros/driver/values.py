@@ -1,0 +1,191 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Values on topics and words in a PLC: how one becomes the other."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+import math
+import struct
+import sys
+from typing import Any
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.file_types import FileType
+
+_MAX_STRING = 82
+
+
+class ValueType(Enum):
+    """What a mapping's Type column may say."""
+
+    BOOL = 'bool'
+    INT16 = 'int16'
+    UINT16 = 'uint16'
+    INT32 = 'int32'
+    UINT32 = 'uint32'
+    FLOAT32 = 'float32'
+    BCD16 = 'bcd16'
+    STRING = 'string'
+
+    @property
+    def words(self) -> int:
+        """Return the words that one element takes in a PLC (a bit: none of its own)."""
+        return _WORDS[self]
+
+    @property
+    def array_code(self) -> str:
+        """Return the type code of ``array.array`` that holds such values."""
+        return _ARRAY_CODES[self]
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Return the least and the greatest value."""
+        return _RANGES[self]
+
+
+_WORDS = {
+    ValueType.BOOL: 0, ValueType.INT16: 1, ValueType.UINT16: 1, ValueType.BCD16: 1,
+    ValueType.INT32: 2, ValueType.UINT32: 2, ValueType.FLOAT32: 2, ValueType.STRING: 42}
+_ARRAY_CODES = {
+    ValueType.BOOL: 'B', ValueType.INT16: 'h', ValueType.UINT16: 'H', ValueType.BCD16: 'H',
+    ValueType.INT32: 'i', ValueType.UINT32: 'I', ValueType.FLOAT32: 'f'}
+_FLOAT_MAX = 3.4028234663852886e38
+_RANGES: dict[ValueType, tuple[float, float]] = {
+    ValueType.BOOL: (0, 1), ValueType.INT16: (-32768, 32767), ValueType.UINT16: (0, 65535),
+    ValueType.BCD16: (0, 9999), ValueType.INT32: (-2**31, 2**31 - 1),
+    ValueType.UINT32: (0, 2**32 - 1), ValueType.FLOAT32: (-_FLOAT_MAX, _FLOAT_MAX),
+    ValueType.STRING: (-math.inf, math.inf)}
+
+_WORD_TYPES = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16, ValueType.INT32,
+               ValueType.UINT32, ValueType.FLOAT32)
+_TYPES: dict[FileType, tuple[ValueType, ...]] = {
+    FileType.FLOAT: (ValueType.FLOAT32,),
+    FileType.LONG: (ValueType.INT32, ValueType.UINT32),
+    FileType.STRING: (ValueType.STRING,),
+    FileType.TIMER: (ValueType.INT16, ValueType.UINT16),
+    FileType.COUNTER: (ValueType.INT16, ValueType.UINT16),
+    FileType.CONTROL: (ValueType.INT16, ValueType.UINT16),
+    FileType.INTEGER: _WORD_TYPES}
+_UNSIGNED_FIRST = (ValueType.UINT16, ValueType.INT16, *_WORD_TYPES[2:])
+
+
+def types_of(file_type: FileType) -> tuple[ValueType, ...]:
+    """Return the types that words of such a file may be read as, the natural one first."""
+    return _TYPES.get(file_type, _UNSIGNED_FIRST)
+
+
+Values = Any
+"""An ``array.array`` with the type code of its ValueType, or a str."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codec:
+    """
+    Turn ``length`` elements into words and back.
+
+    Words are bytes, each word low byte first; elements of two words have their low word first.
+    ``bit`` is the number of the first bit, for bits only.
+    """
+
+    type: ValueType
+    length: int
+    bit: int = 0
+
+    @property
+    def words(self) -> int:
+        """Return the number of words that the elements take or touch."""
+        if self.type is ValueType.BOOL:
+            return (self.bit + self.length + 15) // 16
+        return self.type.words * self.length
+
+    def decode(self, data: bytes) -> Values:
+        """Return the values in ``data``; FormatError where the words are no such value."""
+        if self.type is ValueType.STRING:
+            return _decode_string(data)
+        if self.type is ValueType.BOOL:
+            number = int.from_bytes(data, 'little') >> self.bit
+            return array('B', ((number >> n) & 1 for n in range(self.length)))
+        values: Values = array(self.type.array_code, data)
+        if sys.byteorder == 'big':
+            values.byteswap()
+        if self.type is ValueType.BCD16:
+            return array('H', [_from_bcd(value) for value in values])
+        return values
+
+    def check(self, values: Sequence[float] | str) -> None:
+        """Raise FormatError, saying which value is wrong, unless all can be written."""
+        if isinstance(values, str):
+            _encode_string(values)
+            return
+        if len(values) != self.length:
+            raise FormatError(f'{len(values)} values, the mapping has {self.length}')
+        low, high = self.type.range
+        for index, value in enumerate(values):
+            if not low <= value <= high:  # also NaN
+                raise FormatError(f'value {value} at index {index} is no {self.type.value}')
+
+    def encode(self, values: Sequence[float] | str) -> bytes:
+        """Return whole words for ``values`` that ``check`` has passed; not for bits."""
+        if isinstance(values, str):
+            return _encode_string(values)
+        if self.type is ValueType.FLOAT32:
+            return struct.pack(f'<{self.length}f', *values)
+        if self.type is ValueType.BCD16:
+            values = [int(f'{int(value):04d}', 16) for value in values]
+        size = self.type.words * 2
+        mask = (1 << 8 * size) - 1
+        return b''.join((int(value) & mask).to_bytes(size, 'little') for value in values)
+
+    def bit_changes(self, values: Sequence[float]) -> list[tuple[int, int]]:
+        """Return mask and bits for each word that bits touch."""
+        number = sum(int(value) << n for n, value in enumerate(values)) << self.bit
+        mask = (1 << self.length) - 1 << self.bit
+        return [(mask >> at & 0xFFFF, number >> at & 0xFFFF)
+                for at in range(0, 16 * self.words, 16)]
+
+
+def _from_bcd(word: int) -> int:
+    try:
+        return int(f'{word:x}')
+    except ValueError:
+        raise FormatError(f'word {word:04X} is not BCD') from None
+
+
+def _swap(data: bytes) -> bytes:
+    """Exchange the bytes of each word: the first character is the high byte (P5A)."""
+    swapped = bytearray(data)
+    swapped[0::2], swapped[1::2] = data[1::2], data[0::2]
+    return bytes(swapped)
+
+
+def _decode_string(data: bytes) -> str:
+    length = int.from_bytes(data[:2], 'little')
+    if length > _MAX_STRING:
+        raise FormatError(f'string length {length} is more than {_MAX_STRING}')
+    return _swap(data[2:])[:length].decode('latin-1')
+
+
+def _encode_string(text: str) -> bytes:
+    try:
+        characters = text.encode('latin-1')
+    except UnicodeEncodeError as error:
+        raise FormatError(f'character {text[error.start]!r} does not exist in a PLC') from None
+    if len(characters) > _MAX_STRING:
+        raise FormatError(f'{len(characters)} characters, a PLC string has {_MAX_STRING}')
+    return len(characters).to_bytes(2, 'little') + _swap(characters.ljust(_MAX_STRING, b'\0'))

@@ -1,0 +1,273 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The ROS node: mapped reads as topics, writes as subscriptions, state as diagnostics.
+
+Values and results are published from the link thread itself, which spares the way through the
+executor; publishers may be used from any thread. Everything is created before that thread
+starts and destroyed after it has ended.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+import random
+import signal
+import sys
+import threading
+import time
+from types import FrameType
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import rclpy
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import UInt16MultiArray
+from std_srvs.srv import Trigger
+
+from abdf1_ros.df1.stations import Station
+from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.points import Outcome, WriteResult
+from abdf1_ros.driver.values import Values
+from abdf1_ros.errors import ConfigurationError, FormatError
+from abdf1_ros.messages import Event, Message
+from abdf1_ros.node_diagnostics import Diagnostics
+from abdf1_ros.node_log import EventLog
+from abdf1_ros.node_messages import (
+    latched_qos, MESSAGES, new_message, read_qos, values_of, write_qos)
+from abdf1_ros.node_parameters import Configuration, configure
+from abdf1_ros.port import LinkThread, open_port, PortState
+
+NODE_NAME = 'abdf1'
+
+EXIT_CONFIGURATION = 2
+EXIT_FAULT = 1
+
+# How often (s) levels are compared, so that a change of one is published at once.
+_LEVEL_CHECK_PERIOD = 0.1
+
+_RESULT_LEVELS = {
+    Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.SUPERSEDED: DiagnosticStatus.WARN}
+
+
+class BridgeNode(Node):  # type: ignore[misc]
+    """
+    The bridge; raises ConfigurationError when parameters or files are not fit to run with.
+
+    It implements ``Listener``: the driver calls ``read``, ``written``, ``happened`` and
+    ``station_changed``.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(NODE_NAME, **kwargs)
+        try:
+            configuration = configure(self)
+        except ConfigurationError:
+            self.destroy_node()
+            raise
+        for problem in configuration.map_problems:
+            self.get_logger().error(f'{problem} (row left out)')
+        self._log = EventLog(self.get_logger(), time.monotonic)
+        self._read_publishers: dict[str, Any] = {}
+        self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
+        self._active = self.create_publisher(
+            UInt16MultiArray, '~/active_stations', latched_qos())
+        self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.driver = self._make_driver(configuration)
+        self._create_reads()
+        self._create_writes()
+        self._diagnostics = Diagnostics(self.get_name(), self.driver, configuration.port)
+        self._diagnostics_period = configuration.parameters.diagnostics_period
+        self._next_diagnostics = 0.0
+        self._levels: list[bytes] = []
+        self.create_service(Trigger, '~/reset_counters', self._reset_counters)
+        self.create_timer(_LEVEL_CHECK_PERIOD, self._check_diagnostics)
+        self._port = configuration.port
+        self.link = LinkThread(
+            self.driver.machine, lambda: open_port(configuration.network, configuration.port),
+            on_state=self._port_changed, on_fault=self._fault)
+        self._diagnostics.attach(self.link)
+
+    def start(self) -> None:
+        """Open the port and begin to read."""
+        self._publish_active()
+        self.link.start()
+
+    def stop(self) -> None:
+        """End the link thread, then tell the last state; the node may be destroyed after it."""
+        self.link.stop()
+        self._publish_diagnostics(time.monotonic())
+
+    def _make_driver(self, configuration: Configuration) -> Driver:
+        parameters = configuration.parameters
+        settings = DriverSettings(
+            default_period=parameters.default_period / 1000,
+            stale_after=parameters.stale_after, write_timeout=parameters.write_timeout,
+            read_only=parameters.read_only,
+            nak_on_command_timeout=parameters.nak_on_command_timeout,
+            first_tns=random.randrange(0x10000))
+        return Driver(configuration.network, configuration.mappings, settings, self)
+
+    def _create_reads(self) -> None:
+        # The default callbacks make every publisher a burden on every turn of the executor.
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        for mapping, point in self.driver.points.items():
+            publisher = self.create_publisher(
+                MESSAGES[mapping.type], f'~/read/{mapping.topic}',
+                read_qos(mapping, point.stale_time), event_callbacks=quiet)
+            self._read_publishers[mapping.topic] = publisher, new_message(mapping)
+
+    def _create_writes(self) -> None:
+        topics = defaultdict(list)
+        for mapping in self.driver.mappings:
+            if mapping.writes:
+                topics[mapping.topic].append(mapping)
+        for topic, mappings in topics.items():
+            self.create_subscription(
+                MESSAGES[mappings[0].type], f'~/write/{topic}', self._writer(mappings),
+                write_qos())
+
+    def _writer(self, mappings: Sequence[Mapping]) -> Any:
+        """Return the callback that writes a message to every mapping of its topic."""
+        def write(message: Any, info: Any) -> None:
+            # A message may have waited for us, after a pause of this process for example.
+            waited = max(0.0, (time.time_ns() - info['received_timestamp']) / 1e9)
+            requested = time.monotonic() - waited
+            for mapping in mappings:
+                try:
+                    self.driver.write(mapping, values_of(message), requested)
+                except FormatError as error:
+                    self.driver.refuse(mapping, str(error), message.data)
+            self.link.wake()
+        return write
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Publish the values of a good read."""
+        publisher, message = self._read_publishers[mapping.topic]
+        message.data = values
+        publisher.publish(message)
+
+    def written(self, result: WriteResult) -> None:
+        """Publish the result of a write."""
+        self._diagnostics.written(result, time.monotonic())
+        mapping = result.mapping
+        level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
+        if level == DiagnosticStatus.ERROR:
+            self.get_logger().warning(f'write to {mapping.tag} {result.value}: {result}')
+        values = {'address': str(mapping.address), 'station': str(mapping.station),
+                  'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}'}
+        self._results.publish(DiagnosticStatus(
+            level=level, name=mapping.tag, message=str(result), hardware_id=self._port,
+            values=[KeyValue(key=key, value=value) for key, value in values.items()]))
+
+    def happened(self, event: Event) -> None:
+        """Log a numbered event and remember it for the diagnostics."""
+        self._diagnostics.happened(event, time.monotonic())
+        if event.message is not Message.ERR_INACTIVE_STATION:  # logged when the state changes
+            self._log.add(event)
+
+    def station_changed(self, station: Station) -> None:
+        """Publish the Active Node Table and log the change."""
+        self._publish_active()
+        self._log.forget(station.number)
+        if station.active:
+            self.get_logger().info(f'station {station.number} answers again')
+        else:
+            self.get_logger().error(Message.ERR_INACTIVE_STATION.line(station.number))
+
+    def _publish_active(self) -> None:
+        self._active.publish(UInt16MultiArray(data=self.driver.stations.words()))
+
+    def _port_changed(self, state: PortState) -> None:
+        if state.is_open:
+            self.get_logger().info(f'{self._port}: {state.text}')
+        else:
+            self.get_logger().error(f'{self._port}: {state.text}')
+
+    def _fault(self, error: Exception) -> None:
+        self.get_logger().error(f'internal error: {error!r}; please report it')
+
+    def _check_diagnostics(self) -> None:
+        now = time.monotonic()
+        levels = self._diagnostics.levels(now)
+        if now >= self._next_diagnostics or levels != self._levels:
+            self._levels = levels
+            self._publish_diagnostics(now)
+
+    def _publish_diagnostics(self, now: float) -> None:
+        self._next_diagnostics = now + self._diagnostics_period
+        message = DiagnosticArray(status=self._diagnostics.statuses(now))
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics_publisher.publish(message)
+
+    def _reset_counters(self, request: Trigger.Request,
+                        response: Trigger.Response) -> Trigger.Response:
+        self._diagnostics.reset_counters()
+        response.success, response.message = True, 'all counters begin again at 0'
+        return response
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Run the node until SIGINT or SIGTERM.
+
+    Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors.
+    """
+    ended = threading.Event()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        ended.set()
+
+    signal.signal(signal.SIGINT, end)
+    signal.signal(signal.SIGTERM, end)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = BridgeNode()
+    except ConfigurationError as error:
+        for problem in error.problems:
+            get_logger(NODE_NAME).fatal(str(problem))
+        rclpy.try_shutdown()
+        return EXIT_CONFIGURATION
+    except (ParameterException, RuntimeError, ValueError) as error:
+        # rclpy's own words for arguments and names that it does not take
+        print(f'{NODE_NAME}: {error}', file=sys.stderr)
+        rclpy.try_shutdown()
+        return EXIT_CONFIGURATION
+    _spin(node, ended)
+    node.stop()
+    failed = node.link.has_failed
+    node.destroy_node()
+    rclpy.try_shutdown()
+    return EXIT_FAULT if failed else 0
+
+
+def _spin(node: BridgeNode, ended: threading.Event) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    node.start()
+    while not ended.is_set() and not node.link.has_failed:
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,269 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the node says of itself on /diagnostics, readable without any tool but an echo."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+import time
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from abdf1_ros.df1.stations import Station
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
+from abdf1_ros.messages import Event, Message, Severity
+from abdf1_ros.port import LinkThread
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+_WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR'}
+
+# How long a failed write keeps its status at WARN, in seconds.
+_WRITE_MEMORY = 10.0
+
+_FRESHNESS_LEVELS = {
+    Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
+    Freshness.STALE: ERROR, Freshness.FAILED: ERROR}
+
+Verdict = tuple[bytes, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """
+    One status: ``judge`` gives level and text and is cheap, ``values`` gives the details.
+
+    Both get the clock value (s).
+    """
+
+    name: str
+    hardware_id: str
+    judge: Callable[[float], Verdict]
+    values: Callable[[float], dict[str, str]]
+
+
+class Diagnostics:
+    """All statuses of one node, named ``<node>: <section>``."""
+
+    def __init__(self, node_name: str, driver: Driver, port: str) -> None:
+        self._driver = driver
+        self._port = port
+        self._link: LinkThread | None = None
+        self._last_error: tuple[Event, float] | None = None
+        self._last_events: dict[int | None, Event] = {}
+        self._writes = WriteLog()
+        self._baseline = {name: 0 for name in driver.counters.by_mnemonic()}
+        self._rate = _Rate()
+        self._sections = [
+            Section('link', port, self._judge_link, self._link_values),
+            Section('counters', port, self._judge_counters, lambda now: self._counters()),
+            *(self._station_section(station, port) for station in driver.stations),
+            Section('mappings', port, self._judge_mappings, self._mapping_values),
+            Section('writes', port, self._writes.judge, lambda now: self._writes.values()),
+        ]
+        self._node_name = node_name
+
+    def attach(self, link: LinkThread) -> None:
+        """Name the thread whose port is reported on."""
+        self._link = link
+
+    def happened(self, event: Event, now: float) -> None:
+        """Remember the last numbered error, and the last thing unusual at each station."""
+        if event.message is Message.NTC_REPLY_MSG_RCVD:
+            return
+        self._last_events[event.station] = event
+        if event.message.severity is not Severity.NOTICE:
+            self._last_error = event, now
+
+    def written(self, result: WriteResult, now: float) -> None:
+        """Count a write."""
+        self._writes.add(result, now)
+
+    def reset_counters(self) -> None:
+        """Show every counter from zero again."""
+        # The counters themselves belong to the link thread; only their origin moves.
+        self._baseline = self._driver.counters.by_mnemonic()
+
+    def levels(self, now: float) -> list[bytes]:
+        """Return the level of every status."""
+        return [section.judge(now)[0] for section in self._sections]
+
+    def statuses(self, now: float) -> list[DiagnosticStatus]:
+        """Return every status."""
+        self._rate.update(self._driver, now)
+        return [self._status(section, now) for section in self._sections]
+
+    def _status(self, section: Section, now: float) -> DiagnosticStatus:
+        level, text = section.judge(now)
+        return DiagnosticStatus(
+            level=level, name=f'{self._node_name}: {section.name}',
+            message=f'{_WORDS[level]}: {text}', hardware_id=section.hardware_id,
+            values=[KeyValue(key=key, value=value)
+                    for key, value in section.values(now).items()])
+
+    def _judge_link(self, now: float) -> Verdict:
+        state = self._link.state if self._link else None
+        if state is None or not state.is_open:
+            return ERROR, state.text if state else 'not started yet'
+        active = sum(station.active for station in self._driver.stations)
+        total = sum(1 for _ in self._driver.stations)
+        if total and not active:
+            return ERROR, f'port open, but none of {total} stations answers'
+        if active < total:
+            return WARN, f'port open, {total - active} of {total} stations do not answer'
+        return OK, f'port open, {total} stations answer'
+
+    def _link_values(self, now: float) -> dict[str, str]:
+        state = self._link.state if self._link else None
+        scan_time = self._driver.scan_time
+        network = self._driver.network
+        values = {
+            'port': f'{"open" if state and state.is_open else "closed"}',
+            'settings': f'{network.baud} baud, {network.error_code}',
+            'transactions per second': f'{self._rate.transactions:.1f}',
+            'line load': f'{self._rate.load:.0f} %',
+            'scan time': 'unknown' if scan_time is None else f'{scan_time * 1000:.0f} ms',
+            'expected scan time': f'{self._driver.expected_scan_time * 1000:.0f} ms',
+            'last error': 'none',
+        }
+        if self._last_error is not None:
+            event, when = self._last_error
+            values['last error'] = f'{event} ({now - when:.1f} s ago)'
+        return values
+
+    def _counters(self) -> dict[str, str]:
+        counts = self._driver.counters.by_mnemonic()
+        return {name: str(count - self._baseline[name]) for name, count in counts.items()}
+
+    def _judge_counters(self, now: float) -> Verdict:
+        counts = self._counters()
+        return OK, (f'{counts["CNT_CMD_MSGS_SENT"]} commands sent, '
+                    f'{counts["CNT_REPLY_MSGS_RCVD"]} replies received')
+
+    def _station_section(self, station: Station, port: str) -> Section:
+        return Section(
+            f'station {station.number}', f'{port} station {station.number}',
+            lambda now: _judge_station(station, now),
+            lambda now: self._station_values(station, now))
+
+    def _station_values(self, station: Station, now: float) -> dict[str, str]:
+        heard = station.last_heard
+        return {
+            'active': 'yes' if station.active else 'no',
+            'last answer': 'none yet' if heard is None else f'{now - heard:.1f} s ago',
+            'last TNS': 'none yet' if station.last_tns is None else f'0x{station.last_tns:04X}',
+            'replies': str(station.replies),
+            'transactions without reply': str(station.failures),
+            'error replies': str(station.remote_errors),
+            'last event': str(self._last_events.get(station.number, 'none')),
+        }
+
+    def _judge_mappings(self, now: float) -> Verdict:
+        points = self._driver.points.values()
+        found = Counter(point.freshness(now) for point in points)
+        level = max((_FRESHNESS_LEVELS[state] for state in found), default=OK)
+        if not points:
+            return OK, 'no mapping reads'
+        states = [f'{count} {state.value}' for state, count in found.items()]
+        return level, f'of {len(points)} mappings {", ".join(sorted(states))}'
+
+    def _mapping_values(self, now: float) -> dict[str, str]:
+        points = list(self._driver.points.values())
+        found = Counter(point.freshness(now) for point in points)
+        values = {'total': str(len(points))}
+        values |= {state.name.lower(): str(found[state]) for state in Freshness}
+        return values | {
+            point.mapping.tag: _describe(point, now) for point in points
+            if point.freshness(now) is not Freshness.FRESH}
+
+
+class WriteLog:
+    """
+    Counts of writes by how they ended.
+
+    Refusals are counted in the thread of the requests, all else in that of the link: no count
+    has two writers.
+    """
+
+    def __init__(self) -> None:
+        self._counts: Counter[Outcome] = Counter()
+        self._last_failure: tuple[WriteResult, float] | None = None
+
+    def add(self, result: WriteResult, now: float) -> None:
+        """Count a result."""
+        self._counts[result.outcome] += 1
+        if result.outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED):
+            self._last_failure = result, now
+
+    def judge(self, now: float) -> Verdict:
+        """Return WARN for a while after a write that was not confirmed."""
+        total = self._counts.total()
+        summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
+        if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
+            result = self._last_failure[0]
+            return WARN, f'{summary}; {result.mapping.tag} {result}'
+        return OK, summary
+
+    def values(self) -> dict[str, str]:
+        """Return the counts and the last failure."""
+        counts = self._counts
+        failed = counts[Outcome.FAILED] + counts[Outcome.NOT_SENT]
+        last = self._last_failure
+        return {
+            'accepted': str(counts.total() - counts[Outcome.REFUSED]),
+            'confirmed': str(counts[Outcome.WRITTEN]),
+            'failed': str(failed),
+            'unknown': str(counts[Outcome.UNKNOWN]),
+            'superseded': str(counts[Outcome.SUPERSEDED]),
+            'refused': str(counts[Outcome.REFUSED]),
+            'last failure': f'{last[0].mapping.tag} {last[0]}' if last else 'none',
+        }
+
+
+class _Rate:
+    """Transactions a second and line load since the last look."""
+
+    def __init__(self) -> None:
+        self.transactions = 0.0
+        self.load = 0.0
+        self._seen = (time.monotonic(), 0, 0)
+
+    def update(self, driver: Driver, now: float) -> None:
+        before, transactions, characters = self._seen
+        total = driver.counters.chars_sent + driver.counters.chars_received
+        if now > before:
+            self.transactions = (driver.transactions - transactions) / (now - before)
+            on_line = (total - characters) * driver.network.timing.char_time
+            self.load = min(100.0, 100 * on_line / (now - before))
+            self._seen = now, driver.transactions, total
+
+
+def _judge_station(station: Station, now: float) -> Verdict:
+    if not station.active:
+        since = now - (station.silent_since or now)
+        return ERROR, f'station {station.number} inactive since {since:.1f} s'
+    if station.last_heard is None:
+        return OK, f'station {station.number} not heard yet'
+    return OK, f'station {station.number} active'
+
+
+def _describe(point: ReadPoint, now: float) -> str:
+    age = point.age(now)
+    text = f'{point.freshness(now).value}: {point.mapping.address} at station ' \
+           f'{point.mapping.station}'
+    text += ', never read' if age is None else f', last read {age:.1f} s ago'
+    return f'{text}; {point.error}' if point.error else text

@@ -1,0 +1,95 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The std_msgs of each value type, and the QoS of the node's topics."""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import (
+    Float32MultiArray, Int16MultiArray, Int32MultiArray, MultiArrayDimension, MultiArrayLayout,
+    String, UInt16MultiArray, UInt32MultiArray, UInt8MultiArray)
+
+from abdf1_ros.driver.mapping import Mapping, Publish
+from abdf1_ros.driver.values import Values, ValueType
+from abdf1_ros.errors import FormatError
+
+MESSAGES: dict[ValueType, Any] = {
+    ValueType.BOOL: UInt8MultiArray,
+    ValueType.INT16: Int16MultiArray,
+    ValueType.UINT16: UInt16MultiArray,
+    ValueType.BCD16: UInt16MultiArray,
+    ValueType.INT32: Int32MultiArray,
+    ValueType.UINT32: UInt32MultiArray,
+    ValueType.FLOAT32: Float32MultiArray,
+    ValueType.STRING: String,
+}
+
+# Pulses are written one by one, so a burst of them has to fit.
+_WRITE_DEPTH = 50
+
+
+def new_message(mapping: Mapping) -> Any:
+    """Return a message for the values of ``mapping``, its layout filled in."""
+    message = MESSAGES[mapping.type]()
+    if mapping.type is not ValueType.STRING:
+        dimension = MultiArrayDimension(
+            label=str(mapping.address), size=mapping.length, stride=mapping.length)
+        message.layout = MultiArrayLayout(dim=[dimension])
+    return message
+
+
+def values_of(message: Any) -> Values:
+    """Return the values of a message to be written; FormatError when they do not start at 0."""
+    if isinstance(message, String):
+        return message.data
+    if message.layout.data_offset:
+        raise FormatError('layout.data_offset should be 0')
+    values: array[float] = message.data
+    return values
+
+
+def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
+    """
+    Return the QoS of a read topic.
+
+    A late subscriber gets the last value, but never one older than ``stale_time`` seconds; one
+    that asks for deadline or liveliness is told after that time that values have stopped. A
+    topic that is published on change only cannot promise this.
+    """
+    profile = QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    if mapping.publish is Publish.ALWAYS:
+        time = Duration(seconds=stale_time)
+        profile.lifespan = profile.deadline = profile.liveliness_lease_duration = time
+        profile.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
+    return profile
+
+
+def write_qos() -> QoSProfile:
+    """Return the QoS of write topics: nothing sent before we are there is ever executed."""
+    return QoSProfile(
+        depth=_WRITE_DEPTH, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.VOLATILE)
+
+
+def latched_qos() -> QoSProfile:
+    """Return the QoS of a topic whose last message a late subscriber gets."""
+    return QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                      durability=DurabilityPolicy.TRANSIENT_LOCAL)

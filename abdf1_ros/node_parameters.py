@@ -1,0 +1,172 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node's parameters: one table, their declaration, and what they come to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+
+from abdf1_ros.driver.mapping import COLUMNS, load_mappings, Mapping
+from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
+from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.paths import config_file
+
+
+def _parameter(default: bool | float | str, description: str, low: float | None = None,
+               high: float | None = None) -> Any:
+    return field(default=default,
+                 metadata={'description': description, 'low': low, 'high': high})
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """The node's own parameters; those of the link (``net.*``) are the fields of Network."""
+
+    net_file: str = _parameter('', 'path of the net CSV; empty: the one of this package')
+    map_file: str = _parameter('', 'path of the map CSV; empty: the one of this package')
+    port: str = _parameter('', 'device path or pyserial URL to use instead of Com_Port')
+    strict_map: bool = _parameter(False, 'a bad row in the map ends the process')
+    read_only: bool = _parameter(False, 'refuse every write')
+    default_period: int = _parameter(
+        100, 'ms between reads of a mapping without Period; 0: as often as the line allows',
+        0, 86_400_000)
+    diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
+    stale_after: float = _parameter(
+        3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
+    write_timeout: float = _parameter(
+        2.0, 's that a write may wait for the line', 0.05, 60.0)
+    nak_on_command_timeout: bool = _parameter(
+        True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
+    expose_map_parameters: bool = _parameter(
+        True, 'show every mapping as read-only parameters map.<tag>.<column>')
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """All that the node needs to know; ``map_problems`` are those of rows left out."""
+
+    parameters: Parameters
+    network: Network
+    port: str
+    mappings: list[Mapping]
+    map_problems: list[Problem]
+
+
+def configure(node: Node) -> Configuration:
+    """
+    Declare all parameters and read both files.
+
+    Raises ConfigurationError with every fault that keeps the node from running.
+    """
+    problems: list[Problem] = []
+    parameters = _declare_own(node, problems)
+    network = Network()
+    mappings: list[Mapping] = []
+    map_problems: list[Problem] = []
+    try:
+        from_file = load_network(parameters.net_file or str(config_file('net.csv')))
+        network = _declare_network(node, from_file)
+    except ConfigurationError as error:
+        problems += error.problems
+    try:
+        mappings, map_problems = load_mappings(
+            parameters.map_file or str(config_file('map.csv')))
+    except ConfigurationError as error:
+        problems += error.problems
+    if parameters.strict_map:
+        problems += map_problems
+    if problems:
+        raise ConfigurationError(problems)
+    if parameters.expose_map_parameters:
+        _declare_map(node, mappings)
+    port = parameters.port or network.port
+    return Configuration(parameters, network, port, mappings, map_problems)
+
+
+def _declare(node: Node, name: str, default: Any, description: str, low: float | None = None,
+             high: float | None = None) -> Any:
+    """
+    Declare a parameter and return its value, whatever the user has given.
+
+    Types and ranges are shown to the user by rclpy and checked by us, who can say more.
+    """
+    descriptor = ParameterDescriptor(
+        description=description, read_only=True, dynamic_typing=True)
+    if low is not None and high is not None:
+        if isinstance(default, int):
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(low), to_value=float(high))]
+    try:
+        return node.declare_parameter(name, default, descriptor).value
+    except ParameterException:
+        descriptor.integer_range, descriptor.floating_point_range = [], []
+        return node.declare_parameter(name, default, descriptor).value
+
+
+def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
+    values: dict[str, Any] = {}
+    for entry in fields(Parameters):
+        low, high = entry.metadata['low'], entry.metadata['high']
+        value = _declare(
+            node, entry.name, entry.default, entry.metadata['description'], low, high)
+        kind = type(entry.default)
+        if kind is float and type(value) is int:
+            value = float(value)
+        if kind is str and isinstance(value, int | float):
+            value = str(value)
+        if type(value) is not kind or (low is not None and not low <= value <= high):
+            right = f'a {kind.__name__}' if low is None else f'a {kind.__name__} from ' \
+                                                             f'{low:g} to {high:g}'
+            problems.append(Problem(
+                f'parameter {entry.name}', f'{entry.name} = {value!r} should be {right}'))
+            value = entry.default
+        values[entry.name] = value
+    return Parameters(**values)
+
+
+def _declare_network(node: Node, network: Network) -> Network:
+    """Declare net.*, defaults from the file; return the network with what overrides it."""
+    given = {}
+    for name, entry in FIELDS.items():
+        default = getattr(network, name)
+        description = entry.description
+        if entry.choices:
+            description += f' ({", ".join(map(str, entry.choices))})'
+        value = _declare(node, entry.parameter, default, description, entry.low, entry.high)
+        if value != default:
+            given[name] = _text(value), f'parameter {entry.parameter}'
+    return make_network(given, network)
+
+
+def _text(value: Any) -> str:
+    """Return a value as a CSV would hold it; YAML makes a bool of Yes and No."""
+    if isinstance(value, bool):
+        return 'Yes' if value else 'No'
+    return str(value)
+
+
+def _declare_map(node: Node, mappings: list[Mapping]) -> None:
+    descriptor = ParameterDescriptor(read_only=True)
+    node.declare_parameters('map', [
+        (f'{mapping.name.replace("/", ".")}.{column.lower()}', mapping.cell(column),
+         descriptor)
+        for mapping in mappings for column in COLUMNS], ignore_override=True)

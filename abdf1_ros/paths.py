@@ -1,0 +1,39 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where the files of this package lie."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import sys
+
+_PACKAGE = 'abdf1_ros'
+
+
+def config_file(name: str) -> Path:
+    """Return a file of config/: of the installed package, or of the source tree."""
+    source = Path(__file__).resolve().parent.parent / 'config'
+    if source.is_dir():
+        return source / name
+    return _share() / 'config' / name
+
+
+def _share() -> Path:
+    try:
+        from ament_index_python.packages import get_package_share_directory
+
+        return Path(get_package_share_directory(_PACKAGE))
+    except (ImportError, LookupError, OSError):  # installed without an ament index
+        return Path(sys.prefix) / 'share' / _PACKAGE

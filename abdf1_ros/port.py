@@ -1,0 +1,281 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Ports and the thread that runs a machine on one: the only operating system code.
+
+A port that has a file descriptor is read with poll(2) and read(2), which costs a half to a
+tenth of pyserial's own read; a port without one (rfc2217) is read through pyserial.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+import os
+import select
+import threading
+import time
+from typing import Protocol
+
+import serial
+
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.driver.network import Network
+from abdf1_ros.errors import PortLost
+
+_READ_SIZE = 4096
+_WRITE_TIMEOUT = 2.0
+_FIRST_BACK_OFF = 0.5
+_LAST_BACK_OFF = 30.0
+_MAX_FAULTS = 3
+_FAULT_WINDOW = 60.0
+
+_PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
+
+
+class Port(Protocol):
+    """An open line. Every method raises OSError when the line is gone."""
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until the descriptor ``wake`` is readable."""
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to the operating system."""
+
+    def close(self) -> None:
+        """Give the line back."""
+
+
+class DescriptorPort:
+    """A port with a file descriptor, which is set to non-blocking; ``close`` closes it."""
+
+    def __init__(self, descriptor: int, close: Callable[[], None]) -> None:
+        self._descriptor = descriptor
+        self._close = close
+        os.set_blocking(descriptor, False)
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
+        poll = select.poll()
+        poll.register(self._descriptor, select.POLLIN)
+        poll.register(wake, select.POLLIN)
+        ready = dict(poll.poll(None if timeout is None else math.ceil(timeout * 1000)))
+        if self._descriptor not in ready:
+            return b''
+        try:
+            data = os.read(self._descriptor, _READ_SIZE)
+        except BlockingIOError:
+            return b''
+        if not data:
+            raise OSError('the other end has closed the connection')
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to the operating system."""
+        give_up = time.monotonic() + _WRITE_TIMEOUT
+        while data:
+            try:
+                data = data[os.write(self._descriptor, data):]
+            except BlockingIOError:
+                poll = select.poll()
+                poll.register(self._descriptor, select.POLLOUT)
+                left = give_up - time.monotonic()
+                if left <= 0:
+                    raise OSError('the line takes no data; is Handshake right?') from None
+                poll.poll(math.ceil(left * 1000))
+
+    def close(self) -> None:
+        """Give the line back."""
+        self._close()
+
+
+class SerialPort:
+    """A pyserial port without a file descriptor."""
+
+    # The wake descriptor cannot be waited for together with such a port.
+    _GLANCE = 0.01
+
+    def __init__(self, port: serial.Serial) -> None:
+        self._port = port
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while True:
+            left = max(0.0, end - time.monotonic())
+            self._port.timeout = min(left, self._GLANCE)
+            data = self._port.read(max(1, self._port.in_waiting))
+            if data or not left or select.select([wake], [], [], 0)[0]:
+                return bytes(data)
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to pyserial."""
+        self._port.write(data)
+
+    def close(self) -> None:
+        """Give the line back."""
+        self._port.close()
+
+
+def open_port(network: Network, name: str | None = None) -> Port:
+    """
+    Open the port of a net CSV exclusively; ``name`` is used instead of its Com_Port.
+
+    Raises OSError, also where pyserial has another exception for it.
+    """
+    try:
+        port = serial.serial_for_url(
+            name or network.port, baudrate=network.baud, bytesize=network.data_bits,
+            parity=_PARITIES[network.parity], stopbits=network.stop_bits,
+            rtscts=network.handshake == 'Yes', timeout=0, exclusive=True)
+    except ValueError as error:
+        raise OSError(str(error)) from error
+    try:
+        return DescriptorPort(port.fileno(), port.close)
+    except (OSError, AttributeError):
+        return SerialPort(port)
+
+
+@dataclass(frozen=True, slots=True)
+class PortState:
+    """Whether the port is open, and what there is to say about it."""
+
+    is_open: bool
+    text: str
+
+
+class LinkThread(threading.Thread):
+    """
+    Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
+
+    ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
+    attempts to open it are ``last_back_off`` seconds apart at most.
+    ``on_fault`` is called with an exception that is a bug; the machine starts afresh after it.
+    Three within a minute end the thread, and ``has_failed`` tells so.
+    """
+
+    def __init__(self, machine: Machine, open_port: Callable[[], Port], *,
+                 on_state: Callable[[PortState], None] = lambda state: None,
+                 on_fault: Callable[[Exception], None] = lambda error: None,
+                 last_back_off: float = _LAST_BACK_OFF,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(name='df1 link')
+        self.state = PortState(False, 'not opened yet')
+        self.has_failed = False
+        self._machine = machine
+        self._open_port = open_port
+        self._on_state = on_state
+        self._on_fault = on_fault
+        self._last_back_off = last_back_off
+        self._clock = clock
+        self._stopping = False
+        self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
+        self._wake_reader, self._wake_writer = os.pipe()
+        os.set_blocking(self._wake_reader, False)
+        os.set_blocking(self._wake_writer, False)
+
+    def wake(self) -> None:
+        """Tell the machine, from any thread, that there may be something new to do."""
+        try:
+            os.write(self._wake_writer, b'w')
+        except BlockingIOError:
+            pass  # it is being woken already
+
+    def stop(self) -> None:
+        """End the thread, finishing what it does with an error, and wait for its end."""
+        self._stopping = True
+        self.wake()
+        if self.is_alive():
+            self.join()
+        os.close(self._wake_reader)
+        os.close(self._wake_writer)
+
+    def run(self) -> None:
+        """Keep the port open and the machine running."""
+        back_off = _FIRST_BACK_OFF
+        while not self._stopping and not self.has_failed:
+            try:
+                port = self._open_port()
+            except OSError as error:
+                self._set_state(False, f'cannot open the port: {_reason(error)}')
+                self._pause(back_off)
+                back_off = min(2 * back_off, self._last_back_off)
+                continue
+            back_off = _FIRST_BACK_OFF
+            self._set_state(True, 'open')
+            self._run_on(port)
+
+    def _run_on(self, port: Port) -> None:
+        end = 'the driver is stopping'
+        try:
+            self._serve(port)
+        except OSError as error:
+            self._machine.counters.read_errors += 1
+            end = _reason(error)
+            self._set_state(False, f'the port was lost: {end}')
+        except Exception as error:  # a bug must not end the bridge at its first appearance
+            end = 'internal error, see the log'
+            self._take_fault(error)
+        finally:
+            self._machine.stop(PortLost(end))
+            port.close()
+        if not self._stopping and not self.has_failed:
+            self._pause(_FIRST_BACK_OFF)
+
+    def _serve(self, port: Port) -> None:
+        machine, clock = self._machine, self._clock
+        machine.start(clock())
+        while not self._stopping:
+            data = machine.data_to_send()
+            if data:
+                port.write(data)
+            deadline = machine.deadline
+            timeout = None if deadline is None else max(0.0, deadline - clock())
+            data = port.read(timeout, self._wake_reader)
+            if data:
+                machine.receive_data(data, clock())
+            elif self._take_wake():
+                machine.wake(clock())
+            machine.handle_timeout(clock())
+
+    def _take_wake(self) -> bool:
+        try:
+            return bool(os.read(self._wake_reader, _READ_SIZE))
+        except BlockingIOError:
+            return False
+
+    def _pause(self, seconds: float) -> None:
+        """Wait, but not when asked to stop."""
+        end = self._clock() + seconds
+        while not self._stopping and (left := end - self._clock()) > 0:
+            select.select([self._wake_reader], [], [], left)
+            self._take_wake()
+
+    def _set_state(self, is_open: bool, text: str) -> None:
+        self.state = PortState(is_open, text)
+        self._on_state(self.state)
+
+    def _take_fault(self, error: Exception) -> None:
+        self._faults.append(self._clock())
+        recent = [when for when in self._faults if self._faults[-1] - when < _FAULT_WINDOW]
+        self.has_failed = len(recent) >= _MAX_FAULTS
+        self._set_state(False, f'internal error: {error!r}')
+        self._on_fault(error)
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)

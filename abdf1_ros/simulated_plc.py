@@ -1,0 +1,215 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A PLC to try the bridge against: data tables that move, and faults to switch on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+import random
+from typing import TypeVar
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Poll, Symbol
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
+from abdf1_ros.driver.values import Codec, types_of, ValueType
+from abdf1_ros.errors import ConfigurationError, FormatError, Problem
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.server import SERVED_FAMILIES, Server
+
+COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')
+_RAMP_TOP = 1000
+
+_Choice = TypeVar('_Choice')
+
+
+class Motion(Enum):
+    """How a value changes by itself."""
+
+    NONE = ''
+    RAMP = 'Ramp'
+    TOGGLE = 'Toggle'
+
+
+@dataclass(slots=True)
+class _Mover:
+    """Change ``codec.length`` elements at ``address`` every ``period`` seconds."""
+
+    address: Address
+    codec: Codec
+    motion: Motion
+    period: float
+    next_time: float = 0.0
+
+    def advance(self, table: DataTable, now: float) -> None:
+        """Make the steps that are due."""
+        if now < self.next_time:
+            return
+        steps = int((now - self.next_time) / self.period) + 1
+        self.next_time += steps * self.period
+        values = self.codec.decode(table.read(self.address, self.codec.words))
+        if self.motion is Motion.RAMP:
+            changed = [(value + steps) % _RAMP_TOP for value in values]
+        else:
+            changed = [int(not value) if steps % 2 else value for value in values]
+        _store(table, self.address, self.codec, changed)
+
+
+@dataclass(slots=True)
+class Faults:
+    """
+    What is wrong with a station at the moment.
+
+    ``silent``: it does not answer. ``slow``: so many polls get EOT before each reply. ``noise``:
+    the share of its characters that is damaged. ``status``: STS and EXT STS of every reply.
+    """
+
+    silent: bool = False
+    slow: int = 0
+    noise: float = 0.0
+    status: tuple[int, ...] = ()
+
+
+class SimulatedPlc:
+    """One station with its data table; ``clock`` gives seconds."""
+
+    def __init__(self, station: int, table: DataTable, checksum: Checksum,
+                 clock: Callable[[], float], seed: int = 0) -> None:
+        self.station = station
+        self.table = table
+        self.faults = Faults()
+        self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self._serve)
+        self._server = Server(table)
+        self._clock = clock
+        self._movers: list[_Mover] = []
+        self._random = random.Random(seed + station)
+        self._polls_to_refuse = 0
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Answer a symbol, as well as the faults allow."""
+        if self.faults.silent:
+            return b''
+        is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
+        if is_poll and self._polls_to_refuse > 0:
+            self._polls_to_refuse -= 1
+            return self._damaged(frames.EOT)
+        return self._damaged(self.slave.handle(symbol))
+
+    def move(self, mover: _Mover) -> None:
+        """Let values change from now on."""
+        mover.next_time = self._clock() + mover.period
+        self._movers.append(mover)
+
+    def _serve(self, command: Packet) -> Packet:
+        self._polls_to_refuse = self.faults.slow
+        now = self._clock()
+        for mover in self._movers:
+            mover.advance(self.table, now)
+        if self.faults.status:
+            sts, *ext_sts = self.faults.status
+            return command.reply(bytes(ext_sts), sts)
+        return self._server.serve(command)
+
+    def _damaged(self, data: bytes) -> bytes:
+        if not self.faults.noise:
+            return data
+        return bytes(byte ^ 1 << self._random.randrange(8)
+                     if self._random.random() < self.faults.noise else byte for byte in data)
+
+
+def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list[SimulatedPlc]:
+    """Read a simulator CSV; raise ConfigurationError with every fault found."""
+    plcs: dict[int, SimulatedPlc] = {}
+    problems: list[Problem] = []
+    for row in read_rows(path, COLUMNS):
+        try:
+            _load_row(row, plcs, checksum, clock)
+        except Problem as problem:
+            problems.append(problem)
+    if problems:
+        raise ConfigurationError(problems)
+    return list(plcs.values())
+
+
+def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
+              clock: Callable[[], float]) -> None:
+    station = _number(row, 'Station', 0, 254)
+    length = _number(row, 'Length', 1, 1000) if row.get('Length') else 1
+    motion = _choice(row, 'Motion', {entry.value: entry for entry in Motion})
+    plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in SERVED_FAMILIES})
+    if station not in plcs:
+        plcs[station] = SimulatedPlc(station, DataTable(plc_type), checksum, clock)
+    plc = plcs[station]
+    if plc.table.plc_type is not plc_type:
+        raise Problem(row.where('PLC_Type'),
+                      f'station {station} is a {plc.table.plc_type.value} already')
+    try:
+        address = Address.parse(row.get('Address'), plc_type)
+        kind = ValueType.BOOL if address.bit is not None else types_of(address.file_type)[0]
+        codec = Codec(kind, length, address.bit or 0)
+        plc.table.create(address, codec.words)
+    except (FormatError, NoSuchFile) as error:
+        raise Problem(row.where('Address'), str(error)) from None
+    if row.get('Values'):
+        _store(plc.table, address, codec, _values(row, codec))
+    if motion is not Motion.NONE:
+        period = _number(row, 'Period', 1, 3_600_000)
+        plc.move(_Mover(address, codec, motion, period / 1000))
+
+
+def _number(row: Row, column: str, low: int, high: int) -> int:
+    value = whole_number(row.get(column))
+    if value is None or not low <= value <= high:
+        raise Problem(row.where(column), f'{column} = "{row.get(column)}" should be a whole '
+                                         f'number from {low} to {high}')
+    return value
+
+
+def _choice(row: Row, column: str, choices: dict[str, _Choice]) -> _Choice:
+    for name, choice in choices.items():
+        if name.lower() == row.get(column).lower():
+            return choice
+    raise Problem(row.where(column), f'{column} = "{row.get(column)}" should be one of '
+                                     f'{", ".join(filter(None, choices))}')
+
+
+def _values(row: Row, codec: Codec) -> list[float] | str:
+    if codec.type is ValueType.STRING:
+        return row.get('Values')
+    try:
+        values: list[float] = [
+            float(text) if codec.type is ValueType.FLOAT32 else int(text)
+            for text in row.get('Values').split()]
+        values += [0] * (codec.length - len(values))
+        codec.check(values)
+    except ValueError as error:
+        raise Problem(row.where('Values'), str(error)) from None
+    return values
+
+
+def _store(table: DataTable, address: Address, codec: Codec,
+           values: list[float] | str) -> None:
+    if codec.type is not ValueType.BOOL:
+        table.write(address, codec.encode(values))
+        return
+    assert not isinstance(values, str)
+    for number, (mask, bits) in enumerate(codec.bit_changes(values)):
+        table.write_bits(address.at_offset(address.offset + number), mask, bits)

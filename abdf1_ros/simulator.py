@@ -1,0 +1,262 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The simulator: PLCs on one half-duplex multidrop line, to try the bridge without hardware.
+
+The line is a pseudo-terminal, a serial port, or a TCP port. While it runs, lines on standard
+input switch faults on and off.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import math
+import os
+from pathlib import Path
+import select
+import signal
+import socket
+import sys
+import threading
+import time
+import traceback
+import tty
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.driver.network import BAUD_RATES, Network
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.paths import config_file
+from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port
+from abdf1_ros.simulated_plc import Faults, load_plcs, SimulatedPlc
+
+EXIT_CONFIGURATION = 2
+
+_COMMANDS = """\
+commands, on standard input or with --at:
+  silent STATION              it stops answering
+  slow STATION POLLS          so many polls get EOT before each reply
+  noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
+  error STATION STS [EXT]     every reply says this error (hexadecimal)
+  normal STATION              it works again
+  quit                        end the simulator
+
+examples:
+  simulator --pty /tmp/plc
+  simulator --tcp 127.0.0.1:4001 --check BCC
+  simulator --pty /tmp/plc --at '5 silent 2' --at '10 normal 2'
+"""
+
+
+class CommandError(Exception):
+    """A line that is no command; the text says what would be right."""
+
+
+def execute(line: str, plcs: Sequence[SimulatedPlc]) -> str:
+    """Carry out a command line; return what has been done, or raise CommandError."""
+    verb, *words = line.split()
+    plc, arguments = _station(words, plcs)
+    faults = Faults()
+    try:
+        if verb == 'silent' and not arguments:
+            faults.silent = True
+        elif verb == 'slow' and len(arguments) == 1:
+            faults.slow = int(arguments[0])
+        elif verb == 'noise' and len(arguments) == 1:
+            faults.noise = float(arguments[0])
+        elif verb == 'error' and len(arguments) in (1, 2):
+            faults.status = tuple(bytes.fromhex(''.join(arguments)))
+        elif verb != 'normal' or arguments:
+            raise CommandError(f'"{line.strip()}" is no command\n{_COMMANDS}')
+    except ValueError:
+        raise CommandError(f'"{line.strip()}" has a number that is none') from None
+    plc.faults = faults
+    return f'station {plc.station}: {" ".join([verb, *arguments])}'
+
+
+def _station(arguments: list[str],
+             plcs: Sequence[SimulatedPlc]) -> tuple[SimulatedPlc, list[str]]:
+    for plc in plcs:
+        if arguments and arguments[0] == str(plc.station):
+            return plc, arguments[1:]
+    known = ', '.join(str(plc.station) for plc in plcs)
+    raise CommandError(f'name a station ({known})\n{_COMMANDS}')
+
+
+class PtyLine:
+    """A pseudo-terminal; ``link`` is a name for its other end."""
+
+    def __init__(self, link: str | None) -> None:
+        self._ours, self._theirs = os.openpty()
+        # Open at both ends all the time, or a read fails whenever nobody is connected.
+        tty.setraw(self._theirs)
+        self.name = link or os.ttyname(self._theirs)
+        self._link = Path(link) if link else None
+        if self._link:
+            self._link.unlink(missing_ok=True)
+            self._link.symlink_to(os.ttyname(self._theirs))
+
+    def open(self) -> Port:
+        """Return our end."""
+        descriptor = os.dup(self._ours)
+        return DescriptorPort(descriptor, lambda: os.close(descriptor))
+
+    def close(self) -> None:
+        """Take the line and its name away."""
+        if self._link:
+            self._link.unlink(missing_ok=True)
+        os.close(self._ours)
+        os.close(self._theirs)
+
+
+class TcpLine:
+    """A listening TCP port, "HOST:PORT"; one client at a time is the line."""
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.rpartition(':')
+        self._listener = socket.create_server((host or '127.0.0.1', int(port)))
+        self._listener.settimeout(0.2)
+        self.name = 'socket://{}:{}'.format(*self._listener.getsockname()[:2])
+
+    def open(self) -> Port:
+        """Return the connection of a client; OSError while there is none."""
+        try:
+            client, _ = self._listener.accept()
+        except TimeoutError:
+            raise OSError('waiting for a client') from None
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return DescriptorPort(client.fileno(), client.close)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._listener.close()
+
+
+class SerialLine:
+    """A serial port, or anything that pyserial opens."""
+
+    def __init__(self, name: str, network: Network) -> None:
+        self.name = name
+        self._network = network
+
+    def open(self) -> Port:
+        """Open the port."""
+        return open_port(self._network, self.name)
+
+    def close(self) -> None:
+        """Do nothing: the link thread closes what it has opened."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run until SIGINT, SIGTERM, "quit" or the end of --seconds; return the exit status."""
+    options = _parse(args)
+    checksum = Checksum(options.check)
+    try:
+        script = sorted(map(_scheduled, options.at))
+        plcs = load_plcs(options.data or str(config_file('simulator.csv')), checksum,
+                         time.monotonic)
+        line = _open_line(options)
+    except (ConfigurationError, OSError, ValueError) as error:
+        print(f'simulator: {error}', file=sys.stderr)
+        return EXIT_CONFIGURATION
+    machine = Machine(multidrop(plcs), checksum=checksum)
+    link = LinkThread(machine, line.open, on_fault=_print_fault, last_back_off=0.5)
+    names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
+    _say(f'stations {names} on {line.name}, {options.check}')
+    link.start()
+    _converse(plcs, script, options.seconds)
+    link.stop()
+    line.close()
+    return 0
+
+
+def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='simulator', description=__doc__, epilog=_COMMANDS,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
+    line = parser.add_mutually_exclusive_group()
+    line.add_argument('--pty', metavar='NAME', help='a pseudo-terminal of this name (default: '
+                                                    'one with the name that is printed)')
+    line.add_argument('--port', help='a serial port or a URL of pyserial')
+    line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
+    parser.add_argument('--baud', type=int, choices=BAUD_RATES, default=9600,
+                        help='of the serial port (default: %(default)s)')
+    parser.add_argument('--check', choices=[check.value for check in Checksum],
+                        default=Checksum.CRC.value, help='default: %(default)s')
+    parser.add_argument('--at', metavar='"SECONDS COMMAND"', action='append', default=[],
+                        help='a command to carry out after so many seconds; may be repeated')
+    parser.add_argument('--seconds', type=float, default=math.inf,
+                        help='end after so many seconds')
+    return parser.parse_args(args)
+
+
+def _scheduled(text: str) -> tuple[float, str]:
+    seconds, _, command = text.partition(' ')
+    try:
+        return float(seconds), command
+    except ValueError:
+        raise ValueError(f'--at "{text}" should be seconds and a command') from None
+
+
+def _open_line(options: argparse.Namespace) -> PtyLine | TcpLine | SerialLine:
+    if options.tcp:
+        return TcpLine(options.tcp)
+    if options.port:
+        return SerialLine(options.port, Network(baud=options.baud))
+    return PtyLine(options.pty)
+
+
+def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]],
+              seconds: float) -> None:
+    """Carry out commands as they come, until it is time to end."""
+    ended = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: ended.set())
+    signal.signal(signal.SIGTERM, lambda *_: ended.set())
+    begin = time.monotonic()
+    inputs = [sys.stdin]
+    while not ended.is_set() and (passed := time.monotonic() - begin) < seconds:
+        while script and script[0][0] <= passed:
+            _carry_out(script.pop(0)[1], plcs, ended)
+        if select.select(inputs, [], [], 0.05)[0]:
+            line = sys.stdin.readline()
+            if line:
+                _carry_out(line, plcs, ended)
+            else:
+                inputs = []  # closed; signals and --seconds still end us
+
+
+def _carry_out(line: str, plcs: Sequence[SimulatedPlc], ended: threading.Event) -> None:
+    if line.strip() == 'quit':
+        ended.set()
+    elif line.strip():
+        try:
+            _say(execute(line, plcs))
+        except CommandError as error:
+            _say(str(error))
+
+
+def _say(text: str) -> None:
+    print(f'simulator: {text}', flush=True)
+
+
+def _print_fault(error: Exception) -> None:
+    traceback.print_exception(error)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
