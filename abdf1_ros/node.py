@@ -32,17 +32,6 @@ import time
 from types import FrameType
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-import rclpy
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.exceptions import ParameterException
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.logging import get_logger
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import UInt16MultiArray
-from std_srvs.srv import Trigger
-
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver, DriverSettings
 from abdf1_ros.driver.mapping import Mapping
@@ -53,9 +42,25 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.node_diagnostics import Diagnostics
 from abdf1_ros.node_log import EventLog
 from abdf1_ros.node_messages import (
-    latched_qos, MESSAGES, new_message, read_qos, values_of, write_qos)
+    latched_qos,
+    MESSAGES,
+    new_message,
+    read_qos,
+    values_of,
+    write_qos,
+)
 from abdf1_ros.node_parameters import Configuration, configure
 from abdf1_ros.port import LinkThread, open_port, PortState
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import rclpy
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import UInt16MultiArray
+from std_srvs.srv import Trigger
 
 NODE_NAME = 'abdf1'
 
@@ -69,7 +74,7 @@ _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.SUPERSEDED: DiagnosticStatus.WARN}
 
 
-class BridgeNode(Node):  # type: ignore[misc]
+class BridgeNode(Node):
     """
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
@@ -240,7 +245,7 @@ def main(args: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGINT, end)
     signal.signal(signal.SIGTERM, end)
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
         node = BridgeNode()
     except ConfigurationError as error:
         for problem in error.problems:

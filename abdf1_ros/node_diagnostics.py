@@ -21,13 +21,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.port import LinkThread
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 _WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR'}
@@ -66,7 +65,7 @@ class Diagnostics:
         self._last_error: tuple[Event, float] | None = None
         self._last_events: dict[int | None, Event] = {}
         self._writes = WriteLog()
-        self._baseline = {name: 0 for name in driver.counters.by_mnemonic()}
+        self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
         self._rate = _Rate()
         self._sections = [
             Section('link', port, self._judge_link, self._link_values),

@@ -19,10 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from abdf1_ros.messages import Event, Message, Severity
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
-
-from abdf1_ros.messages import Event, Message, Severity
 
 # A cause that has been quiet for so long (s) is news again.
 _QUIET = 60.0

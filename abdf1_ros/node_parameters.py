@@ -19,14 +19,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.node import Node
-
 from abdf1_ros.driver.mapping import COLUMNS, load_mappings, Mapping
 from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
 
 
 def _parameter(default: bool | float | str, description: str, low: float | None = None,

@@ -31,11 +31,10 @@ import threading
 import time
 from typing import Protocol
 
-import serial
-
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
+import serial
 
 _READ_SIZE = 4096
 _WRITE_TIMEOUT = 2.0

@@ -32,7 +32,6 @@ from abdf1_ros.driver.values import Codec, types_of, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
-from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import SERVED_FAMILIES, Server
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')

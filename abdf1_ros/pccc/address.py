@@ -46,7 +46,7 @@ class AddressRangeError(FormatError):
 _FORM = re.compile(
     r'[#$]?(?P<type>[A-Z]{1,2})(?P<file>\d{1,3})?'
     r'(?:[:;](?P<element>\d{1,5})(?:\.(?P<member>[A-Z]+|\d{1,3}))?)?'
-    r'(?:/(?P<bit>[A-Z]+|\d{1,5}))?')
+    r'(?:/(?P<bit>[A-Z]+|\d{1,5}))?', re.ASCII)
 
 _FIXED_FILES = {FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2}
 _FIRST_FREE_FILE = 3
@@ -103,13 +103,12 @@ class Address:
             return cls._flat_bit(match['bit'], file_type, file, plc_type)
         element = _element(match['element'], file_type, plc_type)
         address = cls(plc_type, file_type, file, element)
-        for part in (match['member'], match['bit']):
-            if part and part.isalpha():
-                address = address._with_member(part)
-        if match['member'] and match['member'].isdigit():
-            address = address._with_word(int(match['member']))
-        if match['bit'] and match['bit'].isdigit():
-            address = address._with_bit(match['bit'])
+        member, bit = match['member'], match['bit']
+        if member:
+            address = (address._with_word(int(member)) if member.isdigit()
+                       else address._with_member(member))
+        if bit:
+            address = address._with_bit(bit) if bit.isdigit() else address._with_member(bit)
         return address
 
     @classmethod

@@ -1,0 +1,276 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The demo: simulator and node as processes, and what a robot cell sees of them, told in order.
+
+It needs no hardware. Everything stays on this machine: discovery is limited to localhost, and
+the domain is one of our own unless ROS_DOMAIN_ID is set.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+from abdf1_ros.driver.mapping import load_mappings, Mapping
+from abdf1_ros.node_messages import MESSAGES
+from abdf1_ros.paths import config_file
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import rclpy
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+_PATIENCE = 15.0
+_WRITTEN = (211, 222, 233, 244)
+_TOO_LARGE = (1, 2, 3, 5000)
+
+
+class Interrupted(Exception):
+    """The user or a process we started has ended the demo."""
+
+
+class Watcher(Node):
+    """The robot cell's side: subscribes to everything and remembers the last of each."""
+
+    def __init__(self, mappings: Sequence[Mapping]) -> None:
+        super().__init__('demo_watcher')
+        self.values: dict[str, Any] = {}
+        self.results: list[DiagnosticStatus] = []
+        self.statuses: dict[str, DiagnosticStatus] = {}
+        self.missed = 0
+        for mapping in mappings:
+            if mapping.reads:
+                self.create_subscription(
+                    MESSAGES[mapping.type], f'/abdf1/read/{mapping.topic}',
+                    self._taker(mapping), QoSProfile(
+                        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self.create_subscription(
+            DiagnosticStatus, '/abdf1/write_results', self.results.append, 10)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
+
+    def expect(self, mapping: Mapping, deadline: float) -> None:
+        """Ask to be told when values of ``mapping`` stop for ``deadline`` seconds."""
+        def missed(event: Any) -> None:
+            self.missed += event.total_count_change
+
+        self.create_subscription(
+            MESSAGES[mapping.type], f'/abdf1/read/{mapping.topic}', lambda message: None,
+            QoSProfile(depth=1, deadline=Duration(seconds=deadline)),
+            event_callbacks=SubscriptionEventCallbacks(deadline=missed))
+
+    def _taker(self, mapping: Mapping) -> Callable[[Any], None]:
+        def take(message: Any) -> None:
+            self.values[mapping.tag] = message.data
+        return take
+
+    def _diagnostics(self, message: DiagnosticArray) -> None:
+        self.statuses.update({status.name: status for status in message.status})
+
+
+class Demo:
+    """Tell the story; every step waits for what it shows to have happened."""
+
+    def __init__(self, mappings: list[Mapping], link: Path) -> None:
+        self._mappings = {mapping.tag: mapping for mapping in mappings}
+        self._begin = time.monotonic()
+        self._simulator = _start('abdf1_ros.simulator', '--pty', str(link))
+        self._bridge = _start('abdf1_ros.node', '--ros-args', '-p', f'port:={link}')
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._watcher = Watcher(mappings)
+
+    def run(self, seconds: float) -> None:
+        """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
+        self._title('A PLC-5 (station 1) and an SLC 5/03 (station 2), simulated on one '
+                    'half-duplex DF1 line')
+        domain = os.environ['ROS_DOMAIN_ID']
+        self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} '
+                  'ros2 topic echo /diagnostics')
+        self._show_reads()
+        self._show_writes()
+        self._show_failure()
+        self._show_diagnostics()
+        while not seconds or time.monotonic() - self._begin < seconds:
+            self._pause(5.0)
+            self._title('Still running' + ('' if seconds else '; Ctrl-C ends it'))
+            self._print_values()
+
+    def close(self) -> None:
+        """End both processes."""
+        for process in (self._bridge, self._simulator):
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in (self._bridge, self._simulator):
+            process.wait(_PATIENCE)
+        self._watcher.destroy_node()
+        rclpy.try_shutdown()
+
+    def _show_reads(self) -> None:
+        reads = [mapping for mapping in self._mappings.values() if mapping.reads]
+        self._wait('every mapped topic', lambda: len(self._watcher.values) == len(reads))
+        self._title('1. Reads: every row of config/map.csv is a topic')
+        self._print_values()
+        self._pause(2.0)
+        self._say('two seconds later:')
+        self._print_values()
+
+    def _print_values(self) -> None:
+        for tag, mapping in self._mappings.items():
+            if tag in self._watcher.values:
+                place = f'station {mapping.station}  {mapping.address!s:<9}'
+                print(f'    {place} -> /abdf1/read/{mapping.topic:<16}'
+                      f' {_shown(self._watcher.values[tag])}', flush=True)
+
+    def _show_writes(self) -> None:
+        self._title('2. Writes: published to ~/write/<topic>, answered on ~/write_results')
+        self._write('recipe', _WRITTEN)
+        self._wait('the value to come back',
+                   lambda: tuple(self._watcher.values['recipe']) == _WRITTEN)
+        self._say(f'and /abdf1/read/recipe now shows {_shown(self._watcher.values["recipe"])}')
+        self._write('recipe', _TOO_LARGE)
+        self._pause(1.0)
+
+    def _write(self, tag: str, values: Sequence[int]) -> None:
+        mapping = self._mappings[tag]
+        publisher = self._watcher.create_publisher(
+            MESSAGES[mapping.type], f'/abdf1/write/{mapping.topic}', 10)
+        self._wait('the bridge to listen', lambda: publisher.get_subscription_count() > 0)
+        self._watcher.results.clear()
+        publisher.publish(MESSAGES[mapping.type](data=values))
+        self._say(f'publish {list(values)} to /abdf1/write/{mapping.topic}')
+        self._wait('the result', lambda: bool(self._watcher.results))
+        result = self._watcher.results[0]
+        latency = {pair.key: pair.value for pair in result.values}['latency_ms']
+        self._say(f'result: {result.message} ({latency} ms)')
+
+    def _show_failure(self) -> None:
+        self._title('3. Station 2 loses its power')
+        counter = self._mappings['part_counter']
+        point = '/abdf1/read/part_counter'
+        self._watcher.expect(counter, 2.0)
+        self._pause(1.0)
+        self._watcher.missed = 0
+        self._command('silent 2')
+        self._wait('the loss to be noticed', lambda: self._watcher.missed > 0)
+        self._say(f'a subscriber of {point} with a deadline of 2 s is told: no more values')
+        self._wait('the station to be inactive', lambda: self._level('station 2') != b'\x00')
+        self._print_statuses('link', 'station 2', 'mappings')
+        self._say('station 1 goes on:')
+        before = list(self._watcher.values['line_speed'])
+        self._wait('new values', lambda: list(self._watcher.values['line_speed']) != before)
+        self._say(f'/abdf1/read/line_speed {before} -> '
+                  f'{_shown(self._watcher.values["line_speed"])}')
+        self._title('   ... and gets it back')
+        self._command('normal 2')
+        self._wait('the station to answer', lambda: self._level('mappings') == b'\x00')
+        self._print_statuses('link', 'station 2', 'mappings')
+
+    def _show_diagnostics(self) -> None:
+        self._title('4. Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
+        self._print_statuses('link', 'counters', 'station 1', 'station 2', 'mappings', 'writes')
+        self._say('the counters of the line that are not 0:')
+        for pair in self._watcher.statuses['abdf1: counters'].values:
+            if pair.value != '0':
+                print(f'    {pair.key:<24} {pair.value:>7}', flush=True)
+
+    def _level(self, section: str) -> bytes:
+        level: bytes = self._watcher.statuses[f'abdf1: {section}'].level
+        return level
+
+    def _print_statuses(self, *sections: str) -> None:
+        for section in sections:
+            status = self._watcher.statuses[f'abdf1: {section}']
+            print(f'    {status.name:<18} {status.message}', flush=True)
+
+    def _command(self, line: str) -> None:
+        assert self._simulator.stdin is not None
+        self._simulator.stdin.write(f'{line}\n'.encode())
+        self._simulator.stdin.flush()
+
+    def _pause(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        self._spin_until(lambda: time.monotonic() >= end, seconds + _PATIENCE)
+
+    def _wait(self, what: str, condition: Callable[[], bool]) -> None:
+        if not self._spin_until(condition, _PATIENCE):
+            raise Interrupted(f'waited {_PATIENCE:g} s in vain for {what}')
+
+    def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
+        end = time.monotonic() + limit
+        while time.monotonic() < end:
+            if condition():
+                return True
+            for process in (self._simulator, self._bridge):
+                if process.poll() is not None:
+                    raise Interrupted('a process has ended; see above')
+            rclpy.spin_once(self._watcher, timeout_sec=0.05)
+        return condition()
+
+    def _title(self, text: str) -> None:
+        print(f'\n{text}', flush=True)
+
+    def _say(self, text: str) -> None:
+        print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
+
+
+def _shown(values: Any) -> str:
+    if isinstance(values, str):
+        return values
+    return '[' + ', '.join(f'{value:g}' for value in values) + ']'
+
+
+def _start(module: str, *args: str) -> subprocess.Popen[bytes]:
+    # A session of its own: Ctrl-C is for us, who then end both in order.
+    return subprocess.Popen([sys.executable, '-m', module, *args], stdin=subprocess.PIPE,
+                            start_new_session=True)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the demo; return 0, or 1 when something did not happen."""
+    parser = argparse.ArgumentParser(prog='demo', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--seconds', type=float, default=20.0,
+                        help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
+    options = parser.parse_args(args)
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    mappings, _ = load_mappings(str(config_file('map.csv')))
+    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
+        demo = Demo(mappings, Path(folder) / 'line')
+        try:
+            demo.run(options.seconds)
+        except Interrupted as reason:
+            print(f'demo: {reason}', file=sys.stderr)
+            return 1
+        except KeyboardInterrupt:
+            print()
+        finally:
+            demo.close()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
