@@ -33,10 +33,12 @@ class LinkError(Abdf1Error):
     """
     A transaction that ended without a reply.
 
-    ``message`` is the numbered error, ``args`` fill its text.
+    ``message`` is the numbered error, ``args`` fill its text. ``sent`` tells whether the
+    command has been on the line, so that it may have been executed.
     """
 
     message = Message.ERR_COMMAND_TIMEOUT
+    sent = True
 
     def __str__(self) -> str:
         """Return the numbered text."""

@@ -245,7 +245,8 @@ def main(args: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGINT, end)
     signal.signal(signal.SIGTERM, end)
     try:
-        rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=list(sys.argv if args is None else args),
+                   signal_handler_options=SignalHandlerOptions.NO)
         node = BridgeNode()
     except ConfigurationError as error:
         for problem in error.problems:

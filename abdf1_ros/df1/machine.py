@@ -99,6 +99,9 @@ class Machine:
         self._pending: Step | None = None  # waits for its delay before it goes out
         self._resting = False
         self._line_free = -math.inf
+        self._last_heard = -math.inf
+        self._echoes = False
+        self._echo_due = 0
 
     def start(self, now: float) -> None:
         """Begin the procedure from its beginning."""
@@ -119,6 +122,7 @@ class Machine:
         self._out.clear()
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
+        self._echoes, self._echo_due = False, 0
         if procedure is None:
             return
         if error is not None:
@@ -132,8 +136,13 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
+        data = self._without_echo(data)
         if self._forget_on_send and not self._listening:
             return
+        if self._listening and self.deadline is None and (
+                now - self._last_heard > self._pause_limit):
+            self.decoder.reset()  # what broke off must not swallow what begins now
+        self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
         if self._listening and self.decoder.in_message and self.deadline is not None:
@@ -148,8 +157,18 @@ class Machine:
         if self._pending is not None:
             self._transmit(self._pending)
         else:
+            self._echoes = self._echoes and not self._echo_due
             self._resume(None)
         self._deliver_symbols()
+
+    def expect_echo(self) -> None:
+        """
+        Drop as many characters as are sent from now on: the line gives them back.
+
+        Two-wire adapters do that. It ends by itself when a time-out shows an echo missing.
+        """
+        if not self._echoes:
+            self._echoes, self._echo_due = True, 0
 
     def wake(self, now: float) -> None:
         """End a rest early: there may be something new to do."""
@@ -173,6 +192,11 @@ class Machine:
         # Longest pause inside a frame: 20 characters, and what an operating system or a
         # device server may hold bytes back.
         return 20 * self._timing.char_time + 0.1
+
+    def _without_echo(self, data: bytes) -> bytes:
+        count = min(self._echo_due, len(data)) if self._echoes else 0
+        self._echo_due -= count
+        return data[count:]
 
     def _deliver_symbols(self) -> None:
         while self._listening:
@@ -215,6 +239,7 @@ class Machine:
             self.counters.chars_sent += len(step.frame)
             left = max(self.now, self._line_free) + len(step.frame) * self._timing.char_time
             self._line_free = left
+            self._echo_due += len(step.frame)
             if self._forget_on_send:
                 self.decoder.reset()
         self._set_deadline(step.timeout, max(self.now, self._line_free))

@@ -43,10 +43,11 @@ from typing import NoReturn, TypeGuard
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
-from abdf1_ros.df1.machine import LISTEN_ON, Machine, Step
+from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol, Unknown
+from abdf1_ros.df1.machine import LISTEN_ON, Machine, Procedure, Step
 from abdf1_ros.df1.packet import HEADER_SIZE, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
@@ -93,6 +94,26 @@ class HalfDuplexMaster:
     @property
     def _counters(self) -> Counters:
         return self._machine.counters
+
+    def run(self, source: TaskSource) -> Procedure:
+        """Carry out the tasks of ``source``, one after the other, for ever."""
+        while True:
+            now = self._machine.now
+            task = source.next_task(now)
+            if task is None:
+                due = source.next_due()
+                yield Step(None, None if due is None else max(due - now, 0.0))
+                continue
+            try:
+                reply = yield from self.exchange(task.command)
+            except (StationInactive, CommandTimeout, WrongCommandCode) as error:
+                task.sent = self.command_sent
+                task.fail(error)
+            except BaseException:  # the end of the line; whoever has the tasks ends them
+                task.sent = self.command_sent
+                raise
+            else:
+                task.reply(reply)
 
     def exchange(self, command: Packet,
                  station: int | None = None) -> Generator[Step, Symbol | None, Packet]:
@@ -144,6 +165,7 @@ class HalfDuplexMaster:
         """Note why a command was not acknowledged; return the cause."""
         if answer == Control(Code.NAK):
             self._note(Message.NTC_RCVD_NAK_SYMBOL, station=number)
+            self._note(Message.ERR_RCVD_NAK_SYMBOL, station=number)
             return Message.ERR_RCVD_NAK_SYMBOL
         if isinstance(answer, Frame) and answer.fault is not None:
             return self._note_fault(answer, number)
@@ -202,7 +224,8 @@ class HalfDuplexMaster:
         Send ``frame``; return a ``wanted`` control symbol, any slave's frame, or None.
 
         Other symbols are counted and passed over while the time runs: noise, an answer that
-        comes late, or our own frame coming back from a two-wire adapter.
+        comes late, or our own frame coming back from a two-wire adapter. Such an echo is
+        expected from then on, or that of our ACK would be taken for the next station's.
         """
         self._last_code = 0
         step = Step(frame, self._timeout, delay)
@@ -219,10 +242,20 @@ class HalfDuplexMaster:
             elif isinstance(symbol, Frame) and symbol.station is None:
                 self._last_code = Code.STX
                 return symbol
+            elif self._is_echo(symbol, frame):
+                self._machine.expect_echo()
         if self._machine.decoder.in_message:
             return Frame(b'', fault=Fault.NO_ETX)
         self._last_code = self._last_code or self._machine.decoder.last_byte
         return None
+
+    def _is_echo(self, symbol: Frame | Poll, frame: bytes) -> bool:
+        """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
+        if isinstance(symbol, Poll):
+            return frames.poll_frame(symbol.station) == frame
+        assert symbol.station is not None  # a slave's frame is an answer
+        return frames.master_frame(
+            symbol.station, symbol.data, self._settings.checksum) == frame
 
     def _receive(self, number: int, frame: Frame,
                  command: Packet | None) -> Generator[Step, Symbol | None, Packet | None]:

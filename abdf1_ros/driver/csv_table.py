@@ -22,16 +22,20 @@ letter case, spaces around values, and lines starting with # as comments.
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterator, Sequence
 import csv
 from dataclasses import dataclass
 import difflib
+import io
 from pathlib import Path
 import re
 
 from abdf1_ros.errors import ConfigurationError, Problem
 
 _DELIMITERS = ',;\t'
+# A last line that no file has, as comments are taken out; only an open quote swallows it.
+_END = '#'
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,26 +77,26 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
 
 def whole_number(text: str) -> int | None:
     """Return the number that a cell of decimal digits stands for, None for anything else."""
-    return int(text) if re.fullmatch(r'[+-]?[0-9]+', text) else None
+    return int(text) if re.fullmatch(r'[+-]?[0-9]{1,20}', text) else None
 
 
 def _read_lines(path: str) -> list[str]:
     try:
-        raw = Path(path).read_bytes()
+        raw = Path(path).read_bytes().removeprefix(codecs.BOM_UTF8)
     except OSError as error:
         raise ConfigurationError(
             [Problem(path, f'cannot be read: {error.strerror or error}')]) from None
     try:
-        text = raw.decode('utf-8-sig')
+        text = raw.decode()
     except UnicodeDecodeError as error:
-        before = raw[:error.start]
+        before = raw[:error.start].replace(b'\r\n', b'\n').replace(b'\r', b'\n')
         line = before.count(b'\n') + 1
-        column = error.start - (before.rfind(b'\n') + 1) + 1
+        column = len(before) - before.rfind(b'\n')
         raise ConfigurationError([Problem(
             f'{path}:{line}:{column}',
             f'byte 0x{raw[error.start]:02X} is not UTF-8; save the file as "CSV UTF-8"')
         ]) from None
-    return text.splitlines(keepends=True)
+    return list(io.StringIO(text, newline=''))  # str.splitlines knows more ends than CSV
 
 
 def _parse(path: str, lines: list[str], known: Sequence[str]) -> list[Row]:
@@ -106,7 +110,7 @@ def _parse(path: str, lines: list[str], known: Sequence[str]) -> list[Row]:
     columns: dict[str, int] | None = None
     rows: list[Row] = []
     problems: list[Problem] = []
-    for line, cells in _records(content, delimiter):
+    for line, cells in _records(path, content, delimiter):
         if columns is None:
             columns = _header(path, line, cells, known, problems)
             continue
@@ -124,13 +128,17 @@ def _parse(path: str, lines: list[str], known: Sequence[str]) -> list[Row]:
     return rows
 
 
-def _records(lines: list[str], delimiter: str) -> Iterator[tuple[int, list[str]]]:
+def _records(path: str, lines: list[str],
+             delimiter: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the line each record begins on and its stripped cells, blank records left out."""
-    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+    reader = csv.reader([*lines, _END], delimiter=delimiter, skipinitialspace=True)
     line = 1
     for record in reader:
+        if reader.line_num > len(lines) and record != [_END]:
+            raise ConfigurationError([Problem(
+                f'{path}:{line}', 'a quote in this row never ends')])
         cells = [cell.strip() for cell in record]
-        if any(cells):
+        if any(cells) and record != [_END]:
             yield line, cells
         line = reader.line_num + 1
 

@@ -22,16 +22,17 @@ port and a clock; the tests give it a virtual line.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.frames import Symbol
-from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
+from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Block, Planner
@@ -46,6 +47,12 @@ from abdf1_ros.pccc.status import check_status, is_address_fault
 # What a station takes to answer, for the estimate of the scan time (M 14-2 counts two answers
 # for each transaction; PLCs serve the port once per program scan).
 _USUAL_RESPONSE = 0.01
+
+
+Request = tuple[int, bytes]
+"""CMD, and what stands behind TNS."""
+
+Steps = Generator[Request, Packet, None]
 
 
 class Listener(Protocol):
@@ -96,7 +103,8 @@ class Driver:
             counters=self.counters, forget_on_send=True)
         self.is_online = False
         self.transactions = 0
-        self._writing: Write | None = None
+        self._tasks: set[_JobTask] = set()
+        self._under_way: deque[_JobTask] = deque()
         self._settings = settings
         self._listener = listener
         self._master = HalfDuplexMaster(
@@ -155,41 +163,68 @@ class Driver:
     def _job(self, block: Block) -> ReadJob:
         return ReadJob(block, [self.points[mapping] for mapping in block.mappings])
 
+    def next_task(self, now: float) -> Task | None:
+        """Return the next command: of a write, of a job that is under way, or of a new one."""
+        write = self._scheduler.next_write(now, bool(self._under_way))
+        if write is not None:
+            return self._start(write.mapping.station, self._write_steps(write))
+        if self._under_way:
+            return self._under_way.popleft()
+        job = self._scheduler.next_read(now)
+        return None if job is None else self._start(job.station, self._read_steps(job, now))
+
+    def next_due(self) -> float | None:
+        """Return when the next read is due (clock value in s), None for never."""
+        return self._scheduler.next_due()
+
     def _run(self) -> Procedure:
-        """Take jobs and carry them out, as long as there is a port."""
+        """Work as long as there is a port."""
         self._scheduler.drop_writes('requested while the port was not open', self.machine.now)
         self.is_online = True
-        end = 'internal error, see the log'
+        reason = 'internal error, see the log'
         try:
-            while True:
-                now = self.machine.now
-                job = self._scheduler.next_job(now)
-                if isinstance(job, Write):
-                    yield from self._do_write(job)
-                elif job is not None:
-                    yield from self._do_read(job)
-                else:
-                    due = self._scheduler.next_due()
-                    yield Step(None, None if due is None else max(due - now, 0.0))
+            yield from self._master.run(self)
         except PortLost as error:
-            end = str(error)
+            reason = error.args[0]
             raise
         finally:
-            self._went_down(end)
+            self._went_down(PortLost(reason))
 
-    def _went_down(self, reason: str) -> None:
+    def _went_down(self, error: PortLost) -> None:
         """Leave nothing without a result, and no old command to be sent later."""
         self.is_online = False
+        for task in list(self._tasks):
+            task.fail(error)
+        self._under_way.clear()
         for point in self.points.values():
-            point.fail(reason)
-        if self._writing is not None:
-            self._finish_write(self._writing, Outcome.UNKNOWN, reason, 0)
-        self._scheduler.drop_writes(reason, self.machine.now)
+            point.fail(str(error))
+        self._scheduler.drop_writes(str(error), self.machine.now)
 
-    def _do_read(self, job: ReadJob) -> Generator[Step, Symbol | None, None]:
-        started = self.machine.now
+    def _start(self, station: int, steps: Steps) -> Task:
+        task = _JobTask(self, station, steps)
+        self._tasks.add(task)
+        return task
+
+    def new_command(self, station: int, request: Request) -> Packet:
+        """Return the command for a request, with a transaction number of its own."""
+        cmd, data = request
+        return Packet(station, self.network.station, cmd, 0, self._next_tns(station), data)
+
+    def advanced(self, task: _JobTask, is_done: bool) -> None:
+        """Take note that a task has its next command ready, or is done."""
+        if is_done:
+            self._tasks.discard(task)
+        else:
+            self._under_way.append(task)
+
+    def _read_steps(self, job: ReadJob, started: float) -> Steps:
+        data = b''
+        dialect = job.block.dialect
         try:
-            data = yield from self._read_block(job.block)
+            for request in job.block.requests:
+                command = dialect.cmd, dialect.read(request.start, request.words)
+                reply = check_status((yield command))
+                data += dialect.read_data(request.start, request.words, reply)
         except RemoteError as error:
             self.stations[job.station].remote_errors += 1
             self._read_failed(job, str(error), is_address_fault(error))
@@ -200,20 +235,7 @@ class Driver:
         else:
             job.done(self.machine.now)
             self._distribute(job, data)
-        if job in self._scheduler.jobs:
-            self._scheduler.finished(job, started, self.machine.now)
-
-    def _read_block(self, block: Block) -> Generator[Step, Symbol | None, bytes]:
-        data = b''
-        for request in block.requests:
-            if data:  # a write does not have to wait for all packets of a long mapping
-                write = self._scheduler.next_write(self.machine.now)
-                if write is not None:
-                    yield from self._do_write(write)
-            command = block.dialect.read(request.start, request.words)
-            reply = yield from self._exchange(block.station, block.dialect.cmd, command)
-            data += block.dialect.read_data(request.start, request.words, reply)
-        return data
+        self._scheduler.finished(job, started, self.machine.now)
 
     def _distribute(self, job: ReadJob, data: bytes) -> None:
         for point in job.points:
@@ -242,24 +264,20 @@ class Driver:
                       if point.mapping.station == station)
         for point in points:
             point.fail(str(error))
-        if isinstance(error, PortLost):
-            raise error
 
-    def _do_write(self, write: Write) -> Generator[Step, Symbol | None, None]:
+    def _write_steps(self, write: Write) -> Steps:
         station = write.mapping.station
         cmd = DIALECTS[write.mapping.plc_type].cmd
-        self._writing = write
         done = 0
         try:
-            for command in write.commands:
-                yield from self._exchange(station, cmd, command)
+            for data in write.commands:
+                check_status((yield cmd, data))
                 done += 1
         except RemoteError as error:
             self.stations[station].remote_errors += 1
             self._finish_write(write, Outcome.FAILED, str(error), done)
         except LinkError as error:
-            sent = self._master.command_sent
-            outcome = Outcome.UNKNOWN if sent or done else Outcome.NOT_SENT
+            outcome = Outcome.UNKNOWN if error.sent or done else Outcome.NOT_SENT
             self._finish_write(write, outcome, str(error), done)
             self._link_failed(station, (), error)
         else:
@@ -268,18 +286,9 @@ class Driver:
             self._scheduler.hasten(write, self.machine.now)
 
     def _finish_write(self, write: Write, outcome: Outcome, detail: str, done: int) -> None:
-        self._writing = None
         if 0 < done < len(write.commands):
             detail += f' (after {done} of {len(write.commands)} packets were written)'
         self._listener.written(write.result(outcome, detail, self.machine.now))
-
-    def _exchange(self, station: int, cmd: int,
-                  data: bytes) -> Generator[Step, Symbol | None, bytes]:
-        """Return the data of the reply; RemoteError or LinkError when there are none."""
-        command = Packet(station, self.network.station, cmd, 0, self._next_tns(station), data)
-        reply = yield from self._master.exchange(command)
-        self.transactions += 1
-        return check_status(reply)
 
     def _next_tns(self, station: int) -> int:
         """Return the next transaction number, never the one this station had last."""
@@ -288,6 +297,41 @@ class Driver:
             self._tns = self._tns + 1 & 0xFFFF
         self._last_tns[station] = self._tns
         return self._tns
+
+
+class _JobTask:
+    """
+    A job as the link sees it: one command after the other.
+
+    ``steps`` yields requests and is sent the replies; an error is raised in it.
+    """
+
+    def __init__(self, driver: Driver, station: int, steps: Steps) -> None:
+        self.sent = False
+        self._driver = driver
+        self._station = station
+        self._steps = steps
+        self.command = driver.new_command(station, next(steps))
+
+    def reply(self, packet: Packet) -> None:
+        """Take the reply and go on to the next request."""
+        self._driver.transactions += 1
+        self._advance(lambda: self._steps.send(packet))
+
+    def fail(self, error: LinkError) -> None:
+        """Raise ``error`` in the job."""
+        error.sent = self.sent
+        self._advance(lambda: self._steps.throw(error))
+
+    def _advance(self, resume: Callable[[], Request]) -> None:
+        try:
+            request = resume()
+        except StopIteration:
+            self._driver.advanced(self, is_done=True)
+            return
+        self.sent = False
+        self.command = self._driver.new_command(self._station, request)
+        self._driver.advanced(self, is_done=False)
 
 
 def _master_settings(network: Network, settings: DriverSettings) -> MasterSettings:

@@ -129,17 +129,31 @@ class Scheduler:
         """Queue a write; may be called from any thread."""
         self._inbox.append(write)
 
-    def next_job(self, now: float) -> ReadJob | Write | None:
-        """Return what has the line now, or None when nothing is due."""
-        write = self._take_write(now)
-        if write is not None:
-            return write
-        self._writes_in_a_row = 0
-        return self._take_probe(now) or self._take_read(now)
+    def next_write(self, now: float, is_read_waiting: bool = False) -> Write | None:
+        """
+        Return the next write, unless it is a read's turn.
 
-    def next_write(self, now: float) -> Write | None:
-        """Return a waiting write, if it is a write's turn."""
-        return self._take_write(now)
+        ``is_read_waiting`` tells of a read that has begun and wants to go on.
+        """
+        while self._inbox:
+            self._queue(self._inbox.popleft(), now)
+        while self._writes:
+            if self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and (
+                    is_read_waiting or self._is_read_due(now)):
+                self._writes_in_a_row = 0
+                return None
+            write = self._writes.popleft()
+            if now - write.requested <= self._write_timeout:
+                self._writes_in_a_row += 1
+                return write
+            detail = f'waited longer than {self._write_timeout:g} s for the line'
+            self._report(write.result(Outcome.NOT_SENT, detail, now))
+        self._writes_in_a_row = 0
+        return None
+
+    def next_read(self, now: float) -> ReadJob | None:
+        """Return the next read or probe, or None when nothing is due."""
+        return self._take_probe(now) or self._take_read(now)
 
     def next_due(self) -> float | None:
         """Return when the next read or probe is due (clock value in s), None for never."""
@@ -149,7 +163,9 @@ class Scheduler:
         return self._next_probe if due is None else min(due, self._next_probe)
 
     def finished(self, job: ReadJob, started: float, now: float) -> None:
-        """Take a job back, whether it went well or not."""
+        """Take a job back, whether it went well or not, unless it has been replaced."""
+        if job not in self._jobs:
+            return
         if not self._stations[job.station].active:
             nobody_else = not self._heap
             self._next_probe = now + (job.block.period if nobody_else else self._probe_interval)
@@ -172,20 +188,6 @@ class Scheduler:
         self._inbox.clear()
         for write in waiting:
             self._report(write.result(Outcome.NOT_SENT, detail, now))
-
-    def _take_write(self, now: float) -> Write | None:
-        while self._inbox:
-            self._queue(self._inbox.popleft(), now)
-        while self._writes:
-            if self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and self._is_read_due(now):
-                return None
-            write = self._writes.popleft()
-            if now - write.requested <= self._write_timeout:
-                self._writes_in_a_row += 1
-                return write
-            detail = f'waited longer than {self._write_timeout:g} s for the line'
-            self._report(write.result(Outcome.NOT_SENT, detail, now))
-        return None
 
     def _queue(self, write: Write, now: float) -> None:
         if not write.is_pulse:

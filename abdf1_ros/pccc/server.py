@@ -44,14 +44,15 @@ class Refusal(Exception):
 
 
 _Commands = dict[tuple[int, int], Callable[[Reader], bytes]]
+_Codes = tuple[int, int | None]  # STS and EXT STS
 
 
 class _Family(Protocol):
     """The commands of a family by CMD and FNC, and how it refuses bad addresses."""
 
     commands: _Commands
-    no_such_file: Refusal
-    out_of_range: Refusal
+    no_such_file: _Codes
+    out_of_range: _Codes
 
 
 class Server:
@@ -76,9 +77,9 @@ class Server:
                 raise Refusal(status.STS_ILLEGAL_COMMAND)
             return function(reader)
         except NoSuchFile:
-            raise self._family.no_such_file from None
+            raise Refusal(*self._family.no_such_file) from None
         except OutOfRange:
-            raise self._family.out_of_range from None
+            raise Refusal(*self._family.out_of_range) from None
         except FormatError:
             raise Refusal(status.STS_ILLEGAL_COMMAND) from None
 
@@ -90,8 +91,8 @@ def _extended(ext_sts: int) -> Refusal:
 class _Plc5:
     """The commands a PLC-5 serves."""
 
-    no_such_file = _extended(status.EXT_BAD_ADDRESS)
-    out_of_range = _extended(status.EXT_WRONG_SIZE)
+    no_such_file: _Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
+    out_of_range: _Codes = status.EXTENDED, status.EXT_WRONG_SIZE
 
     def __init__(self, table: DataTable) -> None:
         self._table = table
@@ -161,8 +162,8 @@ def _element(address: Address, asked: plc5.SystemAddress) -> tuple[int, int, int
 class _Slc:
     """The commands an SLC 5/03 serves."""
 
-    no_such_file = Refusal(status.STS_ILLEGAL_COMMAND)
-    out_of_range = Refusal(status.STS_ADDRESS)
+    no_such_file: _Codes = status.STS_ILLEGAL_COMMAND, None
+    out_of_range: _Codes = status.STS_ADDRESS, None
 
     def __init__(self, table: DataTable) -> None:
         self._table = table
@@ -202,7 +203,7 @@ class _Slc:
     def _address(self, address: slc.LogicalAddress) -> Address:
         kind = BY_SLC_CODE.get(address.type_code)
         if kind is None or self._table.file_type(address.file) is not kind:
-            raise self.no_such_file
+            raise Refusal(*self.no_such_file)
         return Address(
             PlcType.SLC, kind, address.file, address.element, address.sub_element)
 

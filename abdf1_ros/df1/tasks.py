@@ -1,0 +1,36 @@
+"""What a link carries out: tasks, each one command after the other, and where they come from."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import LinkError
+
+
+class Task(Protocol):
+    """
+    One command on its way, and whoever waits for its reply.
+
+    The link sets ``sent`` when the command has been on the line: without a reply its outcome
+    is then unknown. It ends the command by calling ``reply`` or ``fail``, once.
+    """
+
+    command: Packet
+    sent: bool
+
+    def reply(self, packet: Packet) -> None:
+        """Take the reply."""
+
+    def fail(self, error: LinkError) -> None:
+        """Take note that there will be no reply."""
+
+
+class TaskSource(Protocol):
+    """Where a link gets its tasks."""
+
+    def next_task(self, now: float) -> Task | None:
+        """Return what has the line next, or None when nothing is due."""
+
+    def next_due(self) -> float | None:
+        """Return when something will be due (clock value in s), None for never."""

@@ -1,0 +1,53 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Package description for colcon (ament_python) and for pip."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'abdf1_ros'
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    description='Bridge between Allen-Bradley PLCs and ROS topics over DF1',
+    url='https://github.com/abdf1-ros/abdf1_ros',
+    author='abdf1_ros maintainers',
+    author_email='maintainers@users.noreply.github.com',
+    maintainer='abdf1_ros maintainers',
+    maintainer_email='maintainers@users.noreply.github.com',
+    license='Apache-2.0',
+    python_requires='>=3.11',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={PACKAGE: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+        (f'share/{PACKAGE}/config', sorted(glob('config/*'))),
+        (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
+    ],
+    zip_safe=False,
+    install_requires=['setuptools', 'pyserial'],
+    # Not tests_require: newer setuptools ignores it, and colcon test would then run no pytest.
+    extras_require={'test': ['hypothesis', 'pytest']},
+    entry_points={
+        'console_scripts': [
+            f'node = {PACKAGE}.node:main',
+            f'simulator = {PACKAGE}.simulator:main',
+            f'demo = {PACKAGE}.demo:main',
+        ],
+    },
+)

@@ -1,0 +1,364 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Frames: every vector both ways, and a decoder that any bytes can be fed to."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import (
+    ACK,
+    Code,
+    Control,
+    Duplex,
+    EOT,
+    Fault,
+    Frame,
+    FrameDecoder,
+    master_frame,
+    MAX_LINK_DATA,
+    message_frame,
+    NAK,
+    Poll,
+    poll_frame,
+    stuff,
+    Symbol,
+    Unknown,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+from support.vectors import CAPTURED, Captured, MESSAGES, Vector, vector, VECTORS
+
+HALF, FULL, CRC, BCC = Duplex.HALF, Duplex.FULL, Checksum.CRC, Checksum.BCC
+DATA = bytes.fromhex('01 00 0F 00 01 06 A2 02 07 89 00 00')
+
+# Bytes of a line: mostly those that mean something.
+line_bytes = st.lists(st.one_of(
+    st.sampled_from([bytes((0x10, code)) for code in (1, 2, 3, 4, 5, 6, 0x10, 0x15)]),
+    st.sampled_from([b'\x10', b'\x02', b'\x03', b'\xF0', DATA, message_frame(DATA, CRC),
+                     master_frame(0x10, DATA, BCC), poll_frame(0x10), b'\x10\x02' + bytes(260),
+                     bytes(200)]),
+    st.binary(max_size=8)), max_size=40).map(b''.join)
+decoders = st.builds(FrameDecoder, st.sampled_from(Checksum), st.sampled_from(Duplex))
+
+
+def drain(decoder: FrameDecoder) -> list[Symbol]:
+    """Return all symbols that are ready."""
+    symbols = []
+    while (symbol := decoder.next_symbol()) is not None:
+        symbols.append(symbol)
+    return symbols
+
+
+def decode(data: bytes, checksum: Checksum = CRC, duplex: Duplex = HALF,
+           chunk: int | None = None) -> list[Symbol]:
+    """Return the symbols of ``data``, fed ``chunk`` bytes at a time."""
+    decoder = FrameDecoder(checksum, duplex)
+    symbols = []
+    for at in range(0, len(data), chunk or len(data)):
+        decoder.feed(data[at:at + (chunk or len(data))])
+        symbols += drain(decoder)
+    return symbols
+
+
+def expected_symbols(entry: Vector) -> list[Symbol]:
+    """Return what a vector says about its frame."""
+    if entry.mode == 'control':
+        return [Control(Code.EOT)]
+    if entry.mode == 'poll':
+        assert entry.station is not None
+        return [Poll(entry.station, True)]
+    received = int.from_bytes(entry.frame[-entry.checksum.size:], 'little')
+    fault, expected = None, received
+    if not entry.valid:
+        assert entry.expected is not None
+        fault, expected = Fault.BAD_CHECK, entry.expected
+    elif len(entry.link_data) < 6:
+        fault = Fault.TOO_SHORT
+    frame = Frame(entry.link_data, entry.station, fault, received, expected)
+    inside = {'embedded_ack': [Control(Code.ACK)], 'embedded_nak': [Control(Code.NAK)]}
+    return [*inside.get(entry.name, []), frame]
+
+
+@pytest.mark.parametrize('chunk', [None, 1, 3])
+@pytest.mark.parametrize('entry', VECTORS, ids=lambda entry: entry.name)
+def test_vector_decodes(entry: Vector, chunk: int | None) -> None:
+    assert decode(entry.frame, entry.checksum, entry.duplex, chunk) == expected_symbols(entry)
+
+
+@pytest.mark.parametrize('entry', [
+    entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response],
+    ids=lambda entry: entry.name)
+def test_vector_encodes(entry: Vector) -> None:
+    if entry.mode == 'half_duplex_master':
+        assert entry.station is not None
+        frame = master_frame(entry.station, entry.link_data, entry.checksum)
+    else:
+        frame = message_frame(entry.link_data, entry.checksum)
+    assert frame == entry.frame
+
+
+@pytest.mark.parametrize(
+    'entry', [entry for entry in VECTORS if entry.mode == 'poll'], ids=lambda entry: entry.name)
+def test_poll_vector_encodes(entry: Vector) -> None:
+    assert entry.station is not None
+    assert poll_frame(entry.station) == entry.frame
+
+
+def test_vectors_cover_every_mode() -> None:
+    assert {entry.mode for entry in VECTORS} == {
+        'control', 'poll', 'half_duplex_master', 'half_duplex_slave', 'full_duplex'}
+    assert len(VECTORS) == 182
+
+
+@pytest.mark.parametrize('entry', CAPTURED, ids=lambda entry: f'{entry.direction}-{entry.time}')
+def test_captured_frame_decodes_and_encodes(entry: Captured) -> None:
+    (symbol,) = decode(entry.frame, entry.checksum, FULL, 1)
+    if len(entry.frame) == 2:
+        assert symbol == Control(Code(entry.frame[1]))
+        return
+    assert isinstance(symbol, Frame)
+    assert symbol.received == symbol.expected
+    assert symbol.station is None
+    assert symbol.fault is (Fault.TOO_SHORT if entry.checksum is BCC else None)
+    assert message_frame(symbol.data, entry.checksum) == entry.frame
+
+
+def test_captured_conversation_is_command_ack_reply_ack() -> None:
+    symbols = [decode(entry.frame, CRC, FULL)[0] for entry in CAPTURED[:12]]
+    assert symbols[1::2] == [Control(Code.ACK)] * 6
+    for command, reply in zip(symbols[::4], symbols[2::4]):
+        assert isinstance(command, Frame) and isinstance(reply, Frame)
+        assert reply.data[:6] == bytes((
+            command.data[1], command.data[0], command.data[2] | 0x40, 0, *command.data[4:6]))
+
+
+def test_captured_nak_answers_a_frame_shorter_than_a_header() -> None:
+    sent, answer = CAPTURED[12], CAPTURED[13]
+    assert decode(sent.frame, BCC, FULL) == [
+        Frame(b'\x0E\x0D\xAA\xAA', None, Fault.TOO_SHORT, 0x91, 0x91)]
+    assert decode(answer.frame, BCC, FULL) == [Control(Code.NAK)]
+    assert CAPTURED[14].frame == sent.frame
+
+
+@pytest.mark.parametrize(('frame', 'code'), [(ACK, Code.ACK), (NAK, Code.NAK), (EOT, Code.EOT)])
+@pytest.mark.parametrize('duplex', Duplex)
+def test_control_symbols(frame: bytes, code: Code, duplex: Duplex) -> None:
+    assert len(frame) == 2
+    assert decode(frame, duplex=duplex, chunk=1) == [Control(code)]
+
+
+def test_nak_is_15() -> None:
+    assert NAK == b'\x10\x15'
+
+
+def test_enq_is_a_symbol_in_full_duplex_only() -> None:
+    assert decode(b'\x10\x05', duplex=FULL) == [Control(Code.ENQ)]
+    assert decode(b'\x10\x05', duplex=HALF) == []
+
+
+def test_master_frame_is_none_in_full_duplex() -> None:
+    symbols = decode(master_frame(7, DATA, CRC), duplex=FULL)
+    assert symbols[0] == Unknown(0x01)
+    assert all(getattr(symbol, 'fault', 1) is not None for symbol in symbols)
+
+
+@pytest.mark.parametrize('byte', [0x00, 0x03, 0x07, 0x7F, 0xFF])
+def test_unknown_symbol_tells_its_byte(byte: int) -> None:
+    assert decode(bytes((0x10, byte)), chunk=1) == [Unknown(byte)]
+
+
+def test_doubled_dle_outside_of_a_message_is_no_symbol() -> None:
+    assert decode(b'\x10\x10\x10\x06') == [Control(Code.ACK)]
+
+
+def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
+    decoder = FrameDecoder(CRC, HALF)
+    decoder.feed(b'\x55\xAA' + ACK + b'\x01\x77')
+    assert drain(decoder) == [Control(Code.ACK)]
+    assert decoder.last_byte == 0x77
+    decoder.feed(b'')
+    assert decoder.last_byte == 0x77
+
+
+@pytest.mark.parametrize('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xFE])
+@pytest.mark.parametrize('chunk', [None, 1])
+def test_poll_of_any_station(station: int, chunk: int | None) -> None:
+    assert decode(poll_frame(station), chunk=chunk) == [Poll(station, True)]
+
+
+def test_station_10_is_doubled_in_a_poll_but_its_bcc_is_not_stuffed() -> None:
+    assert poll_frame(0x10) == bytes.fromhex('10 05 10 10 F0')
+    assert poll_frame(0xF0) == bytes.fromhex('10 05 F0 10')
+
+
+@pytest.mark.parametrize('chunk', [None, 1])
+def test_poll_of_a_master_that_does_not_double_station_10(chunk: int | None) -> None:
+    assert decode(b'\x10\x05\x10\xF0' + poll_frame(1), chunk=chunk) == [
+        Poll(0x10, True), Poll(1, True)]
+
+
+def test_poll_with_wrong_bcc_is_not_valid() -> None:
+    assert decode(b'\x10\x05\x07\xF8') == [Poll(7, False)]
+
+
+def test_poll_has_a_bcc_on_a_crc_line_too() -> None:
+    for checksum in Checksum:
+        assert decode(bytes.fromhex('10 05 11 EF'), checksum) == [Poll(0x11, True)]
+
+
+@pytest.mark.parametrize('start', [b'\x10\x05', b'\x10\x01', b'\x10\x01\x07', b'\x10\x01\x07\x55'])
+def test_symbol_breaks_into_a_multidrop_header(start: bytes) -> None:
+    assert decode(start + ACK, chunk=1) == [Control(Code.ACK)]
+
+
+def test_etx_pair_among_the_check_bytes_is_check() -> None:
+    entry = vector('crc_low_equals_DLE')
+    (frame, ack) = decode(entry.frame + ACK, CRC, FULL, 1)
+    assert isinstance(frame, Frame) and frame.fault is None
+    assert ack == Control(Code.ACK)
+
+
+@pytest.mark.parametrize('size', [0, 1, 5])
+@pytest.mark.parametrize('checksum', Checksum)
+def test_message_shorter_than_a_header(size: int, checksum: Checksum) -> None:
+    (frame,) = decode(message_frame(bytes(size), checksum), checksum)
+    assert isinstance(frame, Frame)
+    assert (frame.data, frame.fault) == (bytes(size), Fault.TOO_SHORT)
+
+
+def test_wrong_check_of_a_short_message_is_a_wrong_check() -> None:
+    (frame,) = decode(message_frame(b'abc', BCC)[:-1] + b'\x00', BCC)
+    assert frame == Frame(b'abc', None, Fault.BAD_CHECK, 0, 0xDA)
+
+
+@pytest.mark.parametrize('fill', [0x10, 0x55])
+def test_longest_message(fill: int) -> None:
+    data = bytes((fill,)) * MAX_LINK_DATA
+    (frame,) = decode(message_frame(data, CRC))
+    assert isinstance(frame, Frame)
+    assert (frame.data, frame.fault) == (data, None)
+
+
+@pytest.mark.parametrize('fill', [0x10, 0x55])
+@pytest.mark.parametrize('chunk', [None, 1])
+def test_message_longer_than_the_longest(fill: int, chunk: int | None) -> None:
+    first, *rest = decode(message_frame(bytes((fill,)) * 262, CRC), chunk=chunk)
+    assert first == Frame(bytes((fill,)) * 262, None, Fault.TOO_LONG)
+    assert not any(isinstance(symbol, Frame) for symbol in rest)
+
+
+def test_largest_reply_of_any_command_fits() -> None:
+    assert MAX_LINK_DATA >= 6 + 244
+
+
+@pytest.mark.parametrize('chunk', [None, 1, 100])
+def test_message_without_end_is_cut_at_the_same_byte_in_any_chunks(chunk: int | None) -> None:
+    assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == [
+        Frame(bytes(262), None, Fault.TOO_LONG)]
+
+
+@pytest.mark.parametrize('duplex', Duplex)
+def test_message_that_breaks_off_is_reported_and_the_next_one_read(duplex: Duplex) -> None:
+    good = message_frame(DATA, CRC)
+    assert decode(good[:9] + good, duplex=duplex, chunk=1) == [
+        Frame(DATA[:7], None, Fault.NO_ETX), *decode(good)]
+
+
+@pytest.mark.parametrize('response', [ACK, NAK])
+def test_embedded_response_is_one_in_full_duplex_only(response: bytes) -> None:
+    good = message_frame(DATA, CRC)
+    mixed = good[:5] + response + good[5:]
+    assert decode(mixed, duplex=FULL) == [Control(Code(response[1])), *decode(good)]
+    assert decode(mixed, duplex=HALF)[:2] == [
+        Frame(DATA[:3], None, Fault.NO_ETX), Control(Code(response[1]))]
+
+
+def test_reset_forgets_a_message_that_has_begun() -> None:
+    decoder = FrameDecoder(CRC, HALF)
+    decoder.feed(message_frame(DATA, CRC)[:-1] + b'\x10')
+    drain(decoder)
+    decoder.reset()
+    assert (decoder.in_message, decoder.last_byte) == (False, 0)
+    decoder.feed(b'\x06' + message_frame(DATA, CRC))
+    assert drain(decoder) == decode(message_frame(DATA, CRC))
+
+
+def test_in_message_from_stx_to_the_last_check_byte() -> None:
+    decoder = FrameDecoder(CRC, HALF)
+    frame = master_frame(3, DATA, CRC)
+    states = []
+    for byte in frame:
+        decoder.feed(bytes((byte,)))
+        symbols = drain(decoder)
+        states.append(decoder.in_message)
+    assert states == [False] * 4 + [True] * (len(frame) - 5) + [False]
+    assert len(symbols) == 1
+
+
+@PROPERTY
+@given(st.binary(max_size=MAX_LINK_DATA), st.sampled_from(Checksum), st.sampled_from(Duplex))
+def test_stuffing_round_trip(data: bytes, checksum: Checksum, duplex: Duplex) -> None:
+    check = checksum.of_message(data)
+    assert decode(message_frame(data, checksum), checksum, duplex) == [
+        Frame(data, None, None if len(data) >= 6 else Fault.TOO_SHORT, check, check)]
+    assert stuff(data).count(b'\x10') == 2 * data.count(b'\x10')
+
+
+@PROPERTY
+@given(st.binary(min_size=6, max_size=100), st.integers(0, 255), st.sampled_from(Checksum))
+def test_master_frame_round_trip(data: bytes, station: int, checksum: Checksum) -> None:
+    check = checksum.of_message(data, station)
+    assert decode(master_frame(station, data, checksum), checksum, chunk=1) == [
+        Frame(data, station, None, check, check)]
+
+
+@PROPERTY
+@given(line_bytes, st.sampled_from(Checksum), st.sampled_from(Duplex), st.data())
+def test_any_chunking_gives_the_same_symbols(data: bytes, checksum: Checksum, duplex: Duplex,
+                                             draw: st.DataObject) -> None:
+    decoder = FrameDecoder(checksum, duplex)
+    symbols: list[Symbol] = []
+    rest = data
+    while rest:
+        size = draw.draw(st.integers(1, len(rest)))
+        decoder.feed(rest[:size])
+        symbols += drain(decoder)
+        rest = rest[size:]
+    assert symbols == decode(data or b'\x00', checksum, duplex)
+    assert symbols == decode(data or b'\x00', checksum, duplex, 1)
+
+
+@PROPERTY
+@given(decoders, st.lists(st.one_of(line_bytes, st.binary(max_size=400)), max_size=10))
+def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: list[bytes]) -> None:
+    for part in parts:
+        decoder.feed(part)
+        for symbol in drain(decoder):
+            assert not isinstance(symbol, Frame) or len(symbol.data) <= MAX_LINK_DATA + 1
+        assert len(decoder._buffer) <= 2  # a DLE, or one of two check bytes
+        assert len(decoder._data) <= MAX_LINK_DATA + 1
+
+
+@PROPERTY
+@given(decoders, line_bytes)
+def test_frame_is_read_behind_any_garbage_after_a_reset(decoder: FrameDecoder,
+                                                        garbage: bytes) -> None:
+    decoder.feed(garbage)
+    drain(decoder)
+    decoder.reset()
+    decoder.feed(EOT + b'\x10')
+    assert drain(decoder) == [Control(Code.EOT)]

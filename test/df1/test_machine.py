@@ -1,0 +1,432 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The engine: deadlines, delays, deafness and rests, on a clock that the test moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, Code, Control, EOT, message_frame, NAK, Symbol
+from abdf1_ros.df1.machine import LineTiming, LISTEN_ON, Machine, Procedure, Step
+import pytest
+
+FRAME = b'0123456789'
+MESSAGE = message_frame(bytes(20), Checksum.CRC)
+SAID_ACK, SAID_EOT = Control(Code.ACK), Control(Code.EOT)
+
+
+class Bench:
+    """A machine that carries out a list of steps and notes what each of them brought."""
+
+    def __init__(self, *steps: Step, timing: LineTiming | None = None,
+                 forget_on_send: bool = False) -> None:
+        self.got: list[Symbol | None] = []
+        self.error: Exception | None = None
+        self.machine = Machine(
+            self._procedure, checksum=Checksum.CRC, timing=timing, forget_on_send=forget_on_send)
+        self._steps = steps
+
+    def _procedure(self, machine: Machine) -> Procedure:
+        assert machine is self.machine
+        try:
+            for step in self._steps:
+                self.got.append((yield step))
+        except OSError as error:
+            self.error = error
+            raise
+
+
+def test_frame_goes_out_once() -> None:
+    bench = Bench(Step(FRAME, 1.0))
+    bench.machine.start(5.0)
+    assert bench.machine.data_to_send() == FRAME
+    assert bench.machine.data_to_send() == b''
+
+
+def test_nothing_happens_before_start() -> None:
+    bench = Bench(Step(FRAME, 1.0))
+    bench.machine.receive_data(ACK, 1.0)
+    bench.machine.handle_timeout(2.0)
+    bench.machine.wake(3.0)
+    assert (bench.got, bench.machine.data_to_send(), bench.machine.deadline) == ([], b'', None)
+
+
+def test_deadline_counts_from_the_last_byte_on_the_line() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(5.0)
+    assert bench.machine.deadline == pytest.approx(5.0 + 10 * 0.01 + 1.0)
+
+
+def test_deadline_of_a_second_frame_waits_for_the_first_to_leave() -> None:
+    bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(5.0)
+    assert bench.machine.data_to_send() == FRAME + FRAME
+    assert bench.got == [None]
+    assert bench.machine.deadline == pytest.approx(5.0 + 20 * 0.01 + 1.0)
+
+
+def test_deadline_after_an_idle_line_counts_from_now() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(b'', 0.5), Step(FRAME, 1.0),
+                  timing=LineTiming(char_time=0.01))
+    bench.machine.start(5.0)
+    bench.machine.receive_data(ACK, 6.0)
+    assert bench.machine.deadline == pytest.approx(6.5)
+    bench.machine.receive_data(ACK, 6.25)
+    assert bench.machine.deadline == pytest.approx(6.25 + 0.1 + 1.0)
+
+
+def test_symbol_ends_a_step() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK[:1], 0.25)
+    assert bench.got == []
+    bench.machine.receive_data(ACK[1:], 0.5)
+    assert bench.got == [SAID_ACK]
+    assert bench.machine.deadline == 1.5
+    assert bench.machine.now == 0.5
+
+
+def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0))
+    bench.machine.start(0.0)
+    bench.machine.handle_timeout(0.999)
+    assert (bench.got, bench.machine.now) == ([], 0.999)
+    bench.machine.handle_timeout(1.0)
+    assert bench.got == [None]
+    assert bench.machine.deadline == 2.0
+
+
+def test_step_without_limit_has_no_deadline() -> None:
+    bench = Bench(Step(b'', None))
+    bench.machine.start(0.0)
+    assert bench.machine.deadline is None
+    bench.machine.handle_timeout(1e9)
+    assert bench.got == []
+
+
+def test_timeout_zero_does_not_wait() -> None:
+    bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    assert bench.machine.data_to_send() == ACK + EOT + FRAME
+    assert bench.got == [None, None]
+    assert bench.machine.deadline == 1.0
+
+
+def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
+    bench = Bench(Step(ACK, 0))
+    bench.machine.start(0.0)
+    assert bench.machine.deadline is None
+    assert bench.machine.data_to_send() == ACK
+    bench.machine.receive_data(ACK, 1.0)
+    assert bench.got == [None]
+
+
+def test_tx_delay_passes_before_each_transmission() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
+    bench.machine.start(0.0)
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', 0.25)
+    bench.machine.handle_timeout(0.2)
+    assert bench.machine.data_to_send() == b''
+    bench.machine.handle_timeout(0.25)
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 1.25)
+    bench.machine.receive_data(ACK, 0.5)
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', 0.75)
+    bench.machine.handle_timeout(0.75)
+    assert (bench.machine.data_to_send(), bench.got) == (FRAME, [SAID_ACK])
+
+
+def test_tx_delay_begins_when_the_line_is_free() -> None:
+    bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0),
+                  timing=LineTiming(char_time=0.01, tx_delay=0.25))
+    bench.machine.start(0.0)
+    bench.machine.handle_timeout(0.25)
+    assert bench.machine.data_to_send() == FRAME
+    assert bench.machine.deadline == pytest.approx(0.25 + 0.1 + 0.25)
+    bench.machine.handle_timeout(0.6)
+    assert bench.machine.data_to_send() == FRAME
+    assert bench.machine.deadline == pytest.approx(0.6 + 0.1 + 1.0)
+
+
+@pytest.mark.parametrize(('tx_delay', 'delay', 'passes'), [
+    (0.0, 0.25, 0.25), (0.5, 0.25, 0.5), (0.25, 0.5, 0.5)])
+def test_longer_of_the_two_delays_counts(tx_delay: float, delay: float, passes: float) -> None:
+    bench = Bench(Step(FRAME, 1.0, delay), timing=LineTiming(tx_delay=tx_delay))
+    bench.machine.start(0.0)
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', passes)
+
+
+def test_listening_is_not_delayed() -> None:
+    bench = Bench(Step(b'', 1.0, 0.5), timing=LineTiming(tx_delay=0.25))
+    bench.machine.start(0.0)
+    assert bench.machine.deadline == 1.0
+    bench.machine.receive_data(ACK, 0.1)
+    assert bench.got == [SAID_ACK]
+
+
+def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK + EOT + NAK[:1], 0.5)
+    assert bench.got == [SAID_ACK]
+    bench.machine.receive_data(NAK[1:], 0.6)
+    assert bench.got == [SAID_ACK]
+    assert bench.machine.data_to_send() == FRAME + FRAME
+
+
+def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25), forget_on_send=True)
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK + b'\x10', 0.1)
+    bench.machine.handle_timeout(0.25)
+    bench.machine.receive_data(b'\x06', 0.3)
+    assert bench.got == []
+    bench.machine.receive_data(EOT, 0.4)
+    assert bench.got == [SAID_EOT]
+
+
+def test_without_forgetting_all_symbols_are_delivered() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0, 0.25), Step(b'', 1.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK + EOT, 0.5)
+    assert bench.got == [SAID_ACK]
+    bench.machine.handle_timeout(0.75)
+    assert bench.got == [SAID_ACK, SAID_EOT]
+
+
+def test_listen_on_keeps_the_deadline() -> None:
+    bench = Bench(Step(FRAME, 1.0), LISTEN_ON, LISTEN_ON, Step(b'', 3.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(NAK, 0.5)
+    bench.machine.receive_data(EOT, 0.75)
+    assert bench.machine.deadline == 1.0
+    bench.machine.handle_timeout(1.0)
+    assert bench.got == [Control(Code.NAK), SAID_EOT, None]
+
+
+def test_answer_that_has_begun_extends_the_deadline() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), forget_on_send=True)
+    bench.machine.start(0.0)
+    for number, byte in enumerate(MESSAGE):
+        bench.machine.receive_data(bytes((byte,)), 1.0 + 0.2 * number)
+        bench.machine.handle_timeout(1.0 + 0.2 * number)
+    assert len(bench.got) == 1
+    assert bench.got[0] is not None
+
+
+def test_pause_ends_an_answer_that_has_begun() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(MESSAGE[:5], 1.0)
+    assert bench.machine.deadline == pytest.approx(1.0 + 20 * 0.01 + 0.1)
+    bench.machine.handle_timeout(1.31)
+    assert bench.got == [None]
+
+
+def test_answer_that_has_begun_does_not_shorten_the_deadline() -> None:
+    bench = Bench(Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(MESSAGE[:5], 0.1)
+    assert bench.machine.deadline == 1.0
+
+
+def test_noise_outside_of_a_message_does_not_extend_the_deadline() -> None:
+    bench = Bench(Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(b'noise\x10', 0.95)
+    assert bench.machine.deadline == 1.0
+
+
+def test_message_without_time_limit_gets_none() -> None:
+    bench = Bench(Step(b'', None))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(MESSAGE[:5], 0.5)
+    assert bench.machine.deadline is None
+
+
+@pytest.mark.parametrize('broken', [b'\x10', b'\x10\x01', b'\x10\x05\x10', MESSAGE[:-1]])
+@pytest.mark.parametrize(('pause', 'forgotten'), [(0.05, False), (0.31, True)])
+def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, pause: float,
+                                                                forgotten: bool) -> None:
+    bench = Bench(*[Step(b'', None)] * 3, timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(broken, 1.0)
+    bench.machine.receive_data(EOT, 1.0 + pause)
+    assert (bench.got == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
+
+
+def test_pause_within_a_time_limit_ends_nothing() -> None:
+    bench = Bench(Step(b'', 5.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(EOT[:1], 1.0)
+    bench.machine.receive_data(EOT[1:], 4.0)
+    assert bench.got == [SAID_EOT]
+
+
+def test_wake_ends_a_rest() -> None:
+    bench = Bench(Step(None, 10.0), Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    assert bench.machine.deadline == 10.0
+    bench.machine.wake(3.0)
+    assert bench.got == [None]
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 4.0)
+
+
+def test_time_ends_a_rest() -> None:
+    bench = Bench(Step(None, 10.0), Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    bench.machine.handle_timeout(10.0)
+    assert (bench.got, bench.machine.data_to_send()) == ([None], FRAME)
+
+
+def test_rest_without_limit_lasts_until_wake() -> None:
+    bench = Bench(Step(None, None), Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    assert bench.machine.deadline is None
+    bench.machine.wake(3.0)
+    assert bench.got == [None]
+
+
+@pytest.mark.parametrize('step', [Step(FRAME, 1.0), Step(b'', 1.0), Step(FRAME, 1.0, 0.5)])
+def test_wake_disturbs_no_transaction(step: Step) -> None:
+    bench = Bench(step)
+    bench.machine.start(0.0)
+    deadline = bench.machine.deadline
+    bench.machine.wake(0.25)
+    assert (bench.got, bench.machine.deadline) == ([], deadline)
+
+
+def test_rest_is_deaf() -> None:
+    bench = Bench(Step(None, 1.0), Step(FRAME, 1.0), forget_on_send=True)
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK, 0.5)
+    bench.machine.handle_timeout(1.0)
+    assert bench.got == [None]
+    assert bench.machine.deadline == 2.0
+
+
+def test_stop_raises_its_error_inside_the_procedure() -> None:
+    bench = Bench(Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    error = OSError('unplugged')
+    bench.machine.stop(error)
+    assert bench.error is error
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', None)
+    bench.machine.receive_data(ACK, 1.0)
+    assert bench.got == []
+
+
+def test_stop_with_an_error_that_the_procedure_handles() -> None:
+    seen: list[str] = []
+
+    def procedure(machine: Machine) -> Procedure:
+        try:
+            yield Step(FRAME, 1.0)
+        except OSError:
+            seen.append('error')
+        yield Step(FRAME, 1.0)
+        seen.append('went on')
+
+    machine = Machine(procedure, checksum=Checksum.CRC)
+    machine.start(0.0)
+    machine.stop(OSError())
+    assert seen == ['error']
+    assert machine.data_to_send() == b''
+
+
+def test_stop_lets_another_error_through() -> None:
+    def procedure(machine: Machine) -> Procedure:
+        try:
+            yield Step(FRAME, 1.0)
+        finally:
+            raise KeyError('a bug')
+
+    machine = Machine(procedure, checksum=Checksum.CRC)
+    machine.start(0.0)
+    with pytest.raises(KeyError):
+        machine.stop(OSError())
+
+
+def test_stop_without_error_closes_the_procedure() -> None:
+    bench = Bench(Step(FRAME, 1.0))
+    bench.machine.start(0.0)
+    bench.machine.stop()
+    assert bench.error is None
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', None)
+
+
+def test_start_begins_afresh() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0), timing=LineTiming(char_time=1.0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK + b'\x10', 0.5)
+    bench.machine.start(2.0)
+    bench.machine.receive_data(b'\x06', 2.5)
+    assert bench.got == [SAID_ACK]
+    assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 13.0)
+
+
+def test_error_in_a_procedure_reaches_the_caller() -> None:
+    def procedure(machine: Machine) -> Procedure:
+        yield Step(FRAME, 1.0)
+        raise KeyError('a bug')
+
+    machine = Machine(procedure, checksum=Checksum.CRC)
+    machine.start(0.0)
+    with pytest.raises(KeyError):
+        machine.receive_data(ACK, 0.5)
+
+
+def _deaf(machine: Machine) -> None:
+    machine.handle_timeout(0.0)
+
+
+def _stopped(machine: Machine) -> None:
+    machine.stop()
+
+
+@pytest.mark.parametrize('prepare', [_deaf, _stopped])
+def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], None]) -> None:
+    machine = Bench(Step(FRAME, None), Step(EOT, None)).machine
+    machine.start(0.0)
+    assert machine.counters.chars_sent == 10
+    machine.receive_data(ACK, 0.5)
+    assert (machine.counters.chars_sent, machine.counters.chars_received) == (12, 2)
+    prepare(machine)
+    machine.receive_data(b'noise', 0.75)
+    assert machine.counters.chars_received == 7
+
+
+def test_frame_that_waits_is_counted_when_it_goes_out() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
+    bench.machine.start(0.0)
+    assert bench.machine.counters.chars_sent == 0
+    bench.machine.handle_timeout(0.25)
+    assert bench.machine.counters.chars_sent == 10
+
+
+def test_given_counters_are_used() -> None:
+    counters = Counters()
+    machine = Machine(lambda machine: iter_steps(Step(FRAME, 1.0)), checksum=Checksum.CRC,
+                      counters=counters)
+    machine.start(0.0)
+    assert machine.counters is counters
+    assert counters.chars_sent == 10
+
+
+def iter_steps(*steps: Step) -> Procedure:
+    """Return a procedure of ``steps`` that does not care for answers."""
+    for step in steps:
+        yield step

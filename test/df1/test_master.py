@@ -1,0 +1,672 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The half-duplex master: one script for each rule of the manual (M 3-12..3-17) and of S0."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame, STX
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings, MIN_RESPONSE_TIME
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
+import pytest
+from support.script import Answer, Expect, MasterScript, Silence
+
+SLAVE, MASTER = 17, 5
+COMMAND = Packet(SLAVE, MASTER, 0x0F, 0, 0x0102, bytes.fromhex('A2 02 07 89 00 00'))
+REPLY = COMMAND.reply(b'\x34\x12')
+STALE = replace(REPLY, tns=0x0101)
+SETTINGS = MasterSettings(
+    station=MASTER, nak_retries=2, enq_retries=2, timeout=0.5, cmd_timeout=2.0, poll_pause=0.005)
+
+SENT = Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.CRC))
+POLLED = Expect(poll_frame(SLAVE))
+POLLED_AGAIN = Expect(poll_frame(SLAVE), after=0.005)
+ACKED, NAKED = Expect(ACK), Expect(NAK)
+ACKED_AND_SENT = Expect(ACK + SENT.data)
+SAYS_ACK, SAYS_EOT, SAYS_NAK = Answer(ACK, 0.1), Answer(EOT, 0.1), Answer(NAK, 0.1)
+TIMEOUT = Silence(0.5)
+
+DELIVERED = {'commands_sent': 1, 'messages_sent': 1, 'acks_received': 1}
+
+
+def frame(packet: Packet) -> bytes:
+    """Return the slave's frame around ``packet``."""
+    return message_frame(packet.encode(), Checksum.CRC)
+
+
+def says(packet: Packet) -> Answer:
+    """Return the answer that is a slave's message."""
+    return Answer(frame(packet), 0.1)
+
+
+def damaged(packet: Packet) -> bytes:
+    """Return the slave's frame with one data bit flipped."""
+    data = bytearray(frame(packet))
+    data[4] ^= 0x20
+    return bytes(data)
+
+
+SAYS_REPLY = says(REPLY)
+
+
+def inactive_script() -> MasterScript:
+    """Return a master that knows the slave as inactive, with everything else at zero."""
+    script = MasterScript(SETTINGS)
+    script.stations.lost(SLAVE, 0.0)
+    script.forget()
+    return script
+
+
+def test_normal() -> None:
+    script = MasterScript(SETTINGS)
+    reply = script.run(
+        COMMAND,
+        Expect(bytes.fromhex('10 01 11 10 02 11 05 0F 00 02 01 A2 02 07 89 00 00 10 03 57 DE')),
+        Answer(bytes.fromhex('10 06')),
+        Expect(bytes.fromhex('10 05 11 EF')),
+        Answer(bytes.fromhex('10 02 05 11 4F 00 02 01 34 12 10 03 34 07')),
+        Expect(bytes.fromhex('10 06')))
+    assert reply == REPLY
+    assert script.numbers() == [(2523, SLAVE)]
+    assert script.counts() == {
+        'messages_sent': 1, 'messages_received': 1, 'commands_sent': 1, 'replies_received': 1,
+        'polls_sent': 1, 'acks_sent': 1, 'acks_received': 1}
+    assert script.master.command_sent
+    assert script.changes == []
+    station = script.stations[SLAVE]
+    assert (station.replies, station.last_tns, station.last_heard) == (1, 0x0102, 100.0)
+
+
+def test_normal_with_bcc() -> None:
+    script = MasterScript(replace(SETTINGS, checksum=Checksum.BCC))
+    reply = script.run(
+        COMMAND, Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.BCC)), SAYS_ACK,
+        POLLED, Answer(message_frame(REPLY.encode(), Checksum.BCC)), ACKED)
+    assert reply == REPLY
+
+
+def test_slow_slave_is_polled_until_it_replies() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_EOT, POLLED_AGAIN, SAYS_EOT,
+                      POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'polls_sent': 3, 'eots_received': 2,
+        'acks_sent': 1}
+
+
+def test_command_lost_is_sent_again() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(
+        COMMAND, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2515, 0), (2521, 1, 2515), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_sent': 2, 'nak_retries': 1, 'messages_received': 1, 'replies_received': 1,
+        'polls_sent': 1, 'acks_sent': 1}
+
+
+@pytest.mark.parametrize(('garbage', 'last'), [
+    (b'\x10\x16', 0x16), (b'\x10', 0x10), (b'\x06', 0x06), (b'\x55\x66', 0x66)])
+def test_ack_lost_or_damaged_the_command_is_sent_again(garbage: bytes, last: int) -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, Answer(garbage), TIMEOUT, SENT, SAYS_ACK, POLLED,
+                      SAYS_REPLY, ACKED) == REPLY
+    invalid = [(2514, 0x16)] if garbage == b'\x10\x16' else []
+    assert script.numbers() == [*invalid, (2515, last), (2521, 1, 2515), (2523, SLAVE)]
+    assert script.counts()['nak_retries'] == 1
+
+
+def test_command_is_delivered_by_its_last_retry() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, TIMEOUT, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert script.counts()['nak_retries'] == 2
+    assert 'nak_limit_exceeded' not in script.counts()
+
+
+def test_reply_damaged_is_polled_for_again_without_nak() -> None:
+    script = MasterScript(SETTINGS)
+    bad = damaged(REPLY)
+    expected = Checksum.CRC.of_message(b'\x05\x11\x6F' + REPLY.encode()[3:])
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, Answer(bad), POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    check = int.from_bytes(bad[-2:], 'little')
+    assert script.numbers() == [
+        (2506, *divmod(check, 256), *divmod(expected, 256)), (2522, 1, 2506), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'polls_sent': 2, 'acks_sent': 1,
+        'crc_errors': 1, 'enq_retries': 1}
+
+
+def test_reply_damaged_on_a_bcc_line_is_a_bcc_error() -> None:
+    script = MasterScript(replace(SETTINGS, checksum=Checksum.BCC))
+    good = message_frame(REPLY.encode(), Checksum.BCC)
+    assert script.run(
+        COMMAND, Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.BCC)), SAYS_ACK, POLLED,
+        Answer(good[:-1] + b'\x01'), POLLED, Answer(good), ACKED) == REPLY
+    assert script.numbers() == [
+        (2507, 0, 1, 0, good[-1]), (2522, 1, 2507), (2523, SLAVE)]
+    assert script.counts()['bcc_errors'] == 1
+    assert 'crc_errors' not in script.counts()
+
+
+def test_poll_lost_is_sent_again() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, TIMEOUT, POLLED, TIMEOUT, POLLED,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [
+        (2516, 0), (2522, 1, 2516), (2516, 0), (2522, 2, 2516), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'polls_sent': 3, 'acks_sent': 1,
+        'enq_retries': 2}
+
+
+def test_master_ack_lost_the_duplicate_is_acknowledged_and_passed_over() -> None:
+    script = MasterScript(SETTINGS)
+    script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
+    script.forget()
+    command = replace(COMMAND, tns=0x0103)
+    reply = command.reply(b'\x35\x12')
+    assert script.run(
+        command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK,
+        POLLED, SAYS_REPLY, Expect(ACK), Expect(poll_frame(SLAVE), after=0.005), says(reply),
+        ACKED) == reply
+    assert script.numbers() == [(2524, SLAVE), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 2, 'duplicate_messages': 1, 'replies_received': 1, 'polls_sent': 2,
+        'acks_sent': 2}
+    assert script.stations[SLAVE].replies == 2
+
+
+def test_reply_counts_as_duplicate_only_when_it_is_the_same_transaction() -> None:
+    script = MasterScript(SETTINGS)
+    for tns in range(0x0102, 0x0105):
+        command = replace(COMMAND, tns=tns)
+        sent = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
+        reply = command.reply(b'\x34\x12')
+        assert script.run(command, sent, SAYS_ACK, POLLED, says(reply), ACKED) == reply
+    assert 'duplicate_messages' not in script.counts()
+
+
+def test_slave_sink_full_takes_the_command_at_a_retry() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, TIMEOUT, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED,
+                      says(STALE), ACKED, POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [
+        (2515, 0), (2521, 1, 2515), (2515, 0), (2521, 2, 2515),
+        (2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
+    assert script.counts()['nak_retries'] == 2
+    assert script.counts()['stale_messages'] == 1
+
+
+@pytest.mark.parametrize('retries', [0, 1, 3, 10])
+def test_dead_slave_becomes_inactive_after_its_retries(retries: int) -> None:
+    script = MasterScript(replace(SETTINGS, nak_retries=retries))
+    error = script.run(COMMAND, *(SENT, TIMEOUT) * (retries + 1))
+    assert isinstance(error, StationInactive)
+    assert error.args == (SLAVE,)
+    noticed = []
+    for number in range(1, retries + 1):
+        noticed += [(2515, 0), (2521, number, 2515)]
+    assert script.numbers() == [*noticed, (2515, 0), (2519, retries), (2509, SLAVE)]
+    counts = {'commands_sent': 1, 'messages_sent': retries + 1, 'nak_retries': retries,
+              'nak_limit_exceeded': 1}
+    assert script.counts() == {name: count for name, count in counts.items() if count}
+    assert script.changes == [(SLAVE, False)]
+    assert script.stations[SLAVE].silent_since == script.now
+    assert script.now == pytest.approx(100.0 + 0.5 * (retries + 1))
+    assert script.master.command_sent
+
+
+def test_inactive_station_gets_exactly_one_poll() -> None:
+    script = inactive_script()
+    error = script.run(COMMAND, POLLED, TIMEOUT)
+    assert isinstance(error, StationInactive)
+    assert not script.master.command_sent
+    assert script.numbers() == [(2509, SLAVE)]
+    assert script.counts() == {'polls_sent': 1}
+    assert script.changes == []
+    assert isinstance(script.run(COMMAND, POLLED, TIMEOUT), StationInactive)
+
+
+def test_eot_makes_an_inactive_station_active() -> None:
+    script = inactive_script()
+    assert script.run(COMMAND, POLLED, SAYS_EOT, SENT, SAYS_ACK, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.changes == [(SLAVE, True)]
+    assert script.numbers() == [(2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'polls_sent': 2, 'eots_received': 1,
+        'acks_sent': 1}
+
+
+def test_stale_message_makes_an_inactive_station_active() -> None:
+    script = inactive_script()
+    assert script.run(COMMAND, POLLED, says(STALE), ACKED_AND_SENT, SAYS_ACK, POLLED,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert script.changes == [(SLAVE, True)]
+    assert script.numbers() == [(2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 2, 'replies_received': 2, 'polls_sent': 2, 'acks_sent': 2,
+        'stale_messages': 1}
+
+
+def test_duplicate_makes_an_inactive_station_active() -> None:
+    script = MasterScript(SETTINGS)
+    script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
+    script.stations.lost(SLAVE, script.now)
+    script.forget()
+    command = replace(COMMAND, tns=0x0103)
+    sent = Expect(ACK + master_frame(SLAVE, command.encode(), Checksum.CRC))
+    assert isinstance(script.run(command, POLLED, SAYS_REPLY, sent, *_never_acknowledged(command)),
+                      StationInactive)
+    assert script.changes == [(SLAVE, True), (SLAVE, False)]
+    assert script.counts()['duplicate_messages'] == 1
+
+
+def _never_acknowledged(command: Packet) -> list[Expect | Silence]:
+    """Return the script of a slave that does not take ``command`` after its first sending."""
+    sent = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
+    return [TIMEOUT, sent, TIMEOUT, sent, TIMEOUT]
+
+
+@pytest.mark.parametrize('answer', [
+    Answer(damaged(REPLY), 0.1), Answer(message_frame(b'abc', Checksum.CRC), 0.1)])
+def test_bad_answer_leaves_an_inactive_station_inactive(answer: Answer) -> None:
+    script = inactive_script()
+    assert isinstance(script.run(COMMAND, POLLED, answer), StationInactive)
+    assert (script.changes, script.counts()) == ([], {'polls_sent': 1})
+    assert not script.master.command_sent
+
+
+def test_ack_is_no_answer_to_a_probe() -> None:
+    script = inactive_script()
+    assert isinstance(
+        script.run(COMMAND, POLLED, SAYS_ACK, Silence(0.4)), StationInactive)
+    assert script.counts() == {'polls_sent': 1, 'acks_received': 1}
+
+
+@pytest.mark.parametrize('retries', [0, 1, 3])
+def test_enq_limit(retries: int) -> None:
+    script = MasterScript(replace(SETTINGS, enq_retries=retries))
+    error = script.run(COMMAND, SENT, SAYS_ACK, *(POLLED, TIMEOUT) * (retries + 1))
+    assert isinstance(error, StationInactive)
+    noticed = []
+    for number in range(1, retries + 1):
+        noticed += [(2516, 0), (2522, number, 2516)]
+    assert script.numbers() == [*noticed, (2516, 0), (2520, retries), (2509, SLAVE)]
+    counts = DELIVERED | {
+        'polls_sent': retries + 1, 'enq_retries': retries, 'enq_limit_exceeded': 1}
+    assert script.counts() == {name: count for name, count in counts.items() if count}
+    assert script.changes == [(SLAVE, False)]
+    assert script.master.command_sent
+
+
+def test_enq_retries_count_afresh_after_an_eot() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=5.0))
+    assert script.run(
+        COMMAND, SENT, SAYS_ACK, *(POLLED, TIMEOUT) * 2, POLLED, SAYS_EOT,
+        POLLED_AGAIN, TIMEOUT, POLLED, TIMEOUT, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.counts()['enq_retries'] == 4
+    assert 'enq_limit_exceeded' not in script.counts()
+
+
+def test_retries_are_not_cut_short_by_the_command_timeout() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5))
+    assert script.run(COMMAND, SENT, TIMEOUT, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, TIMEOUT,
+                      POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert 'command_timeouts' not in script.counts()
+
+
+@pytest.mark.parametrize('nak', [True, False])
+def test_command_timeout_by_eots(nak: bool) -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=1.0, nak_on_command_timeout=nak))
+    busy = Answer(EOT, 0.4)
+    last = [NAKED] if nak else []
+    error = script.run(COMMAND, SENT, SAYS_ACK, POLLED, busy, POLLED_AGAIN, busy, POLLED_AGAIN,
+                       busy, *last)
+    assert isinstance(error, CommandTimeout)
+    assert script.numbers() == [(2508,)]
+    assert script.counts() == DELIVERED | {
+        'polls_sent': 3, 'eots_received': 3, 'command_timeouts': 1} | (
+        {'naks_sent': 1} if nak else {})
+    assert script.changes == []
+    assert script.stations[SLAVE].active
+    assert script.master.command_sent
+
+
+def test_command_timeout_counts_from_the_beginning_of_the_transaction() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=1.0))
+    error = script.run(COMMAND, SENT, TIMEOUT, SENT, Answer(ACK, 0.375), POLLED,
+                       Answer(EOT, 0.125), NAKED)
+    assert isinstance(error, CommandTimeout)
+    assert script.now == 101.0
+
+
+def test_command_timeout_is_not_early() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=1.0))
+    assert script.run(COMMAND, SENT, TIMEOUT, SENT, Answer(ACK, 0.375), POLLED,
+                      Answer(EOT, 0.12), POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
+
+
+def test_command_timeout_by_stale_messages() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
+    error = script.run(COMMAND, SENT, Answer(ACK), POLLED, says(STALE), Expect(ACK + NAK))
+    assert isinstance(error, CommandTimeout)
+    assert script.numbers() == [(2510, SLAVE, MASTER, 0x0101), (2508,)]
+
+
+def test_reply_at_the_last_poll_is_taken_even_after_the_command_timeout() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5))
+    assert script.run(COMMAND, SENT, Answer(ACK, 0.4), POLLED, Answer(frame(REPLY), 0.4),
+                      ACKED) == REPLY
+    assert 'command_timeouts' not in script.counts()
+
+
+def test_late_reply_after_a_command_timeout_is_stale() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5))
+    script.run(COMMAND, SENT, SAYS_ACK, POLLED, Answer(EOT, 0.45), NAKED)
+    script.forget()
+    command = replace(COMMAND, tns=0x0103)
+    assert script.run(
+        command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
+        SAYS_REPLY, ACKED, POLLED_AGAIN, says(command.reply()), ACKED) == command.reply()
+    assert script.numbers() == [(2510, SLAVE, MASTER, 0x0102), (2523, SLAVE)]
+    assert script.counts()['stale_messages'] == 1
+
+
+def test_nak_received_the_command_is_sent_again() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_NAK, SENT, SAYS_ACK, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2517,), (2511,), (2521, 1, 2511), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_sent': 2, 'naks_received': 1, 'nak_retries': 1, 'messages_received': 1,
+        'replies_received': 1, 'polls_sent': 1, 'acks_sent': 1}
+
+
+def test_naks_only_end_as_inactive() -> None:
+    script = MasterScript(SETTINGS)
+    assert isinstance(script.run(COMMAND, *(SENT, SAYS_NAK) * 3), StationInactive)
+    assert script.numbers() == [
+        (2517,), (2511,), (2521, 1, 2511), (2517,), (2511,), (2521, 2, 2511), (2517,), (2511,),
+        (2519, 2), (2509, SLAVE)]
+
+
+def test_nak_is_no_answer_to_a_poll() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_NAK, SAYS_REPLY, ACKED) == REPLY
+    assert script.counts()['naks_received'] == 1
+    assert 'enq_retries' not in script.counts()
+
+
+def test_eot_is_no_answer_to_a_command() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_EOT, Silence(0.4), SENT, SAYS_ACK, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2515, 0x04), (2521, 1, 2515), (2523, SLAVE)]
+    assert script.counts()['eots_received'] == 1
+
+
+def test_message_instead_of_an_ack_is_no_ack() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, says(STALE), SENT, SAYS_ACK, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2515, STX[1]), (2521, 1, 2515), (2523, SLAVE)]
+    assert 'messages_received' in script.counts()
+
+
+def test_wrong_command_code() -> None:
+    script = MasterScript(SETTINGS)
+    error = script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(replace(REPLY, cmd=0x41)), ACKED)
+    assert isinstance(error, WrongCommandCode)
+    assert error.args == (SLAVE, 0x41, 0x4F)
+    assert script.numbers() == [(2505, SLAVE, 0x41, 0x4F)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'polls_sent': 1, 'acks_sent': 1,
+        'invalid_messages': 1}
+    assert script.stations[SLAVE].active
+    assert script.master.command_sent
+
+
+def test_stale_reply_is_acknowledged_and_counted() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(STALE), ACKED, POLLED_AGAIN,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 2, 'replies_received': 2, 'polls_sent': 2, 'acks_sent': 2,
+        'stale_messages': 1}
+    assert script.stations[SLAVE].replies == 1
+
+
+def test_command_from_a_slave_is_acknowledged_and_passed_over() -> None:
+    script = MasterScript(SETTINGS)
+    message = Packet(MASTER, SLAVE, 0x0F, 0, COMMAND.tns, b'\x00')
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(message), ACKED, POLLED_AGAIN,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2510, SLAVE, MASTER, COMMAND.tns), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 2, 'commands_received': 1, 'replies_received': 1, 'polls_sent': 2,
+        'acks_sent': 2}
+
+
+@pytest.mark.parametrize('change', [{'dst': 6}, {'src': 18}])
+def test_reply_with_wrong_addresses_is_invalid(change: dict[str, Any]) -> None:
+    script = MasterScript(SETTINGS)
+    wrong = replace(REPLY, **change)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), ACKED, POLLED_AGAIN,
+                      Answer(frame(replace(REPLY, tns=0x0101))), ACKED, POLLED_AGAIN,
+                      says(REPLY), ACKED) == REPLY
+    assert script.numbers() == [
+        (2510, wrong.src, wrong.dst, wrong.tns), (2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
+    assert script.counts()['invalid_messages'] == 1
+    assert script.counts()['stale_messages'] == 1
+
+
+def test_reply_with_an_error_status_is_a_reply() -> None:
+    script = MasterScript(SETTINGS)
+    refused = COMMAND.reply(sts=0x10)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(refused), ACKED) == refused
+    assert script.numbers() == [(2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'error_messages_received': 1,
+        'polls_sent': 1, 'acks_sent': 1}
+
+
+def test_message_too_short() -> None:
+    script = MasterScript(SETTINGS)
+    short = Answer(message_frame(b'abcde', Checksum.CRC))
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, short, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2513, 6), (2522, 1, 2513), (2523, SLAVE)]
+    assert script.counts()['invalid_messages'] == 1
+    assert script.counts()['messages_received'] == 1
+
+
+def test_message_too_long() -> None:
+    script = MasterScript(SETTINGS)
+    long = Answer(message_frame(bytes(262), Checksum.CRC))
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2512, 261), (2522, 1, 2512), (2523, SLAVE)]
+    assert script.counts()['invalid_messages'] == 1
+
+
+def test_message_without_etx_ends_by_a_pause() -> None:
+    script = MasterScript(SETTINGS, LineTiming(char_time=0.001))
+    leaving = len(SENT.data) * 0.001
+    begun = Answer(frame(REPLY)[:-3], 0.4)
+    assert script.run(
+        COMMAND, SENT, Answer(ACK, leaving), POLLED, begun, Silence(0.02 + 0.1), POLLED,
+        SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2518,), (2522, 1, 2518), (2523, SLAVE)]
+    assert script.counts()['invalid_messages'] == 1
+
+
+def test_message_without_etx_ends_by_another_symbol() -> None:
+    script = MasterScript(SETTINGS)
+    broken = Answer(frame(REPLY)[:-4] + EOT)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, broken, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2518,), (2522, 1, 2518), (2523, SLAVE)]
+
+
+def test_bad_message_instead_of_an_ack_names_its_own_cause() -> None:
+    script = MasterScript(SETTINGS)
+    short = Answer(message_frame(b'abcde', Checksum.CRC))
+    assert script.run(COMMAND, SENT, short, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2513, 6), (2521, 1, 2513), (2523, SLAVE)]
+
+
+def test_invalid_symbol_is_told_and_passed_over() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, Answer(b'\x10\x07'), SAYS_ACK, POLLED, Answer(b'\x10\xFE'),
+                      TIMEOUT, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [
+        (2514, 0x07), (2514, 0xFE), (2516, 0xFE), (2522, 1, 2516), (2523, SLAVE)]
+
+
+def test_echo_of_our_own_frames_is_passed_over() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(
+        COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data), SAYS_EOT,
+        POLLED_AGAIN, Answer(POLLED.data), SAYS_REPLY, ACKED) == REPLY
+    assert script.numbers() == [(2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 1, 'replies_received': 1, 'polls_sent': 2, 'eots_received': 1,
+        'acks_sent': 1}
+
+
+def test_echo_of_our_ack_does_not_acknowledge_the_next_command() -> None:
+    script = MasterScript(SETTINGS)
+    script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data),
+               SAYS_REPLY, ACKED)
+    command = replace(COMMAND, tns=0x0103)
+    sent = master_frame(SLAVE, command.encode(), Checksum.CRC)
+    reply = command.reply()
+    assert script.run(command, Expect(sent), Answer(ACK), Answer(sent), SAYS_ACK, POLLED,
+                      Answer(POLLED.data), says(reply), ACKED) == reply
+
+
+def test_line_that_stops_echoing_is_heard_again_after_one_retry() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, TIMEOUT, POLLED,
+                      SAYS_REPLY, ACKED) == REPLY
+
+
+def test_echo_alone_is_silence() -> None:
+    script = MasterScript(SETTINGS)
+    error = script.run(COMMAND, *(SENT, Answer(SENT.data), TIMEOUT) * 3)
+    assert isinstance(error, StationInactive)
+    assert script.counts()['nak_limit_exceeded'] == 1
+
+
+def test_answer_of_before_the_transmission_is_none() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, Answer(ACK + EOT + frame(REPLY)), POLLED, TIMEOUT, POLLED,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert script.counts()['polls_sent'] == 2
+
+
+def test_tx_delay_passes_before_each_transmission() -> None:
+    script = MasterScript(SETTINGS, LineTiming(tx_delay=0.05))
+    assert script.run(
+        COMMAND, Expect(SENT.data, 0.05), SAYS_ACK, Expect(POLLED.data, 0.05), SAYS_EOT,
+        Expect(POLLED.data, 0.05), TIMEOUT, Expect(POLLED.data, 0.05), SAYS_REPLY,
+        Expect(ACK, 0.05)) == REPLY
+
+
+def test_tx_delay_passes_before_a_nak_too() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5), LineTiming(tx_delay=0.05))
+    error = script.run(COMMAND, Expect(SENT.data, 0.05), SAYS_ACK, Expect(POLLED.data, 0.05),
+                       Answer(EOT, 0.4), Expect(NAK, 0.05))
+    assert isinstance(error, CommandTimeout)
+
+
+def test_timeout_begins_when_the_last_byte_has_left() -> None:
+    script = MasterScript(SETTINGS, LineTiming(char_time=0.01))
+    leaving = len(SENT.data) * 0.01
+    error = script.run(COMMAND, *[SENT, Silence(leaving + 0.5)] * 3)
+    assert isinstance(error, StationInactive)
+
+
+def test_timeout_zero_is_as_short_as_the_equipment_can_do() -> None:
+    script = MasterScript(replace(SETTINGS, timeout=0.0))
+    error = script.run(COMMAND, *(SENT, Silence(MIN_RESPONSE_TIME)) * 3)
+    assert isinstance(error, StationInactive)
+    assert MIN_RESPONSE_TIME > 0
+
+
+def test_station_behind_a_gateway() -> None:
+    script = MasterScript(SETTINGS)
+    command = replace(COMMAND, dst=99)
+    reply = command.reply(b'\x34\x12')
+    assert script.run(
+        command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
+        says(reply), ACKED, station=SLAVE) == reply
+    assert [station.number for station in script.stations] == [SLAVE]
+    assert script.numbers() == [(2523, SLAVE)]
+
+
+def test_stations_are_kept_apart() -> None:
+    script = MasterScript(SETTINGS)
+    assert isinstance(script.run(COMMAND, *(SENT, TIMEOUT) * 3), StationInactive)
+    other = replace(COMMAND, dst=9)
+    assert script.run(
+        other, Expect(master_frame(9, other.encode(), Checksum.CRC)), SAYS_ACK,
+        Expect(poll_frame(9)), says(other.reply()), ACKED) == other.reply()
+    assert script.changes == [(SLAVE, False)]
+
+
+def test_command_sent_tells_what_has_been_on_the_line() -> None:
+    script = inactive_script()
+    assert not script.master.command_sent
+    script.begin(COMMAND, POLLED)
+    assert not script.master.command_sent
+    script = inactive_script()
+    script.begin(COMMAND, POLLED, SAYS_EOT, SENT)
+    assert script.master.command_sent
+
+
+def test_command_sent_is_taken_back_at_the_next_transaction() -> None:
+    script = MasterScript(SETTINGS)
+    script.run(COMMAND, *(SENT, TIMEOUT) * 3)
+    assert script.master.command_sent
+    script.run(COMMAND, POLLED, TIMEOUT)
+    assert not script.master.command_sent
+
+
+def test_every_event_names_its_station() -> None:
+    script = MasterScript(SETTINGS)
+    script.run(COMMAND, *(SENT, TIMEOUT) * 3)
+    assert {event.station for event in script.events} == {SLAVE}
+
+
+def test_settings_default_to_those_of_the_specification() -> None:
+    settings = MasterSettings()
+    assert (settings.station, settings.checksum, settings.nak_retries, settings.enq_retries) == (
+        5, Checksum.CRC, 3, 3)
+    assert (settings.timeout, settings.cmd_timeout) == (1.0, 1.0)
+
+
+def test_report_may_be_left_out() -> None:
+    script = MasterScript(SETTINGS)
+    script.master = HalfDuplexMaster(script.machine, SETTINGS, script.stations)
+    assert isinstance(script.run(COMMAND, *(SENT, TIMEOUT) * 3), LinkError)
+    assert script.events == []

@@ -1,0 +1,338 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The half-duplex slave, rule by rule (M 3-4, 3-5; KF2 4-31)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import (
+    ACK,
+    Code,
+    Control,
+    EOT,
+    Fault,
+    Frame,
+    master_frame,
+    message_frame,
+    NAK,
+    Poll,
+    poll_frame,
+    Symbol,
+    Unknown,
+)
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+import pytest
+
+STATION = 7
+COMMAND = Packet(dst=STATION, src=5, cmd=0x0F, sts=0, tns=0x0102, data=b'\xA2\x01')
+POLL = Poll(STATION, True)
+HEARD_ACK, HEARD_NAK = Control(Code.ACK), Control(Code.NAK)
+
+
+class Bench:
+    """A slave, and the commands it has executed."""
+
+    def __init__(self, sts: int = 0, settings: SlaveSettings | None = None) -> None:
+        self.served: list[Packet] = []
+        self._sts = sts
+        self.slave = HalfDuplexSlave(settings or SlaveSettings(STATION), self._serve)
+
+    def _serve(self, command: Packet) -> Packet:
+        self.served.append(command)
+        return command.reply(b'', self._sts)
+
+    def hear(self, *symbols: Symbol) -> list[bytes]:
+        """Return what the slave answers to each symbol."""
+        return [self.slave.handle(symbol) for symbol in symbols]
+
+    def counts(self) -> dict[str, int]:
+        """Return the counters that are not zero."""
+        return {name: count for name, count in asdict(self.slave.counters).items() if count}
+
+
+def sent(packet: Packet, station: int | None = STATION, fault: Fault | None = None) -> Frame:
+    """Return the symbol of a master's frame."""
+    return Frame(packet.encode(), station, fault)
+
+
+def reply_frame(command: Packet, sts: int = 0, checksum: Checksum = Checksum.CRC) -> bytes:
+    """Return the frame of the reply to ``command``."""
+    return message_frame(command.reply(b'', sts).encode(), checksum)
+
+
+def later(number: int) -> Packet:
+    """Return a command of a later transaction."""
+    return replace(COMMAND, tns=COMMAND.tns + number)
+
+
+def test_normal() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND), POLL, HEARD_ACK, POLL) == [
+        ACK, reply_frame(COMMAND), b'', EOT]
+    assert bench.served == [COMMAND]
+    assert bench.counts() == {
+        'messages_received': 1, 'commands_received': 1, 'acks_sent': 1, 'polls_received': 2,
+        'messages_sent': 1, 'replies_sent': 1, 'acks_received': 1, 'eots_sent': 1}
+
+
+def test_poll_without_a_message_is_answered_by_eot() -> None:
+    bench = Bench()
+    assert bench.hear(POLL, POLL) == [EOT, EOT]
+    assert bench.counts() == {'polls_received': 2, 'eots_sent': 2}
+
+
+@pytest.mark.parametrize('poll', [Poll(STATION, False), Poll(8, True), Poll(BROADCAST, True)])
+def test_poll_of_another_or_damaged_is_passed_over(poll: Poll) -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND), poll) == [ACK, b'']
+    assert 'polls_received' not in bench.counts()
+
+
+@pytest.mark.parametrize('station', [8, None])
+def test_frame_of_another_is_passed_over(station: int | None) -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND, station)) == [b'']
+    assert (bench.served, bench.counts()) == ([], {})
+
+
+def test_frame_for_a_node_behind_the_station_is_accepted_by_its_stn() -> None:
+    bench = Bench()
+    assert bench.hear(sent(replace(COMMAND, dst=99))) == [ACK]
+    assert bench.served == [replace(COMMAND, dst=99)]
+
+
+@pytest.mark.parametrize(('fault', 'checksum', 'counter'), [
+    (Fault.BAD_CHECK, Checksum.CRC, 'crc_errors'), (Fault.BAD_CHECK, Checksum.BCC, 'bcc_errors'),
+    (Fault.TOO_SHORT, Checksum.CRC, 'invalid_messages'),
+    (Fault.TOO_LONG, Checksum.CRC, 'invalid_messages'),
+    (Fault.NO_ETX, Checksum.BCC, 'invalid_messages')])
+def test_bad_frame_is_met_with_silence(fault: Fault, checksum: Checksum, counter: str) -> None:
+    bench = Bench(settings=SlaveSettings(STATION, checksum))
+    assert bench.hear(sent(COMMAND, fault=fault)) == [b'']
+    assert (bench.served, bench.counts()) == ([], {counter: 1})
+
+
+def test_damaged_command_is_accepted_when_it_comes_again() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND, fault=Fault.BAD_CHECK), sent(COMMAND)) == [b'', ACK]
+    assert bench.served == [COMMAND]
+
+
+def test_ack_lost_duplicate_command_is_acknowledged_and_not_executed() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND), sent(COMMAND), POLL) == [ACK, ACK, reply_frame(COMMAND)]
+    assert bench.served == [COMMAND]
+    assert bench.counts() == {
+        'messages_received': 2, 'commands_received': 1, 'duplicate_messages': 1, 'acks_sent': 2,
+        'polls_received': 1, 'messages_sent': 1, 'replies_sent': 1}
+
+
+def test_duplicate_is_known_after_its_reply_too() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND), POLL, HEARD_ACK, sent(COMMAND), POLL)[3:] == [ACK, EOT]
+    assert bench.served == [COMMAND]
+
+
+@pytest.mark.parametrize('other', [
+    replace(COMMAND, tns=0x0202), replace(COMMAND, src=6), replace(COMMAND, cmd=0x06)])
+def test_command_with_another_src_cmd_or_tns_is_no_duplicate(other: Packet) -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND), sent(other)) == [ACK, ACK]
+    assert bench.served == [COMMAND, other]
+
+
+def test_only_the_last_command_is_remembered() -> None:
+    bench = Bench()
+    bench.hear(sent(COMMAND), sent(later(1)), sent(COMMAND))
+    assert bench.served == [COMMAND, later(1), COMMAND]
+
+
+def test_master_ack_lost_reply_is_held_and_sent_again() -> None:
+    bench = Bench()
+    reply = reply_frame(COMMAND)
+    assert bench.hear(sent(COMMAND), POLL, POLL, HEARD_ACK, POLL) == [ACK, reply, reply, b'', EOT]
+    assert bench.counts() == {
+        'messages_received': 1, 'commands_received': 1, 'acks_sent': 1, 'polls_received': 3,
+        'messages_sent': 2, 'replies_sent': 1, 'nak_retries': 1, 'acks_received': 1,
+        'eots_sent': 1}
+
+
+@pytest.mark.parametrize('retries', [0, 1, 3])
+def test_reply_is_given_up_after_its_retries(retries: int) -> None:
+    bench = Bench(settings=SlaveSettings(STATION, retries=retries))
+    bench.hear(sent(COMMAND))
+    reply = reply_frame(COMMAND)
+    assert bench.hear(*[POLL] * (retries + 2)) == [reply] * (retries + 1) + [EOT]
+    assert bench.slave.counters.nak_limit_exceeded == 1
+    assert bench.slave.counters.nak_retries == retries
+    assert bench.slave.counters.replies_sent == 1
+
+
+def test_next_reply_follows_the_one_that_was_given_up() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, retries=0))
+    assert bench.hear(sent(COMMAND), sent(later(1)), POLL, POLL)[2:] == [
+        reply_frame(COMMAND), reply_frame(later(1))]
+
+
+@pytest.mark.parametrize('between', [
+    POLL, Poll(8, True), Poll(STATION, False), sent(later(1), 8), Control(Code.EOT), Unknown(0)])
+def test_ack_is_ours_only_straight_after_our_message(between: Symbol) -> None:
+    bench = Bench(settings=SlaveSettings(STATION, retries=9))
+    reply = reply_frame(COMMAND)
+    bench.hear(sent(COMMAND), POLL, between)
+    if between == POLL:
+        bench.hear(Unknown(0))
+    assert bench.hear(HEARD_ACK, POLL) == [b'', reply]
+    assert bench.slave.counters.acks_received == 0
+
+
+def test_ack_without_a_message_of_ours_is_not_counted() -> None:
+    bench = Bench()
+    assert bench.hear(HEARD_ACK, sent(COMMAND), HEARD_ACK, POLL)[2:] == [b'', reply_frame(COMMAND)]
+    assert bench.slave.counters.acks_received == 0
+
+
+def test_replies_leave_in_order_one_for_each_poll() -> None:
+    bench = Bench()
+    bench.hear(sent(COMMAND), sent(later(1)), sent(later(2)))
+    answers = bench.hear(*(POLL, HEARD_ACK) * 3)
+    assert answers[::2] == [reply_frame(entry) for entry in (COMMAND, later(1), later(2))]
+
+
+def test_sink_full_command_is_neither_acknowledged_nor_executed_nor_remembered() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, queue_size=2))
+    commands = [sent(later(number)) for number in range(3)]
+    assert bench.hear(*commands) == [ACK, ACK, b'']
+    assert len(bench.served) == 2
+    assert bench.hear(POLL, HEARD_ACK, commands[2]) == [reply_frame(COMMAND), b'', ACK]
+    assert bench.served[2] == later(2)
+    assert bench.slave.counters.duplicate_messages == 0
+
+
+def test_duplicate_is_acknowledged_by_a_full_sink_too() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
+    assert bench.hear(sent(COMMAND), sent(COMMAND)) == [ACK, ACK]
+    assert len(bench.served) == 1
+
+
+def test_nak_resets_the_slave() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND), sent(later(1)), POLL, HEARD_NAK, POLL)[3:] == [b'', EOT]
+    assert bench.slave.counters.naks_received == 1
+
+
+def test_command_is_still_known_as_duplicate_after_a_nak() -> None:
+    bench = Bench()
+    bench.hear(sent(COMMAND), HEARD_NAK, sent(COMMAND))
+    assert bench.served == [COMMAND]
+
+
+def test_broadcast_is_executed_but_neither_acknowledged_nor_answered() -> None:
+    bench = Bench()
+    command = replace(COMMAND, dst=BROADCAST)
+    assert bench.hear(sent(command, BROADCAST), sent(command, BROADCAST), POLL) == [
+        b'', b'', EOT]
+    assert bench.served == [command]
+    assert bench.slave.counters.acks_sent == 0
+
+
+def test_slave_never_sends_nak() -> None:
+    bench = Bench()
+    for fault in Fault:
+        bench.hear(sent(COMMAND, fault=fault))
+    assert bench.slave.counters.naks_sent == 0
+
+
+def test_reply_from_the_master_is_acknowledged_and_not_executed() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND.reply()), POLL) == [ACK, EOT]
+    assert bench.served == []
+    assert bench.slave.counters.replies_received == 1
+    assert bench.slave.counters.commands_received == 0
+
+
+def test_reply_with_an_error_is_counted_once() -> None:
+    bench = Bench(sts=0x10)
+    assert bench.hear(sent(COMMAND), POLL, POLL)[1:] == [reply_frame(COMMAND, 0x10)] * 2
+    assert bench.slave.counters.error_messages_sent == 1
+
+
+def test_check_of_the_reply_is_that_of_the_line() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, Checksum.BCC))
+    assert bench.hear(sent(COMMAND), POLL)[1] == reply_frame(COMMAND, 0, Checksum.BCC)
+
+
+class Line:
+    """A machine of several slaves; ``say`` returns what they answer."""
+
+    def __init__(self, *slaves: HalfDuplexSlave) -> None:
+        self.machine = Machine(multidrop(slaves), checksum=Checksum.CRC)
+        self.machine.start(0.0)
+
+    def say(self, data: bytes) -> bytes:
+        """Put the master's bytes on the line."""
+        self.machine.receive_data(data, 1.0)
+        return self.machine.data_to_send()
+
+
+def echo(data: bytes) -> Callable[[Packet], Packet]:
+    """Return a server that always replies ``data``."""
+    return lambda command: command.reply(data)
+
+
+def test_multidrop_only_the_addressed_station_answers() -> None:
+    line = Line(*(HalfDuplexSlave(SlaveSettings(number), echo(bytes((number,))))
+                  for number in (1, 7, 8)))
+    assert line.say(master_frame(7, COMMAND.encode(), Checksum.CRC)) == ACK
+    assert line.say(poll_frame(8)) == EOT
+    assert line.say(poll_frame(7)) == message_frame(
+        COMMAND.reply(b'\x07').encode(), Checksum.CRC)
+    assert line.say(poll_frame(9)) == b''
+    assert line.machine.deadline is None
+
+
+def test_multidrop_ack_goes_to_the_station_that_spoke() -> None:
+    slaves = [HalfDuplexSlave(SlaveSettings(number), echo(b'')) for number in (7, 8)]
+    line = Line(*slaves)
+    for number in (7, 8):
+        command = replace(COMMAND, dst=number)
+        assert line.say(master_frame(number, command.encode(), Checksum.CRC)) == ACK
+    assert line.say(poll_frame(7)) == reply_frame(COMMAND)
+    assert line.say(poll_frame(8)) == reply_frame(replace(COMMAND, dst=8))
+    assert line.say(ACK) == b''
+    assert [slave.counters.acks_received for slave in slaves] == [0, 1]
+    assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (reply_frame(COMMAND), EOT)
+
+
+def test_multidrop_broadcast_reaches_every_station() -> None:
+    benches = [Bench(settings=SlaveSettings(number)) for number in (7, 8)]
+    line = Line(*(bench.slave for bench in benches))
+    command = replace(COMMAND, dst=BROADCAST)
+    assert line.say(master_frame(BROADCAST, command.encode(), Checksum.CRC)) == b''
+    assert [bench.served for bench in benches] == [[command], [command]]
+
+
+def test_multidrop_nak_resets_every_station() -> None:
+    benches = [Bench(settings=SlaveSettings(number)) for number in (7, 8)]
+    line = Line(*(bench.slave for bench in benches))
+    for number in (7, 8):
+        line.say(master_frame(number, COMMAND.encode(), Checksum.CRC))
+    assert line.say(NAK) == b''
+    assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (EOT, EOT)

@@ -1,0 +1,98 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The Active Station List."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList, Station
+import pytest
+
+REPLY = Packet(dst=5, src=7, cmd=0x4F, sts=0, tns=0x0102)
+
+
+def test_every_station_counts_as_active_at_start() -> None:
+    stations = ActiveStationList([9, 3, 3])
+    assert [(station.number, station.active) for station in stations] == [(3, True), (9, True)]
+
+
+def test_station_is_taken_into_the_list_at_its_first_use() -> None:
+    stations = ActiveStationList([9])
+    station = stations[3]
+    assert station.active and stations[3] is station
+    assert [entry.number for entry in stations] == [3, 9]
+
+
+def test_changes_are_told_once() -> None:
+    told: list[tuple[int, bool]] = []
+    stations = ActiveStationList([7], lambda station: told.append(
+        (station.number, station.active)))
+    stations.heard(7, 1.0)
+    assert told == []
+    stations.lost(7, 2.0)
+    stations.lost(7, 3.0)
+    assert told == [(7, False)]
+    stations.heard(7, 4.0)
+    stations.heard(7, 5.0)
+    assert told == [(7, False), (7, True)]
+
+
+def test_silence_counts_from_the_loss_until_the_next_answer() -> None:
+    stations = ActiveStationList([7])
+    assert (stations[7].last_heard, stations[7].silent_since) == (None, None)
+    stations.heard(7, 1.0)
+    stations.lost(7, 2.0)
+    stations.lost(7, 3.0)
+    assert (stations[7].last_heard, stations[7].silent_since) == (1.0, 2.0)
+    stations.heard(7, 4.0)
+    assert (stations[7].last_heard, stations[7].silent_since) == (4.0, None)
+
+
+@pytest.mark.parametrize(('number', 'word', 'bit'), [
+    (0, 0, 0), (15, 0, 15), (16, 1, 0), (17, 1, 1), (254, 15, 14)])
+def test_active_node_table_has_a_bit_for_each_station(number: int, word: int, bit: int) -> None:
+    stations = ActiveStationList([number])
+    table = [0] * 16
+    assert stations.words() == table[:word] + [1 << bit] + table[word + 1:]
+    stations.lost(number, 0.0)
+    assert stations.words() == table
+
+
+def test_active_node_table_shows_all_active_stations() -> None:
+    stations = ActiveStationList([1, 2, 3, 40])
+    stations.lost(2, 0.0)
+    assert stations.words()[:3] == [0b1010, 0, 1 << 8]
+
+
+def test_repeated_message_is_not_accepted() -> None:
+    station = Station(7)
+    assert station.accepts(REPLY)
+    assert not station.accepts(REPLY)
+    assert not station.accepts(Packet(6, 7, 0x4F, 0x10, 0x0102, b'other'))
+
+
+@pytest.mark.parametrize('other', [
+    Packet(5, 7, 0x4F, 0, 0x0103), Packet(5, 8, 0x4F, 0, 0x0102), Packet(5, 7, 0x41, 0, 0x0102)])
+def test_only_the_last_message_counts_as_repeated(other: Packet) -> None:
+    station = Station(7)
+    assert station.accepts(REPLY)
+    assert station.accepts(other)
+    assert station.accepts(REPLY)
+
+
+def test_each_station_has_its_own_record() -> None:
+    stations = ActiveStationList([7, 8])
+    assert stations[7].accepts(REPLY)
+    assert stations[8].accepts(REPLY)

@@ -1,0 +1,226 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Addresses: the grammar, both families' ranges, and where words lie."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+
+PLC5, SLC = PlcType.PLC5, PlcType.SLC
+BOTH = (PLC5, SLC)
+FAMILIES = st.sampled_from(BOTH)
+
+
+@pytest.mark.parametrize('family', BOTH)
+@pytest.mark.parametrize(('text', 'kind', 'file', 'element', 'word', 'bit'), [
+    ('N7:0', 'N', 7, 0, 0, None), ('N:12', 'N', 7, 12, 0, None), ('N9;5', 'N', 9, 5, 0, None),
+    ('n7:30/3', 'N', 7, 30, 0, 3), (' N7:1 ', 'N', 7, 1, 0, None), ('#N7:0', 'N', 7, 0, 0, None),
+    ('$N10:255', 'N', 10, 255, 0, None), ('B3:1/5', 'B', 3, 1, 0, 5), ('B3/17', 'B', 3, 1, 0, 1),
+    ('B/0', 'B', 3, 0, 0, 0), ('B10/4095', 'B', 10, 255, 0, 15), ('S:1/15', 'S', 2, 1, 0, 15),
+    ('S2:4', 'S', 2, 4, 0, None), ('F8:9', 'F', 8, 9, 0, None), ('ST9:0', 'ST', 9, 0, 0, None),
+    ('T4:0', 'T', 4, 0, 0, None), ('T4:0.ACC', 'T', 4, 0, 2, None),
+    ('T4:0.PRE', 'T', 4, 0, 1, None), ('T4:0.DN', 'T', 4, 0, 0, 13),
+    ('T4:0/DN', 'T', 4, 0, 0, 13), ('T4:0/EN', 'T', 4, 0, 0, 15), ('T4:0.2', 'T', 4, 0, 2, None),
+    ('T4:0.1/3', 'T', 4, 0, 1, 3), ('T4:0.0/DN', 'T', 4, 0, 0, 13), ('t:3/tt', 'T', 4, 3, 0, 14),
+    ('T4:0.ACC/7', 'T', 4, 0, 2, 7), ('C5:2.PRE', 'C', 5, 2, 1, None),
+    ('C5:2/CU', 'C', 5, 2, 0, 15), ('R6:0.LEN', 'R', 6, 0, 1, None),
+    ('R6:0/FD', 'R', 6, 0, 0, 8), ('A12:3', 'A', 12, 3, 0, None), ('D13:3/15', 'D', 13, 3, 0, 15),
+])
+def test_parse(family: PlcType, text: str, kind: str, file: int, element: int, word: int,
+               bit: int | None) -> None:
+    assert Address.parse(text, family) == Address(
+        family, FileType(kind), file, element, word, bit)
+
+
+@pytest.mark.parametrize(('text', 'file', 'element', 'bit'), [
+    ('I:017/12', 1, 0o17, 0o12), ('O:0', 0, 0, None), ('I:277/17', 1, 0o277, 15),
+    ('O0:012', 0, 0o12, None), ('I1:007/07', 1, 7, 7)])
+def test_plc5_io_is_octal(text: str, file: int, element: int, bit: int | None) -> None:
+    address = Address.parse(text, PLC5)
+    assert (address.file, address.element, address.word, address.bit) == (file, element, 0, bit)
+
+
+@pytest.mark.parametrize(('text', 'file', 'slot', 'word', 'bit'), [
+    ('I:1.0/3', 1, 1, 0, 3), ('I:1/3', 1, 1, 0, 3), ('O:30.255/15', 0, 30, 255, 15),
+    ('I1:8.2', 1, 8, 2, None), ('O:2', 0, 2, 0, None)])
+def test_slc_io_is_slot_word_bit(text: str, file: int, slot: int, word: int,
+                                 bit: int | None) -> None:
+    address = Address.parse(text, SLC)
+    assert (address.file, address.element, address.word, address.bit) == (file, slot, word, bit)
+    assert address.area == Area(SLC, address.file_type, file, slot)
+    assert address.offset == word
+
+
+def test_long_files_are_of_the_slc_family_only() -> None:
+    assert Address.parse('L10:3', SLC).file_type is FileType.LONG
+    with pytest.raises(AddressSyntaxError, match='has no L files'):
+        Address.parse('L10:3', PLC5)
+
+
+@pytest.mark.parametrize('family', BOTH)
+@pytest.mark.parametrize('text', [
+    '', ' ', 'N', 'N7', 'N7:', ':0', '7:0', 'X7:0', 'NN7:0', 'N7:0:1', 'N7:0/', 'N7:0.', 'N7:-1',
+    'N7:0 /1', 'N7:0.1', 'N7:0.ACC', 'N7:0/DN', 'N7/3', 'T4/3', 'B3/DN', 'F8:0/1', 'L:0', 'ST:0',
+    'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN', 'T4:0.LEN',
+    'R6:0.ACC', 'N7:123456', 'N1234:0', 'ST9:0.1', 'PD9:0', '%N7:0', 'N7:0\n1', '##N7:0',
+])
+def test_what_is_no_address(family: PlcType, text: str) -> None:
+    with pytest.raises(AddressSyntaxError):
+        Address.parse(text, family)
+
+
+@pytest.mark.parametrize('text', [
+    'T4:0.2/DN', 'T4:0.1/PRE', 'T4:0.2/PRE', 'C5:0.1/CU', 'R6:0.2/EN', 'T4:0.PRE/ACC'])
+def test_named_member_belongs_to_no_other_word(text: str) -> None:
+    with pytest.raises(AddressSyntaxError):
+        Address.parse(text, PLC5)
+
+
+@pytest.mark.parametrize('text', ['I:8', 'I:019', 'I:017/8', 'O:0/9'])
+def test_plc5_io_takes_octal_digits_only(text: str) -> None:
+    with pytest.raises(AddressSyntaxError, match='octal'):
+        Address.parse(text, PLC5)
+
+
+@pytest.mark.parametrize('text', ['N7:\u0663', 'I:\u0668', 'I:1/\u0668', 'N\u0667:0'])
+@pytest.mark.parametrize('family', BOTH)
+def test_digits_are_ascii(text: str, family: PlcType) -> None:
+    with pytest.raises(AddressSyntaxError):
+        Address.parse(text, family)
+
+
+@pytest.mark.parametrize('text', [
+    'N7:0/16', 'B3:0/16', 'N2:0', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255', 'ST9:99999'])
+@pytest.mark.parametrize('family', BOTH)
+def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
+    with pytest.raises(AddressRangeError):
+        Address.parse(text, family)
+
+
+@pytest.mark.parametrize(('family', 'last', 'beyond'), [
+    (PLC5, 'N999:999', 'N999:1000'), (SLC, 'N255:255', 'N255:256'),
+    (SLC, 'N255:0', 'N256:0'), (PLC5, 'S:127', 'S:128'), (PLC5, 'ST9:779', 'ST9:780'),
+    (PLC5, 'I:277', 'I:300'), (PLC5, 'I:277/17', 'I:277/20'), (SLC, 'I:30', 'I:31'),
+    (SLC, 'I:0.255', 'I:0.256'), (PLC5, 'B3/15999', 'B3/16000'), (SLC, 'B3/4095', 'B3/4096'),
+    (SLC, 'I1:0', 'I2:0'), (PLC5, 'O0:0', 'O1:0'), (PLC5, 'N3:0', 'N2:0'),
+    (SLC, 'T255:255.ACC', 'T256:0.ACC')])
+def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
+    Address.parse(last, family)
+    with pytest.raises(AddressRangeError):
+        Address.parse(beyond, family)
+
+
+def test_errors_are_format_errors() -> None:
+    assert issubclass(AddressSyntaxError, FormatError)
+    assert issubclass(AddressRangeError, FormatError)
+    assert not issubclass(AddressRangeError, AddressSyntaxError)
+
+
+@pytest.mark.parametrize(('text', 'family', 'shown'), [
+    ('b/17', SLC, 'B3:1/1'), ('i:17/2', PLC5, 'I:017/02'), ('o:3', SLC, 'O:3.0'),
+    ('I:3/3', SLC, 'I:3.0/3'), ('T4:1.2', SLC, 'T4:1.ACC'), ('T4:1/13', SLC, 'T4:1/DN'),
+    ('T4:1/2', SLC, 'T4:1/2'), ('T4:1.con', SLC, 'T4:1'), ('T4:1.1/3', SLC, 'T4:1.1/3'),
+    ('#N7;3', PLC5, 'N7:3'), ('S:1', PLC5, 'S2:1')])
+def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
+    assert str(Address.parse(text, family)) == shown
+
+
+texts = st.builds(
+    '{}{}{}{}{}{}{}'.format,
+    st.sampled_from(['', '', '#']),
+    st.sampled_from(['N', 'B', 'T', 'C', 'R', 'S', 'I', 'O', 'F', 'ST', 'A', 'D', 'L', 'X']),
+    st.sampled_from(['', '', '0', '1', '2', '3', '7', '9', '255', '300']),
+    st.sampled_from([':', ':', ';', '/']),
+    st.integers(0, 300),
+    st.sampled_from(['', '', '.0', '.1', '.2', '.9', '.ACC', '.PRE', '.LEN', '.CON', '.DN']),
+    st.sampled_from(['', '', '/0', '/07', '/15', '/17', '/DN', '/EN', '/FD', '/ACC']))
+
+
+@PROPERTY
+@given(texts, FAMILIES)
+def test_parse_and_str_are_inverse(text: str, family: PlcType) -> None:
+    try:
+        address = Address.parse(text, family)
+    except FormatError:
+        return
+    assert Address.parse(str(address), family) == address
+    assert Address.parse(str(address).lower(), family) == address
+
+
+@PROPERTY
+@given(FAMILIES, st.sampled_from(FileType), st.integers(3, 255), st.integers(0, 127),
+       st.one_of(st.none(), st.integers(0, 15)), st.integers(0, 2))
+def test_every_address_is_read_back(family: PlcType, kind: FileType, file: int, element: int,
+                                    bit: int | None, word: int) -> None:
+    if family is PLC5 and kind is FileType.LONG:
+        return
+    if kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS):
+        file = kind.layout.default_file or 0
+    slot = kind.is_io and family is SLC
+    address = Address(
+        family, kind, file, element % 31 if slot else element,
+        word if kind.is_structure or slot else 0, bit if kind.has_bits else None)
+    assert Address.parse(str(address), family) == address
+
+
+@PROPERTY
+@given(st.one_of(st.text(max_size=20), st.text('NBTSIO0123456789:;./#$ACDN \u0663', max_size=14)),
+       FAMILIES)
+def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) -> None:
+    try:
+        address = Address.parse(text, family)
+    except FormatError as error:
+        assert str(error)
+    else:
+        assert address.offset < address.area_size
+
+
+@PROPERTY
+@given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS']), FAMILIES,
+       st.integers(0, 255))
+def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: int) -> None:
+    address = Address.parse(text, family)
+    assert address.at_offset(address.offset) == address
+    moved = address.at_offset(offset)
+    assert moved.offset == offset
+    assert moved.area == address.area
+
+
+@pytest.mark.parametrize(('text', 'family', 'offset', 'size'), [
+    ('N7:5', SLC, 5, 256), ('N7:5', PLC5, 5, 1000), ('T4:2.ACC', SLC, 8, 768),
+    ('F8:3', PLC5, 6, 2000), ('ST9:1', SLC, 42, 256 * 42), ('I:3.2', SLC, 2, 256),
+    ('I:012', PLC5, 10, 192), ('S:1', PLC5, 1, 128), ('L9:2', SLC, 4, 512)])
+def test_offset_counts_words(text: str, family: PlcType, offset: int, size: int) -> None:
+    address = Address.parse(text, family)
+    assert (address.offset, address.area_size) == (offset, size)
+
+
+def test_at_offset_names_a_word_and_no_bit() -> None:
+    assert Address.parse('B3:0/5', SLC).at_offset(2) == Address.parse('B3:2', SLC)
+    assert Address.parse('T4:0/DN', SLC).at_offset(4) == Address.parse('T4:1.PRE', SLC)
+    assert Address.parse('O:2.0/5', SLC).at_offset(1) == Address.parse('O:2.1', SLC)
+
+
+def test_area_is_a_file_or_a_slot() -> None:
+    assert Address.parse('N7:1', SLC).area == Address.parse('N7:99/3', SLC).area
+    assert Address.parse('I:1.0', SLC).area != Address.parse('I:2.0', SLC).area
+    assert Address.parse('I:001', PLC5).area == Address.parse('I:002', PLC5).area
+    assert Address.parse('N7:0', SLC).area != Address.parse('N7:0', PLC5).area

@@ -1,0 +1,137 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The data table of an emulated PLC."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.file_types import FileType, PlcType
+import pytest
+
+SLC, PLC5 = PlcType.SLC, PlcType.PLC5
+
+
+def at(text: str, family: PlcType = SLC) -> Address:
+    """Return an address."""
+    return Address.parse(text, family)
+
+
+def table(*files: tuple[str, int], family: PlcType = SLC) -> DataTable:
+    """Return a table with these files, each of so many words."""
+    result = DataTable(family)
+    for text, words in files:
+        result.create(at(text, family), words)
+    return result
+
+
+def test_new_file_is_zero() -> None:
+    assert table(('N7:0', 3)).read(at('N7:0'), 3) == bytes(6)
+
+
+def test_words_are_written_and_read_low_byte_first() -> None:
+    words = table(('N7:0', 10))
+    words.write(at('N7:3'), b'\x34\x12\x78\x56')
+    assert words.read(at('N7:4'), 1) == b'\x78\x56'
+    assert words.read(at('N7:2'), 4) == bytes.fromhex('00 00 34 12 78 56 00 00')
+
+
+def test_create_makes_a_file_longer_and_keeps_its_words() -> None:
+    words = table(('N7:0', 2))
+    words.write(at('N7:1'), b'\x01\x02')
+    words.create(at('N7:4'), 2)
+    words.create(at('N7:0'), 1)
+    assert words.read(at('N7:0'), 6) == b'\x00\x00\x01\x02' + bytes(8)
+    with pytest.raises(OutOfRange):
+        words.read(at('N7:6'), 1)
+
+
+@pytest.mark.parametrize(('text', 'words', 'length'), [
+    ('T4:0.ACC', 1, 3), ('T4:1.PRE', 1, 6), ('F8:0', 1, 2), ('ST9:0', 1, 42), ('N7:0', 1, 1)])
+def test_file_has_whole_elements(text: str, words: int, length: int) -> None:
+    created = table((text, words))
+    start = at(text).at_offset(0)
+    assert len(created.read(start, length)) == 2 * length
+    with pytest.raises(OutOfRange):
+        created.read(start, length + 1)
+
+
+def test_slots_are_files_of_their_own() -> None:
+    words = table(('I:1.0', 2), ('I:2.0', 1))
+    words.write(at('I:1.1'), b'\xFF\xFF')
+    assert words.read(at('I:2.0'), 1) == b'\x00\x00'
+    with pytest.raises(OutOfRange):
+        words.read(at('I:2.1'), 1)
+    with pytest.raises(NoSuchFile):
+        words.read(at('I:3.0'), 1)
+    assert [(area.file, area.slot) for area in words] == [(1, 1), (1, 2)]
+
+
+def test_members_are_words_of_their_element() -> None:
+    words = table(('T4:0', 6))
+    words.write(at('T4:1.PRE'), b'\x07\x00')
+    assert words.read(at('T4:1'), 3) == bytes.fromhex('00 00 07 00 00 00')
+    assert words.read(at('T4:0'), 3) == bytes(6)
+
+
+@pytest.mark.parametrize('act', [
+    lambda words, place: words.read(place, 1),
+    lambda words, place: words.write(place, b'\x01\x00'),
+    lambda words, place: words.write_bits(place, 1, 1)])
+@pytest.mark.parametrize(('text', 'error'), [
+    ('N7:3', OutOfRange), ('N9:0', NoSuchFile), ('B7:0', NoSuchFile)])
+def test_bad_place_changes_nothing(act: Callable[[DataTable, Address], object], text: str,
+                                   error: type[Exception]) -> None:
+    words = table(('N7:0', 3))
+    with pytest.raises(error):
+        act(words, at(text))
+    assert words.read(at('N7:0'), 3) == bytes(6)
+    assert len(list(words)) == 1
+
+
+def test_write_across_the_end_changes_nothing() -> None:
+    words = table(('N7:0', 3))
+    with pytest.raises(OutOfRange):
+        words.write(at('N7:2'), b'\x01\x00\x02\x00')
+    assert words.read(at('N7:0'), 3) == bytes(6)
+
+
+@pytest.mark.parametrize(('old', 'mask', 'bits', 'new'), [
+    (0x0008, 0x0108, 0x0100, 0x0100), (0xFFFF, 0x0001, 0x0000, 0xFFFE),
+    (0x0000, 0x0001, 0xFFFF, 0x0001), (0x1234, 0xFFFF, 0x4321, 0x4321),
+    (0x1234, 0x0000, 0xFFFF, 0x1234), (0x8000, 0x7FFF, 0x0000, 0x8000)])
+def test_write_bits_changes_the_bits_of_the_mask_only(old: int, mask: int, bits: int,
+                                                      new: int) -> None:
+    words = table(('B3:0', 3))
+    words.write(at('B3:1'), old.to_bytes(2, 'little'))
+    words.write_bits(at('B3:1'), mask, bits)
+    assert words.read(at('B3:0'), 3) == b'\x00\x00' + new.to_bytes(2, 'little') + b'\x00\x00'
+
+
+def test_file_number_has_one_type() -> None:
+    words = table(('N7:0', 1))
+    assert words.file_type(7) is FileType.INTEGER
+    with pytest.raises(NoSuchFile, match='type N'):
+        words.create(at('B7:0'), 1)
+    with pytest.raises(NoSuchFile):
+        words.file_type(8)
+
+
+def test_plc5_io_image_is_one_file() -> None:
+    words = table(('I:000', 16), family=PLC5)
+    words.write(at('I:017', PLC5), b'\x01\x00')
+    assert words.read(at('I:016', PLC5), 2) == b'\x00\x00\x01\x00'

@@ -1,0 +1,165 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The PLC-5 commands, byte for byte."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.plc5 import BitSet, ReadModifyWrite, SystemAddress, TypedRead, TypedWrite
+from abdf1_ros.pccc.typed_data import TypedData
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+from support.vectors import commands, Vector
+
+COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {0x68: TypedRead, 0x67: TypedWrite, 0x26: ReadModifyWrite}
+
+levels = st.integers(0, 0xFFFF)
+addresses = st.builds(SystemAddress, levels, levels, st.one_of(st.none(), levels))
+words = st.integers(0, 0xFFFF)
+values = st.builds(lambda type_id, size, count: TypedData(type_id, size, bytes(size * count)),
+                   st.integers(1, 8), st.integers(1, 90), st.integers(0, 4))
+
+
+def parameters(data: str | bytes) -> Reader:
+    """Return a reader of hexadecimal bytes."""
+    return Reader(bytes.fromhex(data) if isinstance(data, str) else data)
+
+
+@pytest.mark.parametrize(('address', 'encoded'), [
+    (SystemAddress(7, 30), '07 00 07 1E'), (SystemAddress(3, 300), '07 00 03 FF 2C 01'),
+    (SystemAddress(4, 2, 2), '0F 00 04 02 02'), (SystemAddress(12, 10, 2), '0F 00 0C 0A 02'),
+    (SystemAddress(1, 10), '07 00 01 0A'), (SystemAddress(4, 2, 0), '0F 00 04 02 00'),
+    (SystemAddress(999, 255), '07 00 FF E7 03 FF FF 00')])
+def test_address_in_logical_binary(address: SystemAddress, encoded: str) -> None:
+    assert address.encode() == bytes.fromhex(encoded)
+    assert SystemAddress.read(parameters(encoded)) == address
+
+
+@pytest.mark.parametrize(('encoded', 'address'), [
+    ('06 07 1E', SystemAddress(7, 30)), ('06 03 FF 2C 01', SystemAddress(3, 300)),
+    ('0E 04 02 02', SystemAddress(4, 2, 2)), ('02 07', SystemAddress(7, 0)),
+    ('07 FF 00 00 FF 07 00 FF 1E 00', SystemAddress(7, 30)),
+    ('00 24 4E 31 30 3A 33 36 30 00', SystemAddress(10, 360)),
+    ('00 24 54 34 3A 32 2E 41 43 43 00', SystemAddress(4, 2, 2)),
+    ('00 24 49 3A 30 31 37 00', SystemAddress(1, 0o17))])
+def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
+    reader = parameters(encoded)
+    assert SystemAddress.read(reader) == address
+    assert reader.is_empty
+
+
+@pytest.mark.parametrize('encoded', [
+    '', '07', '07 00', '07 00 07', '07 00 07 FF 2C', '17 00 07 00', '80 07', '07 01 07 00',
+    '00', '00 25 4E 00', '00 24 4E 37 3A 30', '00 24 00', '00 24 58 37 3A 30 00',
+    '00 24 4E 37 3A 30 2F 31 00', '00 24 FF 37 3A 30 00'])
+def test_what_is_no_address(encoded: str) -> None:
+    with pytest.raises(FormatError):
+        SystemAddress.read(parameters(encoded))
+
+
+def test_typed_read_of_the_manual() -> None:
+    read = TypedRead(SystemAddress(7, 0), 40, 110, 150)
+    encoded = '68 6E 00 96 00 07 00 07 00 28 00'
+    assert read.encode() == bytes.fromhex(encoded)
+    assert TypedRead.read(parameters(encoded[3:])) == read
+
+
+def test_typed_write_of_one_integer() -> None:
+    write = TypedWrite(SystemAddress(7, 10), TypedData(4, 2, b'\x10\x10'), 0, 1)
+    encoded = '67 00 00 01 00 07 00 07 0A 93 09 42 10 10'
+    assert write.encode() == bytes.fromhex(encoded)
+    assert TypedWrite.read(parameters(encoded[3:])) == write
+
+
+def test_read_modify_write_of_two_words() -> None:
+    change = ReadModifyWrite((BitSet(SystemAddress(3, 4), 0xFFF7, 0x0100),
+                              BitSet(SystemAddress(4, 2, 0), 0xFFFF, 1)))
+    encoded = '26 07 00 03 04 F7 FF 00 01 0F 00 04 02 00 FF FF 01 00'
+    assert change.encode() == bytes.fromhex(encoded)
+    assert ReadModifyWrite.read(parameters(encoded[3:])) == change
+
+
+def test_read_modify_write_takes_243_bytes() -> None:
+    short, long = BitSet(SystemAddress(7, 0), 0, 0), BitSet(SystemAddress(300, 0, 0), 0, 0)
+    fits = (*[short] * 29, long)
+    assert len(ReadModifyWrite(fits).encode()) == 1 + 29 * 8 + 11
+    with pytest.raises(FormatError, match='243'):
+        ReadModifyWrite((*[short] * 28, long, long)).encode()
+
+
+@pytest.mark.parametrize('entry', commands(*COMMANDS), ids=lambda entry: entry.name)
+def test_command_of_every_vector(entry: Vector) -> None:
+    data = entry.packet.data
+    reader = Reader(data[1:])
+    command = COMMANDS[data[0]].read(reader)
+    assert reader.is_empty
+    again = command.encode()
+    if b'\x00$' in data:  # logical ASCII is read, and written as logical binary
+        assert again[:5] == data[:5]
+        assert COMMANDS[data[0]].read(Reader(again[1:])) == command
+    else:
+        assert again == data
+
+
+def test_vectors_have_every_command() -> None:
+    assert {entry.fnc for entry in commands(*COMMANDS)} == set(COMMANDS)
+
+
+@PROPERTY
+@given(addresses, words, words, words)
+def test_typed_read_is_read_back(address: SystemAddress, size: int, offset: int,
+                                 total: int) -> None:
+    command = TypedRead(address, size, offset, total)
+    assert TypedRead.read(Reader(command.encode()[1:])) == command
+
+
+@PROPERTY
+@given(addresses, values, words, words)
+def test_typed_write_is_read_back(address: SystemAddress, data: TypedData, offset: int,
+                                  total: int) -> None:
+    command = TypedWrite(address, data, offset, total)
+    assert TypedWrite.read(Reader(command.encode()[1:])) == command
+
+
+@PROPERTY
+@given(st.lists(st.builds(BitSet, addresses, words, words), min_size=1, max_size=10))
+def test_read_modify_write_is_read_back(sets: list[BitSet]) -> None:
+    command = ReadModifyWrite(tuple(sets))
+    assert ReadModifyWrite.read(Reader(command.encode()[1:])) == command
+
+
+@PROPERTY
+@given(st.sampled_from(sorted(COMMANDS)), st.binary(max_size=30))
+def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
+    reader = Reader(data)
+    try:
+        command = COMMANDS[fnc].read(reader)
+    except FormatError:
+        return
+    assert reader.is_empty
+    assert COMMANDS[fnc].read(Reader(command.encode()[1:])) == command
+
+
+def test_bytes_behind_a_typed_read_are_a_format_error() -> None:
+    with pytest.raises(FormatError, match='too many'):
+        TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 00'))
+
+
+def test_read_modify_write_of_nothing_is_a_format_error() -> None:
+    with pytest.raises(FormatError):
+        ReadModifyWrite.read(Reader(b''))

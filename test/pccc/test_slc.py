@@ -1,0 +1,102 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The SLC commands, byte for byte."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.slc import (
+    LogicalAddress,
+    LogicalRead,
+    LogicalWrite,
+    MaskedWrite,
+    MAX_READ,
+    MAX_WRITE,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+from support.vectors import commands, Vector
+
+COMMANDS: dict[int, type[LogicalRead | LogicalWrite | MaskedWrite]] = {0xA2: LogicalRead, 0xAA: LogicalWrite, 0xAB: MaskedWrite}
+
+levels = st.integers(0, 0xFFFF)
+addresses = st.builds(LogicalAddress, levels, st.integers(0, 255), levels, levels)
+
+
+@pytest.mark.parametrize(('command', 'encoded'), [
+    (LogicalRead(LogicalAddress(7, 0x89, 0, 0), 20), 'A2 14 07 89 00 00'),
+    (LogicalRead(LogicalAddress(10, 0x89, 300, 0), 2), 'A2 02 0A 89 FF 2C 01 00'),
+    (LogicalRead(LogicalAddress(255, 0x89, 254, 255), 255), 'A2 FF FF FF 00 89 FE FF FF 00'),
+    (LogicalWrite(LogicalAddress(4, 0x86, 0, 1), b'\x2C\x01'), 'AA 02 04 86 00 01 2C 01'),
+    (MaskedWrite(LogicalAddress(3, 0x85, 4, 0), 0x0108, b'\x00\x01'),
+     'AB 02 03 85 04 00 08 01 00 01'),
+])
+def test_encode_and_read(command: LogicalRead | LogicalWrite | MaskedWrite, encoded: str) -> None:
+    data = bytes.fromhex(encoded)
+    assert command.encode() == data
+    reader = Reader(data[1:])
+    assert COMMANDS[data[0]].read(reader) == command
+    assert reader.is_empty
+
+
+@pytest.mark.parametrize('entry', commands(*COMMANDS), ids=lambda entry: entry.name)
+def test_command_of_every_vector(entry: Vector) -> None:
+    data = entry.packet.data
+    reader = Reader(data[1:])
+    command = COMMANDS[data[0]].read(reader)
+    assert reader.is_empty
+    assert command.encode() == data
+
+
+def test_vectors_have_every_command() -> None:
+    assert {entry.fnc for entry in commands(*COMMANDS)} == set(COMMANDS)
+
+
+@PROPERTY
+@given(addresses, st.integers(0, 255), st.integers(0, 0xFFFF), st.binary(max_size=255))
+def test_commands_are_read_back(address: LogicalAddress, size: int, mask: int,
+                                data: bytes) -> None:
+    for command in (LogicalRead(address, size), LogicalWrite(address, data),
+                    MaskedWrite(address, mask, data)):
+        assert type(command).read(Reader(command.encode()[1:])) == command
+
+
+@PROPERTY
+@given(st.sampled_from(sorted(COMMANDS)), st.binary(max_size=20))
+def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
+    reader = Reader(data)
+    try:
+        command = COMMANDS[fnc].read(reader)
+    except FormatError:
+        return
+    assert reader.is_empty
+    assert COMMANDS[fnc].read(Reader(command.encode()[1:])) == command
+
+
+@pytest.mark.parametrize(('fnc', 'encoded'), [
+    (0xA2, ''), (0xA2, '02 07 89 00'), (0xA2, '02 07 89 00 00 00'), (0xA2, '02 07 89 FF 2C'),
+    (0xAA, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01'), (0xAA, '02 07 89 00 00 01 02 03'),
+    (0xAB, '02 07 89 00 00 08 00 08'), (0xAB, '04 07 89 00 00 08 00 08 00'),
+    (0xAB, '02 07 89 00 00 08')])
+def test_sizes_that_do_not_add_up(fnc: int, encoded: str) -> None:
+    with pytest.raises(FormatError):
+        COMMANDS[fnc].read(Reader(bytes.fromhex(encoded)))
+
+
+def test_limits_of_the_manual() -> None:
+    assert (MAX_READ, MAX_WRITE) == (236, 234)

@@ -1,0 +1,86 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""STS and EXT STS in words."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.status import check_status, is_address_fault, status_text
+import pytest
+from support.vectors import pair
+
+
+def reply(sts: int, data: bytes = b'') -> Packet:
+    """Return a reply with this status."""
+    return Packet(0, 1, 0x4F, sts, 1, data)
+
+
+def failure(sts: int, data: bytes = b'') -> RemoteError:
+    """Return the error that a reply with this status is."""
+    with pytest.raises(RemoteError) as caught:
+        check_status(reply(sts, data))
+    return caught.value
+
+
+def test_success_returns_the_data() -> None:
+    assert check_status(reply(0, b'data')) == b'data'
+
+
+@pytest.mark.parametrize(('sts', 'data', 'ext_sts', 'text'), [
+    (0x10, b'', None, 'STS 10: illegal command, format or length'),
+    (0x50, b'\x01', None, 'STS 50: address not there, or memory protected'),
+    (0x05, b'', None, 'STS 05: no reply in time (application timeout)'),
+    (0x15, b'', None, 'STS 15: illegal command, format or length; '
+                      'no reply in time (application timeout)'),
+    (0xF0, b'\x17', 0x17, 'STS F0 EXT STS 17: type mismatch'),
+    (0xF0, b'\x06\x00', 0x06, 'STS F0 EXT STS 06: address does not point to something usable'),
+    (0xF2, b'\x07', 0x07, 'STS F2 EXT STS 07: file has the wrong size'),
+    (0xF0, b'\x00', 0x00, 'STS F0 EXT STS 00: unknown code'),
+    (0xF0, b'\xEE', 0xEE, 'STS F0 EXT STS EE: unknown code'),
+    (0xF0, b'', None, 'STS F0: extended status missing from the reply'),
+    (0xD0, b'', None, 'STS D0: unknown code'),
+    (0x0F, b'', None, 'STS 0F: unknown code'),
+])
+def test_failure_in_words(sts: int, data: bytes, ext_sts: int | None, text: str) -> None:
+    error = failure(sts, data)
+    assert (error.sts, error.ext_sts, str(error)) == (sts, ext_sts, text)
+
+
+@pytest.mark.parametrize('sts', range(1, 256))
+def test_every_other_status_is_a_failure(sts: int) -> None:
+    assert str(failure(sts)) == status_text(sts)
+    assert failure(sts).sts == sts
+
+
+@pytest.mark.parametrize(('name', 'codes'), [
+    ('plc5_typed_write_badtype', (0xF0, 0x17)), ('slc_err_address', (0x50, None)),
+    ('sts_timeout_local', (0x05, None))])
+def test_failures_of_the_vectors(name: str, codes: tuple[int, int | None]) -> None:
+    with pytest.raises(RemoteError) as caught:
+        check_status(pair(name)[1])
+    assert (caught.value.sts, caught.value.ext_sts) == codes
+
+
+@pytest.mark.parametrize(('sts', 'data'), [
+    (0x10, b''), (0x50, b''), *((0xF0, bytes((code,))) for code in (1, 3, 6, 7, 10, 0x13, 0x17))])
+def test_refusal_of_the_address(sts: int, data: bytes) -> None:
+    assert is_address_fault(failure(sts, data))
+
+
+@pytest.mark.parametrize(('sts', 'data'), [
+    (0x05, b''), (0x60, b''), (0x70, b''), (0xF0, b''), (0xF0, b'\x0B'), (0xF0, b'\x1F')])
+def test_refusal_for_another_reason(sts: int, data: bytes) -> None:
+    assert not is_address_fault(failure(sts, data))

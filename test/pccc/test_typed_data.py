@@ -1,0 +1,125 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The type/data parameter of the PLC-5 typed commands."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.typed_data import TypedData
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+from support.vectors import pair, vector, VECTORS
+
+TYPED_READS = sorted({entry.pair for entry in VECTORS
+                      if entry.pair and entry.fnc == 0x68 and '_max' not in entry.pair})
+
+
+@pytest.mark.parametrize(('type_id', 'size', 'data', 'encoded'), [
+    (4, 2, 'D2 04', '93 09 42 D2 04'),
+    (4, 2, '01 00 02 00', '95 09 42 01 00 02 00'),
+    (4, 2, '00 00 FE FF FF 00', '97 09 42 00 00 FE FF FF 00'),
+    (4, 2, '01 00 02 00 03 00 04 00', '99 09 09 42 01 00 02 00 03 00 04 00'),
+    (8, 4, '00 00 2A 42', '96 09 94 08 00 00 2A 42'),
+    (8, 4, '00 00 7A 44 00 00 C0 BF', '99 09 0A 94 08 00 00 7A 44 00 00 C0 BF'),
+    (5, 10, '00 C2 0A 00 09 00 00 00 00 00',
+     '99 09 0C 59 0A 00 C2 0A 00 09 00 00 00 00 00'),
+    (6, 6, '01 02 03 04 05 06', '97 09 66 01 02 03 04 05 06'),
+    (7, 6, '01 02 03 04 05 06', '97 09 76 01 02 03 04 05 06'),
+])
+def test_encode_and_decode(type_id: int, size: int, data: str, encoded: str) -> None:
+    values = TypedData(type_id, size, bytes.fromhex(data))
+    assert values.encode() == bytes.fromhex(encoded)
+    assert TypedData.decode(bytes.fromhex(encoded)) == values
+
+
+def test_long_array_has_a_two_byte_size() -> None:
+    values = TypedData(4, 2, bytes(300))
+    assert values.encode()[:5] == bytes.fromhex('9A 09 2D 01 42')
+    assert TypedData.decode(values.encode()) == values
+    assert values.count == 150
+
+
+@pytest.mark.parametrize('encoded', [
+    '93 09 42 D2 04', '99 09 03 42 D2 04', '9A 09 03 00 42 D2 04', '42 D2 04', '49 02 D2 04',
+    '4A 02 00 D2 04', '94 09 92 04 D2 04', 'B3 09 00 00 42 D2 04',
+    '9B 09 03 00 00 42 D2 04'])
+def test_every_legal_form_of_one_integer(encoded: str) -> None:
+    assert TypedData.decode(bytes.fromhex(encoded)) == TypedData(4, 2, b'\xD2\x04')
+
+
+def test_example_of_the_manual_with_a_padded_size() -> None:
+    data = bytes(range(20))
+    assert TypedData.decode(bytes.fromhex('9A 09 15 00 42') + data) == TypedData(4, 2, data)
+
+
+def test_bytes_behind_an_array_are_passed_over() -> None:
+    assert TypedData.decode(bytes.fromhex('93 09 42 D2 04 00 00')) == TypedData(4, 2, b'\xD2\x04')
+
+
+@pytest.mark.parametrize('encoded', [
+    '', '93', '93 09', '93 09 42 D2', '99 09', '99 09 05 42 D2 04', '9A 09 03', '42 D2',
+    '42 D2 04 00', '40 D2', '90 09 42', '94 09 42 D2 04 00', '91 09 40', '9F 09 01', 'FF',
+    '93 09 40 D2 04'])
+def test_what_does_not_add_up_is_a_format_error(encoded: str) -> None:
+    with pytest.raises(FormatError):
+        TypedData.decode(bytes.fromhex(encoded))
+
+
+@pytest.mark.parametrize('name', TYPED_READS)
+def test_reply_of_every_typed_read_vector(name: str) -> None:
+    request, reply = pair(name)
+    size = int.from_bytes(request.data[-2:], 'little')
+    values = TypedData.decode(reply.data)
+    assert values.count == size
+    assert reply.data.endswith(values.data)
+    assert (values.type_id, values.element_size) in {(4, 2), (8, 4), (5, 10), (6, 6), (7, 6)}
+    if not name.endswith(('_ext', '_pad', '_bare')):
+        assert values.encode() == reply.data
+
+
+def test_vectors_of_one_value_mean_the_same() -> None:
+    names = [f'plc5_typed_read_N7_30_1_{form}' for form in ('short', 'ext', 'pad', 'bare')]
+    decoded = {TypedData.decode(pair(name)[1].data) for name in names}
+    assert decoded == {TypedData(4, 2, (1234).to_bytes(2, 'little'))}
+
+
+def test_data_of_the_typed_write_vector() -> None:
+    data = vector('plc5_typed_write_badtype_req_fd_crc').packet.data[9:]
+    assert TypedData.decode(data) == TypedData(4, 2, b'\x01\x00')
+    assert TypedData(4, 2, b'\x01\x00').encode() == data
+
+
+@PROPERTY
+@given(st.integers(1, 0x20).filter(lambda value: value != 9), st.integers(1, 300),
+       st.integers(0, 5))
+def test_any_elements_are_read_back(type_id: int, size: int, count: int) -> None:
+    values = TypedData(type_id, size, bytes(size * count))
+    assert TypedData.decode(values.encode()) == values
+    assert values.count == count
+
+
+@PROPERTY
+@given(st.one_of(st.binary(max_size=40), st.builds(
+    bytes.__add__, st.sampled_from([b'\x99\x09', b'\x9A\x09', b'\x93\x09', b'\x42']),
+    st.binary(max_size=20))))
+def test_any_bytes_are_elements_or_a_format_error(parameter: bytes) -> None:
+    try:
+        values = TypedData.decode(parameter)
+    except FormatError:
+        return
+    assert values.element_size > 0
+    assert values.count * values.element_size == len(values.data)

@@ -1,0 +1,199 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A driver and simulated PLCs on a virtual line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import heapq
+import itertools
+
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.slave import Station as LineStation
+from abdf1_ros.df1.stations import Station
+from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import Outcome, WriteResult
+from abdf1_ros.driver.values import Codec, types_of, Values, ValueType
+from abdf1_ros.errors import PortLost
+from abdf1_ros.messages import Event
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.simulated_plc import SimulatedPlc
+from support.virtual_line import VirtualLine
+
+_WHOLE_FRAMES = 1000
+
+
+class Recorder:
+    """A listener that keeps everything, with the time it came."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.reads: list[tuple[float, Mapping, Values]] = []
+        self.results: list[WriteResult] = []
+        self.events: list[Event] = []
+        self.changes: list[tuple[int, bool]] = []
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Keep a value."""
+        kept = values if isinstance(values, str) else list(values)
+        self.reads.append((self._clock(), mapping, kept))
+
+    def written(self, result: WriteResult) -> None:
+        """Keep the result of a write."""
+        self.results.append(result)
+
+    def happened(self, event: Event) -> None:
+        """Keep a numbered event."""
+        self.events.append(event)
+
+    def station_changed(self, station: Station) -> None:
+        """Keep that a station has come or gone."""
+        self.changes.append((station.number, station.active))
+
+    def values(self, mapping: Mapping) -> list[Values]:
+        """Return all that was published of a mapping."""
+        return [values for _, which, values in self.reads if which is mapping]
+
+    def times(self, mapping: Mapping) -> list[float]:
+        """Return when a mapping was published."""
+        return [when for when, which, _ in self.reads if which is mapping]
+
+    def numbers(self) -> set[int]:
+        """Return the numbers of all events."""
+        return {event.message.number for event in self.events}
+
+    def outcomes(self) -> list[Outcome]:
+        """Return how the writes ended, in the order of their results."""
+        return [result.outcome for result in self.results]
+
+
+def simulated_plc(station: int, plc: str, clock: Callable[[], float],
+                  *areas: tuple[str, int], checksum: str = 'CRC') -> SimulatedPlc:
+    """Return a PLC whose files are (address, words)."""
+    kind = PlcType(plc)
+    table = DataTable(kind)
+    for text, words in areas:
+        table.create(Address.parse(text, kind), words)
+    return SimulatedPlc(station, table, Network(error_code=checksum).checksum, clock)
+
+
+def store(plc: SimulatedPlc, text: str, values: Sequence[float] | str) -> None:
+    """Put values of the natural type into a PLC's table."""
+    address = Address.parse(text, plc.table.plc_type)
+    if address.bit is None:
+        codec = Codec(types_of(address.file_type)[0], len(values))
+        plc.table.write(address, codec.encode(values))
+        return
+    assert not isinstance(values, str)
+    changes = Codec(ValueType.BOOL, len(values), address.bit).bit_changes(values)
+    for number, (mask, bits) in enumerate(changes):
+        plc.table.write_bits(address.at_offset(address.offset + number), mask, bits)
+
+
+def stored(plc: SimulatedPlc, text: str, words: int = 1) -> bytes:
+    """Return words of a PLC's table."""
+    return plc.table.read(Address.parse(text, plc.table.plc_type), words)
+
+
+class _FarEnd(Machine):
+    """All stations of the line; what they hear and say goes through two filters."""
+
+    def __init__(self, stations: Sequence[LineStation], network: Network) -> None:
+        super().__init__(multidrop(stations), checksum=network.checksum)
+        self.hear: Callable[[bytes], bytes] = bytes
+        self.say: Callable[[bytes], bytes] = bytes
+
+    def receive_data(self, data: bytes, now: float) -> None:
+        """Take bytes, as far as they get through."""
+        super().receive_data(self.hear(data), now)
+
+    def data_to_send(self) -> bytes:
+        """Give bytes, as far as they get through."""
+        data = super().data_to_send()
+        return self.say(data) if data else data
+
+
+class DriverBench:
+    """
+    The driver on one end of a line, stations on the other, whole frames at a time.
+
+    ``far.hear`` and ``far.say`` stand in the line: they return what comes through of a frame.
+    """
+
+    def __init__(self, mappings: Sequence[Mapping], *, network: Network | None = None,
+                 settings: DriverSettings | None = None, start: bool = True) -> None:
+        self.network = network or Network(baud=115200, timeout=200)
+        self.listener = Recorder(self.clock)
+        self.driver = Driver(self.network, mappings, settings or DriverSettings(), self.listener)
+        self._stations: list[LineStation] = []
+        self.far = _FarEnd(self._stations, self.network)
+        self.line = VirtualLine(
+            self.driver.machine, self.far, baud=self.network.baud, chunk=_WHOLE_FRAMES)
+        self._actions: list[tuple[float, int, Callable[[], None]]] = []
+        self._count = itertools.count()
+        self.far.start(0.0)
+        if start:
+            self.open()
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.line.now
+
+    def plc(self, station: int, plc: str, *areas: tuple[str, int]) -> SimulatedPlc:
+        """Put a PLC on the line."""
+        made = simulated_plc(
+            station, plc, self.clock, *areas, checksum=self.network.error_code)
+        self.connect(made)
+        return made
+
+    def connect(self, station: LineStation) -> None:
+        """Put any station on the line."""
+        self._stations.append(station)
+
+    def open(self) -> None:
+        """Open the port."""
+        self.driver.machine.start(self.line.now)
+        self.line.wake(self.driver.machine)
+
+    def lose_port(self, reason: str = 'unplugged') -> None:
+        """Lose the port."""
+        self.driver.machine.stop(PortLost(reason))
+
+    def at(self, when: float, action: Callable[[], None]) -> None:
+        """Do something at a moment of the clock, while ``run`` lets time pass."""
+        heapq.heappush(self._actions, (when, next(self._count), action))
+
+    def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
+        """Ask for a write, as the node does."""
+        self.driver.write(mapping, values, self.line.now)
+        self.line.wake(self.driver.machine)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self.line.now + seconds
+        while self._actions and self._actions[0][0] <= end:
+            when, _, action = heapq.heappop(self._actions)
+            self.line.run_for(max(0.0, when - self.line.now))
+            action()
+        self.line.run_for(end - self.line.now)
+
+    def run_until(self, condition: Callable[[], bool], limit: float = 60.0) -> None:
+        """Let time pass until something is so; it has to be before the limit."""
+        self.line.run(condition, limit)

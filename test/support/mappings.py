@@ -1,0 +1,57 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Mappings without a file, and files without a folder."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+import tempfile
+
+from abdf1_ros.driver.mapping import COLUMNS, Command, load_mappings, Mapping, Publish
+from abdf1_ros.driver.values import types_of, ValueType
+from abdf1_ros.errors import Problem
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import PlcType
+
+HEADER = ','.join(COLUMNS)
+
+
+def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
+                 plc: str = 'PLC5', length: int = 1, kind: str | None = None,
+                 period: int | None = None, publish: str = 'Always', tag: str | None = None,
+                 topic: str | None = None, minimum: float = -math.inf,
+                 maximum: float = math.inf, item: int = 1) -> Mapping:
+    """Return what a row of these cells becomes; its name is the address unless told."""
+    address = Address.parse(text, PlcType(plc))
+    natural = ValueType.BOOL if address.bit is not None else types_of(address.file_type)[0]
+    name = tag or f'{text}_{station}_{command}_{length}'
+    return Mapping(
+        item, item + 1, name, name, Command(command), address, station, PlcType(plc), length,
+        ValueType(kind) if kind else natural, topic or name, period, Publish(publish),
+        minimum, maximum)
+
+
+def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:
+    """Return what ``load_mappings`` makes of a file with this content."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, name)
+        path.write_bytes(text.encode() if isinstance(text, str) else text)
+        return load_mappings(str(path))
+
+
+def load_rows(*rows: str) -> tuple[list[Mapping], list[Problem]]:
+    """Return what ``load_mappings`` makes of data rows with all columns in their order."""
+    return load_text('\n'.join([HEADER, *rows]))

@@ -1,0 +1,148 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A half-duplex master on a scripted line: what it has to send, and what it gets for it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
+from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.errors import LinkError
+from abdf1_ros.messages import Event
+
+_JUST_BEFORE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Expect:
+    """Exactly these bytes go out, ``after`` seconds from now and not earlier."""
+
+    data: bytes
+    after: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """These bytes come in, ``after`` seconds from now, before the master's patience ends."""
+
+    data: bytes
+    after: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """Nothing comes in for exactly ``seconds``; then the master's patience ends."""
+
+    seconds: float
+
+
+class MasterScript:
+    """A master whose line says what a script tells it."""
+
+    def __init__(self, settings: MasterSettings, timing: LineTiming | None = None) -> None:
+        self.now = 100.0
+        self.events: list[Event] = []
+        self.changes: list[tuple[int, bool]] = []
+        self.stations = ActiveStationList(
+            on_change=lambda station: self.changes.append((station.number, station.active)))
+        self.machine = Machine(self._procedure, checksum=settings.checksum, timing=timing,
+                               forget_on_send=True)
+        self.master = HalfDuplexMaster(
+            self.machine, settings, self.stations, self.events.append)
+        self._command: Packet | None = None
+        self._station: int | None = None
+        self._result: Packet | LinkError | None = None
+        self._sent = self._received = 0
+        self._started = False
+
+    def _procedure(self, machine: Machine) -> Procedure:
+        while True:
+            if self._command is not None:
+                try:
+                    self._result = yield from self.master.exchange(self._command, self._station)
+                except LinkError as error:
+                    self._result = error
+                self._command = None
+            yield Step(None, None)
+
+    def run(self, command: Packet, *script: Expect | Answer | Silence,
+            station: int | None = None) -> Packet | LinkError:
+        """Carry out one transaction and return its reply or its error."""
+        self.begin(command, *script, station=station)
+        assert self._result is not None, 'the script ends before the transaction'
+        assert self.machine.data_to_send() == b'', 'the master says more than the script'
+        assert self.machine.counters.chars_sent == self._sent
+        assert self.machine.counters.chars_received == self._received
+        return self._result
+
+    def begin(self, command: Packet, *script: Expect | Answer | Silence,
+              station: int | None = None) -> None:
+        """Carry out the first part of a transaction."""
+        self._command, self._station, self._result = command, station, None
+        if not self._started:
+            self._started = True
+            self.machine.start(self.now)
+        else:
+            self.machine.wake(self.now)
+        for step in script:
+            self._step(step)
+
+    def _step(self, step: Expect | Answer | Silence) -> None:
+        if isinstance(step, Expect):
+            self._expect(step)
+        elif isinstance(step, Answer):
+            assert self.machine.data_to_send() == b'', 'the master says more than the script'
+            self.now += step.after
+            assert self.machine.deadline is None or self.now < self.machine.deadline
+            self._received += len(step.data)
+            self.machine.receive_data(step.data, self.now)
+        else:
+            self._pass_time(step.seconds)
+
+    def _expect(self, step: Expect) -> None:
+        if step.after:
+            self._pass_time(step.after)
+        self._sent += len(step.data)
+        sent = self.machine.data_to_send()
+        assert sent == step.data, f'{sent.hex(" ")} instead of {step.data.hex(" ")}'
+
+    def _pass_time(self, seconds: float) -> None:
+        early = self.now + seconds - _JUST_BEFORE
+        self.machine.handle_timeout(early)
+        assert self.machine.data_to_send() == b'', 'the master says something too early'
+        deadline = self.machine.deadline
+        assert deadline is not None and abs(deadline - self.now - seconds) < _JUST_BEFORE
+        self.now = deadline
+        self.machine.handle_timeout(self.now)
+
+    def forget(self) -> None:
+        """Set events, changes and counters back to nothing."""
+        self.events.clear()
+        self.changes.clear()
+        self.machine.counters = Counters()
+        self._sent = self._received = 0
+
+    def numbers(self) -> list[tuple[int, ...]]:
+        """Return number and arguments of every event so far."""
+        return [(event.message.number, *event.args) for event in self.events]
+
+    def counts(self) -> dict[str, int]:
+        """Return the counters that are not zero, without the characters."""
+        return {name: count for name, count in asdict(self.machine.counters).items()
+                if count and not name.startswith('chars_')}

@@ -1,0 +1,137 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recorded and computed frames of test/vectors, with types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.packet import Packet
+
+VECTOR_FOLDER = Path(__file__).resolve().parent.parent / 'vectors'
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """
+    One frame of df1_vectors.json.
+
+    ``station`` is the STN of a master frame or poll. ``header`` is DST, SRC, CMD, STS, TNS,
+    None where the file names none; ``fnc`` the function code of a command. ``expected`` is the
+    right check of a frame that carries a wrong one. Frames of one ``pair`` are a command and
+    its reply.
+    """
+
+    name: str
+    mode: str
+    checksum: Checksum
+    valid: bool
+    frame: bytes
+    link_data: bytes
+    station: int | None
+    header: tuple[int, int, int, int, int] | None
+    fnc: int | None
+    expected: int | None
+    pair: str | None
+
+    @property
+    def duplex(self) -> Duplex:
+        """Return the line discipline under which this frame was sent."""
+        return Duplex.FULL if self.mode == 'full_duplex' else Duplex.HALF
+
+    @property
+    def is_message(self) -> bool:
+        """Tell a message frame from a poll or a control symbol."""
+        return self.mode not in ('poll', 'control')
+
+    @property
+    def has_embedded_response(self) -> bool:
+        """Tell whether a response of the other direction stands inside the frame."""
+        return self.name.startswith('embedded_')
+
+    @property
+    def packet(self) -> Packet:
+        """Return the message inside."""
+        return Packet.decode(self.link_data)
+
+
+def _vector(entry: dict[str, Any]) -> Vector:
+    decoded = entry['decoded']
+    header = None
+    if 'tns' in decoded:
+        header = (decoded['dst'], decoded['src'], int(decoded['cmd'], 16),
+                  int(decoded['sts'], 16), int(decoded['tns'], 16))
+    expected = decoded.get('checksum_expected')
+    return Vector(
+        name=entry['name'], mode=entry['mode'], valid=entry['valid'],
+        checksum=Checksum.CRC if entry['checksum'] == 'crc' else Checksum.BCC,
+        frame=bytes.fromhex(entry['frame_hex']),
+        link_data=bytes.fromhex(decoded.get('link_data_hex', '')),
+        station=decoded.get('stn'), header=header,
+        fnc=int(decoded['fnc'], 16) if 'fnc' in decoded else None,
+        expected=None if expected is None else int.from_bytes(bytes.fromhex(expected), 'little'),
+        pair=entry.get('pair'))
+
+
+def load_json(name: str) -> Any:
+    """Return the content of a file of test/vectors."""
+    return json.loads((VECTOR_FOLDER / name).read_text(encoding='utf-8'))
+
+
+VECTORS = tuple(_vector(entry) for entry in load_json('df1_vectors.json'))
+MESSAGES = tuple(vector for vector in VECTORS if vector.is_message)
+
+
+def vector(name: str) -> Vector:
+    """Return the vector of that name."""
+    return next(entry for entry in VECTORS if entry.name == name)
+
+
+def commands(*functions: int) -> list[Vector]:
+    """Return the good CMD 0F command vectors with one of the function codes."""
+    return [entry for entry in MESSAGES
+            if entry.valid and entry.header is not None and entry.header[2] == 0x0F
+            and entry.fnc in functions and len(entry.link_data) > 7]
+
+
+def pair(name: str) -> tuple[Packet, Packet]:
+    """Return command and reply of a pair, as full-duplex CRC frames carry them."""
+    request = vector(f'{name}_req_fd_crc').packet
+    return request, vector(f'{name}_rep_fd_crc').packet
+
+
+@dataclass(frozen=True, slots=True)
+class Captured:
+    """
+    One line of racom_frames.json, a capture at a radio modem.
+
+    ``time`` is the wall-clock time of the capture, ``direction`` is seen from the modem.
+    """
+
+    time: str
+    direction: str
+    checksum: Checksum
+    frame: bytes
+
+
+CAPTURED = tuple(
+    Captured(entry['time'], entry['direction'], Checksum(entry['checksum']),
+             bytes.fromhex(entry['hex']))
+    for entry in load_json('racom_frames.json'))

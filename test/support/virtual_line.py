@@ -1,0 +1,161 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A line in virtual time: machines, a baud rate and seeded noise.
+
+What one machine sends reaches all the others, byte by byte, a character's time apart; each
+direction is a wire of its own, so a half-duplex master with its slaves fits as well as two
+full-duplex peers. Nothing waits: the clock jumps to the next arrival or deadline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import heapq
+from random import Random
+
+from abdf1_ros.df1.machine import Machine
+
+BITS_PER_CHARACTER = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """The probability, for each byte, of being lost, flipped in one bit, doubled, or led in."""
+
+    lost: float = 0.0
+    flipped: float = 0.0
+    doubled: float = 0.0
+    inserted: float = 0.0
+
+    def bytes_for(self, byte: int, random: Random) -> bytes:
+        """Return what arrives in place of ``byte``."""
+        chance = random.random()
+        if chance < self.lost:
+            return b''
+        chance -= self.lost
+        if chance < self.flipped:
+            return bytes((byte ^ 1 << random.randrange(8),))
+        chance -= self.flipped
+        if chance < self.doubled:
+            return bytes((byte, byte))
+        if chance - self.doubled < self.inserted:
+            return bytes((random.randrange(256), byte))
+        return bytes((byte,))
+
+
+QUIET = Noise()
+
+
+class VirtualLine:
+    """
+    The line between ``machines``, and their clock.
+
+    ``baud`` is bits per second, ``propagation`` seconds that a byte travels. ``chunk`` bytes
+    are handed over together, when the last of them is here (1: as a bare UART does; more: as
+    its FIFO or an adapter does). ``noise`` may be changed at any time and acts on what is sent
+    from then on.
+    """
+
+    def __init__(self, *machines: Machine, baud: int = 19200, propagation: float = 0.0,
+                 chunk: int = 1, noise: Noise = QUIET, seed: int = 0) -> None:
+        self.now = 0.0
+        self.noise = noise
+        self.char_time = char_time(baud)
+        self._machines = machines
+        self._propagation = propagation
+        self._chunk = chunk
+        self._random = Random(seed)
+        self._free = [0.0] * len(machines)  # when each sender's last byte has left
+        self._arrivals: list[tuple[float, int, int, bytes]] = []
+        self._count = 0
+
+    def start(self) -> None:
+        """Start every machine."""
+        for machine in self._machines:
+            machine.start(self.now)
+        for sender in range(len(self._machines)):
+            self._take(sender)
+
+    def wake(self, machine: Machine) -> None:
+        """Wake a machine that rests."""
+        machine.wake(self.now)
+        self._take(self._machines.index(machine))
+
+    def run(self, until: Callable[[], bool], limit: float) -> None:
+        """Let time pass until ``until()``; fail after ``limit`` seconds, or when all is still."""
+        end = self.now + limit
+        while not until():
+            if not self._advance():
+                raise AssertionError(f'nothing will ever happen again, at {self.now}')
+            assert self.now <= end, f'not done after {limit} s of line time'
+
+    def run_for(self, seconds: float) -> None:
+        """Let ``seconds`` pass."""
+        end = self.now + seconds
+        while self._next_time() <= end:
+            self._advance()
+        self.now = end
+
+    def _next_time(self) -> float:
+        times = [machine.deadline for machine in self._machines if machine.deadline is not None]
+        if self._arrivals:
+            times.append(self._arrivals[0][0])
+        return max(self.now, min(times, default=float('inf')))
+
+    def _advance(self) -> bool:
+        """Carry out the next event; return False when there is none."""
+        arrival = self._arrivals[0][0] if self._arrivals else float('inf')
+        first, deadline = -1, float('inf')
+        for index, machine in enumerate(self._machines):
+            if machine.deadline is not None and machine.deadline < deadline:
+                first, deadline = index, machine.deadline
+        if arrival <= deadline:
+            if not self._arrivals:
+                return False
+            self.now, _, first, data = heapq.heappop(self._arrivals)
+            self._machines[first].receive_data(data, self.now)
+        else:
+            self.now = max(self.now, deadline)
+            self._machines[first].handle_timeout(self.now)
+        self._take(first)
+        return True
+
+    def _take(self, sender: int) -> None:
+        """Put on the wire what a machine has to send."""
+        data = self._machines[sender].data_to_send()
+        if not data:
+            return
+        start = max(self.now, self._free[sender])
+        self._free[sender] = start + len(data) * self.char_time
+        for receiver in range(len(self._machines)):
+            if receiver != sender:
+                self._send(data, start, receiver)
+
+    def _send(self, data: bytes, start: float, receiver: int) -> None:
+        for at in range(0, len(data), self._chunk):
+            part = data[at:at + self._chunk]
+            here = start + (at + len(part)) * self.char_time + self._propagation
+            if self.noise is not QUIET:
+                part = b''.join(self.noise.bytes_for(byte, self._random) for byte in part)
+            if part:
+                self._count += 1  # keeps the order of what arrives at one instant
+                heapq.heappush(self._arrivals, (here, self._count, receiver, part))
+
+
+def char_time(baud: int) -> float:
+    """Return the seconds that a character takes."""
+    return BITS_PER_CHARACTER / baud

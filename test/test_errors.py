@@ -1,0 +1,86 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The exception tree: what callers catch, and the numbered texts."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import (
+    Abdf1Error,
+    CommandTimeout,
+    ConfigurationError,
+    FormatError,
+    LinkError,
+    PortLost,
+    Problem,
+    RemoteError,
+    StationInactive,
+    WrongCommandCode,
+)
+from abdf1_ros.messages import Message
+import pytest
+
+
+@pytest.mark.parametrize('error', [
+    CommandTimeout, StationInactive, WrongCommandCode, PortLost])
+def test_failed_transactions_are_link_errors(error: type[LinkError]) -> None:
+    assert issubclass(error, LinkError)
+    assert issubclass(error, Abdf1Error)
+
+
+@pytest.mark.parametrize('error', [FormatError, RemoteError, Problem, ConfigurationError])
+def test_other_errors_are_no_link_errors(error: type[Abdf1Error]) -> None:
+    assert issubclass(error, Abdf1Error)
+    assert not issubclass(error, LinkError)
+
+
+def test_format_error_is_a_value_error() -> None:
+    assert issubclass(FormatError, ValueError)
+
+
+@pytest.mark.parametrize(('error', 'text'), [
+    (CommandTimeout(), '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
+    (StationInactive(9), '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'),
+    (WrongCommandCode(9, 0x41, 0x4F),
+     '2505 ERR_BAD_FUNCTION_CODE: Response with wrong command code '
+     '(slv=9, actual=65, expected=79)'),
+    (PortLost('unplugged'), 'port lost: unplugged'),
+])
+def test_link_error_reads_as_its_numbered_text(error: LinkError, text: str) -> None:
+    assert str(error) == text
+
+
+def test_remote_error_keeps_the_codes() -> None:
+    error = RemoteError(0xF0, 0x06, 'no such place')
+    assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
+
+
+def test_problem_shows_place_number_and_advice() -> None:
+    problem = Problem('net.csv:2:1', 'write 0 to 254', Message.CRT_BAD_STATION_ID, ('x', 255))
+    assert str(problem) == (
+        'net.csv:2:1: 2552 CRT_BAD_STATION_ID: Invalid station number (x) must be less than '
+        '255; write 0 to 254')
+    assert (problem.where, problem.text) == ('net.csv:2:1', 'write 0 to 254')
+    assert problem.message is Message.CRT_BAD_STATION_ID
+
+
+def test_problem_without_number_shows_place_and_advice() -> None:
+    assert str(Problem('net.csv:2:9', 'write 9600')) == 'net.csv:2:9: write 9600'
+
+
+def test_configuration_error_shows_every_problem() -> None:
+    problems = [Problem('a:1:1', 'this'), Problem('a:1:2', 'that')]
+    error = ConfigurationError(problems)
+    assert error.problems == problems
+    assert str(error) == 'a:1:1: this\na:1:2: that'

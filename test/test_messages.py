@@ -1,0 +1,82 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The numbered messages: numbers, names and texts are those of the specification."""
+
+from __future__ import annotations
+
+from abdf1_ros.messages import Event, Message, Severity
+import pytest
+from support.vectors import load_json
+
+SPECIFIED: list[tuple[int, str, str]] = [
+    tuple(row) for row in load_json('driver_tables.json')['messages']]
+
+
+def test_exactly_the_specified_messages_exist() -> None:
+    assert sorted((entry.number, entry.name) for entry in Message) == [
+        (number, name) for number, name, _ in SPECIFIED]
+    assert len(SPECIFIED) == 32
+
+
+@pytest.mark.parametrize(('number', 'name', 'text'), SPECIFIED, ids=lambda value: str(value)[:24])
+def test_text_is_that_of_the_specification(number: int, name: str, text: str) -> None:
+    message = Message[name]
+    assert message.number == number
+    assert message.template == text
+
+
+@pytest.mark.parametrize('message', Message, ids=lambda message: message.name)
+def test_severity_follows_the_mnemonic(message: Message) -> None:
+    prefix = {Severity.CRITICAL: 'CRT', Severity.ERROR: 'ERR', Severity.NOTICE: 'NTC'}
+    assert message.name.startswith(prefix[message.severity] + '_')
+
+
+@pytest.mark.parametrize('message', Message, ids=lambda message: message.name)
+def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None:
+    args = tuple(range(message.template.count('%')))
+    assert '%' not in message.text(*args)
+    with pytest.raises(TypeError):
+        message.text(*args, 1)
+
+
+def test_text_fills_hexadecimal_places() -> None:
+    assert Message.ERR_BAD_CRC.text(0x0A, 0xFF, 0, 1) == (
+        'Response with wrong CRC (actual=0x0aff, expected=0x0001)')
+    assert Message.ERR_WRONG_MESSAGE.text(1, 0x20, 0x2A) == (
+        'Wrong Message Received Src:0x01, Dst:0x20, Tns:0x002a')
+
+
+def test_number_place_shows_what_a_user_typed() -> None:
+    assert Message.CRT_BAD_STATION_ID.text('abc', 255) == (
+        'Invalid station number (abc) must be less than 255')
+
+
+def test_line_carries_number_and_mnemonic() -> None:
+    assert Message.ERR_COMMAND_TIMEOUT.line() == '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+
+
+def test_event_names_its_station() -> None:
+    event = Event(Message.NTC_ACK_EXPECTED, (0x15,), 7)
+    assert str(event) == (
+        '2515 NTC_ACK_EXPECTED: ACK Expected (last symbol received was 0x15) [station 7]')
+
+
+def test_event_of_station_zero_names_it_too() -> None:
+    assert str(Event(Message.ERR_COMMAND_TIMEOUT, (), 0)).endswith(' [station 0]')
+
+
+def test_event_without_station_is_the_bare_line() -> None:
+    event = Event(Message.NTC_NAK_RETRY, (2, 2515))
+    assert str(event) == '2521 NTC_NAK_RETRY: NAK Retry #2, due to error 2515'
