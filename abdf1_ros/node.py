@@ -129,6 +129,7 @@ class BridgeNode(Node):
             stale_after=parameters.stale_after, write_timeout=parameters.write_timeout,
             read_only=parameters.read_only,
             nak_on_command_timeout=parameters.nak_on_command_timeout,
+            max_outstanding=parameters.max_outstanding,
             first_tns=random.randrange(0x10000))
         return Driver(configuration.network, configuration.mappings, settings, self)
 

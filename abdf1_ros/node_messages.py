@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from array import array
+import math
 from typing import Any
 
 from rclpy.duration import Duration
@@ -70,12 +71,12 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
 
     A late subscriber gets the last value, but never one older than ``stale_time`` seconds; one
     that asks for deadline or liveliness is told after that time that values have stopped. A
-    topic that is published on change only cannot promise this.
+    topic that is published on change only, or when a PLC chooses to write, cannot promise this.
     """
     profile = QoSProfile(
         depth=1, reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    if mapping.publish is Publish.ALWAYS:
+    if mapping.publish is Publish.ALWAYS and math.isfinite(stale_time):
         time = Duration(seconds=stale_time)
         profile.lifespan = profile.deadline = profile.liveliness_lease_duration = time
         profile.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC

@@ -21,6 +21,7 @@ from typing import Any
 
 from abdf1_ros.driver.mapping import COLUMNS, load_mappings, Mapping
 from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
+from abdf1_ros.driver.served import served_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -53,6 +54,8 @@ class Parameters:
         2.0, 's that a write may wait for the line', 0.05, 60.0)
     nak_on_command_timeout: bool = _parameter(
         True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
+    max_outstanding: int = _parameter(
+        1, 'commands that may wait for their reply at a time, Mode Peer only', 1, 16)
     expose_map_parameters: bool = _parameter(
         True, 'show every mapping as read-only parameters map.<tag>.<column>')
 
@@ -84,9 +87,12 @@ def configure(node: Node) -> Configuration:
         network = _declare_network(node, from_file)
     except ConfigurationError as error:
         problems += error.problems
+    map_file = parameters.map_file or str(config_file('map.csv'))
     try:
-        mappings, map_problems = load_mappings(
-            parameters.map_file or str(config_file('map.csv')))
+        mappings, map_problems = load_mappings(map_file)
+        for mapping, problem in served_problems(mappings, network, map_file):
+            mappings.remove(mapping)
+            map_problems.append(problem)
     except ConfigurationError as error:
         problems += error.problems
     if parameters.strict_map:

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 import random
@@ -29,10 +30,12 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
 from abdf1_ros.driver.values import Codec, types_of, ValueType
-from abdf1_ros.errors import ConfigurationError, FormatError, Problem
+from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
+from abdf1_ros.pccc.dialects import DIALECTS
 from abdf1_ros.pccc.server import SERVED_FAMILIES, Server
+from abdf1_ros.pccc.status import check_status
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')
 _RAMP_TOP = 1000
@@ -87,6 +90,28 @@ class Faults:
     status: tuple[int, ...] = ()
 
 
+class Sending:
+    """A command of a simulated PLC on its way; ``report`` is told how it ended."""
+
+    def __init__(self, command: Packet, report: Callable[[str], None]) -> None:
+        self.command = command
+        self.sent = False
+        self._report = report
+
+    def reply(self, packet: Packet) -> None:
+        """Take the reply."""
+        try:
+            check_status(packet)
+        except RemoteError as error:
+            self._report(str(error))
+        else:
+            self._report('confirmed')
+
+    def fail(self, error: LinkError) -> None:
+        """Take note that there will be no reply."""
+        self._report(str(error))
+
+
 class SimulatedPlc:
     """One station with its data table; ``clock`` gives seconds."""
 
@@ -95,8 +120,10 @@ class SimulatedPlc:
         self.station = station
         self.table = table
         self.faults = Faults()
-        self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self._serve)
+        self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self.serve)
+        self.outbox: deque[Sending] = deque()
         self._server = Server(table)
+        self._tns = random.Random(seed).randrange(0x10000)
         self._clock = clock
         self._movers: list[_Mover] = []
         self._random = random.Random(seed + station)
@@ -109,15 +136,52 @@ class SimulatedPlc:
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
         if is_poll and self._polls_to_refuse > 0:
             self._polls_to_refuse -= 1
-            return self._damaged(frames.EOT)
-        return self._damaged(self.slave.handle(symbol))
+            return self.damaged(frames.EOT)
+        return self.damaged(self.slave.handle(symbol))
 
     def move(self, mover: _Mover) -> None:
         """Let values change from now on."""
         mover.next_time = self._clock() + mover.period
         self._movers.append(mover)
 
-    def _serve(self, command: Packet) -> Packet:
+    def send(self, address: Address, values: list[float], station: int,
+             report: Callable[[str], None]) -> None:
+        """
+        Write to ``station`` with commands of our own, as a MSG instruction does.
+
+        Only a full-duplex line carries them. ``report`` is told how each of them ended. Raises
+        FormatError for values that do not fit.
+        """
+        codec = _natural_codec(address, len(values))
+        codec.check(values)
+        dialect = DIALECTS[address.plc_type]
+        if codec.type is ValueType.BOOL:
+            bodies = [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
+                      for n, (mask, bits) in enumerate(codec.bit_changes(values))]
+        else:
+            bodies = [dialect.write(address, codec.encode(values))]
+        for body in bodies:
+            self._tns = self._tns + 1 & 0xFFFF
+            command = Packet(station, self.station, dialect.cmd, 0, self._tns, body)
+            self.outbox.append(Sending(command, report))
+
+    def next_task(self, now: float) -> Sending | None:
+        """Return a command of our own that waits to be sent."""
+        return self.outbox.popleft() if self.outbox else None
+
+    def next_due(self) -> float | None:
+        """Return None: we send when we are told to, not by the clock."""
+        return None
+
+    def damaged(self, data: bytes) -> bytes:
+        """Return what arrives of ``data`` at the other end."""
+        if not self.faults.noise:
+            return data
+        return bytes(byte ^ 1 << self._random.randrange(8)
+                     if self._random.random() < self.faults.noise else byte for byte in data)
+
+    def serve(self, command: Packet) -> Packet:
+        """Execute a command and return its reply."""
         self._polls_to_refuse = self.faults.slow
         now = self._clock()
         for mover in self._movers:
@@ -126,12 +190,6 @@ class SimulatedPlc:
             sts, *ext_sts = self.faults.status
             return command.reply(bytes(ext_sts), sts)
         return self._server.serve(command)
-
-    def _damaged(self, data: bytes) -> bytes:
-        if not self.faults.noise:
-            return data
-        return bytes(byte ^ 1 << self._random.randrange(8)
-                     if self._random.random() < self.faults.noise else byte for byte in data)
 
 
 def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list[SimulatedPlc]:
@@ -162,8 +220,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
                       f'station {station} is a {plc.table.plc_type.value} already')
     try:
         address = Address.parse(row.get('Address'), plc_type)
-        kind = ValueType.BOOL if address.bit is not None else types_of(address.file_type)[0]
-        codec = Codec(kind, length, address.bit or 0)
+        codec = _natural_codec(address, length)
         plc.table.create(address, codec.words)
     except (FormatError, NoSuchFile) as error:
         raise Problem(row.where('Address'), str(error)) from None
@@ -172,6 +229,11 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     if motion is not Motion.NONE:
         period = _number(row, 'Period', 1, 3_600_000)
         plc.move(_Mover(address, codec, motion, period / 1000))
+
+
+def _natural_codec(address: Address, length: int) -> Codec:
+    kind = ValueType.BOOL if address.bit is not None else types_of(address.file_type)[0]
+    return Codec(kind, length, address.bit or 0)
 
 
 def _number(row: Row, column: str, low: int, high: int) -> int:
@@ -194,14 +256,17 @@ def _values(row: Row, codec: Codec) -> list[float] | str:
     if codec.type is ValueType.STRING:
         return row.get('Values')
     try:
-        values: list[float] = [
-            float(text) if codec.type is ValueType.FLOAT32 else int(text)
-            for text in row.get('Values').split()]
+        values = numbers(row.get('Values').split())
         values += [0] * (codec.length - len(values))
         codec.check(values)
     except ValueError as error:
         raise Problem(row.where('Values'), str(error)) from None
     return values
+
+
+def numbers(texts: Sequence[str]) -> list[float]:
+    """Return whole and decimal numbers as such; ValueError for anything else."""
+    return [int(text) if whole_number(text) is not None else float(text) for text in texts]
 
 
 def _store(table: DataTable, address: Address, codec: Codec,

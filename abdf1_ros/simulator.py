@@ -13,10 +13,12 @@
 # limitations under the License.
 
 """
-The simulator: PLCs on one half-duplex multidrop line, to try the bridge without hardware.
+The simulator: PLCs on one line, to try the bridge without hardware.
 
-The line is a pseudo-terminal, a serial port, or a TCP port. While it runs, lines on standard
-input switch faults on and off.
+By default all PLCs of the data file share a half-duplex multidrop line; with --full-duplex one
+of them has a full-duplex line for itself, on which it can also send commands. The line is a
+pseudo-terminal, a serial port, or a TCP port. While it runs, lines on standard input switch
+faults on and off.
 """
 
 from __future__ import annotations
@@ -36,15 +38,22 @@ import traceback
 import tty
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port
-from abdf1_ros.simulated_plc import Faults, load_plcs, SimulatedPlc
+from abdf1_ros.simulated_plc import Faults, load_plcs, numbers, SimulatedPlc
 
 EXIT_CONFIGURATION = 2
+
+# Where a simulated PLC sends its messages: the default Station of a net CSV.
+BRIDGE_STATION = Network().station
 
 _COMMANDS = """\
 commands, on standard input or with --at:
@@ -53,11 +62,13 @@ commands, on standard input or with --at:
   noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
   error STATION STS [EXT]     every reply says this error (hexadecimal)
   normal STATION              it works again
+  msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
   quit                        end the simulator
 
 examples:
   simulator --pty /tmp/plc
   simulator --tcp 127.0.0.1:4001 --check BCC
+  simulator --full-duplex 1 --pty /tmp/plc --at '3 msg 1 N7:50 11 22'
   simulator --pty /tmp/plc --at '5 silent 2' --at '10 normal 2'
 """
 
@@ -66,15 +77,17 @@ class CommandError(Exception):
     """A line that is no command; the text says what would be right."""
 
 
-def execute(line: str, plcs: Sequence[SimulatedPlc]) -> str:
+def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False) -> str:
     """Carry out a command line; return what has been done, or raise CommandError."""
     verb, *words = line.split()
     plc, arguments = _station(words, plcs)
+    if verb == 'msg' and is_full_duplex and len(arguments) > 1:
+        return _send(plc, *arguments)
     faults = Faults()
     try:
         if verb == 'silent' and not arguments:
             faults.silent = True
-        elif verb == 'slow' and len(arguments) == 1:
+        elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
             faults.slow = int(arguments[0])
         elif verb == 'noise' and len(arguments) == 1:
             faults.noise = float(arguments[0])
@@ -88,6 +101,16 @@ def execute(line: str, plcs: Sequence[SimulatedPlc]) -> str:
     return f'station {plc.station}: {" ".join([verb, *arguments])}'
 
 
+def _send(plc: SimulatedPlc, address: str, *values: str) -> str:
+    try:
+        place = Address.parse(address, plc.table.plc_type)
+        plc.send(place, numbers(values), BRIDGE_STATION,
+                 lambda outcome: _say(f'station {plc.station}: msg {place} {outcome}'))
+    except ValueError as error:
+        raise CommandError(f'msg {address}: {error}') from None
+    return f'station {plc.station}: msg {place} {" ".join(values)}'
+
+
 def _station(arguments: list[str],
              plcs: Sequence[SimulatedPlc]) -> tuple[SimulatedPlc, list[str]]:
     for plc in plcs:
@@ -95,6 +118,28 @@ def _station(arguments: list[str],
             return plc, arguments[1:]
     known = ', '.join(str(plc.station) for plc in plcs)
     raise CommandError(f'name a station ({known})\n{_COMMANDS}')
+
+
+class _FaultyPort:
+    """The port of the one PLC on a full-duplex line, as good as its faults allow."""
+
+    def __init__(self, port: Port, plc: SimulatedPlc) -> None:
+        self._port = port
+        self._plc = plc
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes; a silent PLC hears none."""
+        data = self._port.read(timeout, wake)
+        return b'' if self._plc.faults.silent else data
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, damaged or not at all."""
+        if not self._plc.faults.silent:
+            self._port.write(self._plc.damaged(data))
+
+    def close(self) -> None:
+        """Close the port."""
+        self._port.close()
 
 
 class PtyLine:
@@ -169,16 +214,25 @@ def main(args: Sequence[str] | None = None) -> int:
         script = sorted(map(_scheduled, options.at))
         plcs = load_plcs(options.data or str(config_file('simulator.csv')), checksum,
                          time.monotonic)
+        if options.full_duplex is not None:
+            plcs = [_station([options.full_duplex], plcs)[0]]
         line = _open_line(options)
+    except CommandError as error:
+        print(f'simulator: --full-duplex: {str(error).splitlines()[0]}', file=sys.stderr)
+        return EXIT_CONFIGURATION
     except (ConfigurationError, OSError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return EXIT_CONFIGURATION
     machine = Machine(multidrop(plcs), checksum=checksum)
-    link = LinkThread(machine, line.open, on_fault=_print_fault, last_back_off=0.5)
+    open_line = line.open
+    if options.full_duplex is not None:
+        machine = _full_duplex(plcs[0], checksum)
+        open_line = lambda: _FaultyPort(line.open(), plcs[0])  # noqa: E731
+    link = LinkThread(machine, open_line, on_fault=_print_fault, last_back_off=0.5)
     names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
     _say(f'stations {names} on {line.name}, {options.check}')
     link.start()
-    _converse(plcs, script, options.seconds)
+    _converse(plcs, script, link, options)
     link.stop()
     line.close()
     return 0
@@ -194,6 +248,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                                                     'one with the name that is printed)')
     line.add_argument('--port', help='a serial port or a URL of pyserial')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
+    parser.add_argument('--full-duplex', metavar='STATION',
+                        help='this PLC alone, on a full-duplex line')
     parser.add_argument('--baud', type=int, choices=BAUD_RATES, default=9600,
                         help='of the serial port (default: %(default)s)')
     parser.add_argument('--check', choices=[check.value for check in Checksum],
@@ -221,33 +277,42 @@ def _open_line(options: argparse.Namespace) -> PtyLine | TcpLine | SerialLine:
     return PtyLine(options.pty)
 
 
-def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]],
-              seconds: float) -> None:
+def _full_duplex(plc: SimulatedPlc, checksum: Checksum) -> Machine:
+    """Return a machine that is ``plc`` at the other end of a full-duplex line."""
+    def run(machine: Machine) -> Procedure:
+        peer = FullDuplexPeer(
+            machine, PeerSettings(checksum), ActiveStationList(), plc.serve)
+        return peer.run(plc)
+    return Machine(run, checksum=checksum, duplex=Duplex.FULL)
+
+
+def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]], link: LinkThread,
+              options: argparse.Namespace) -> None:
     """Carry out commands as they come, until it is time to end."""
+    def carry_out(line: str) -> None:
+        if line.strip() == 'quit':
+            ended.set()
+        elif line.strip():
+            try:
+                _say(execute(line, plcs, options.full_duplex is not None))
+            except CommandError as error:
+                _say(str(error))
+            link.wake()
+
     ended = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: ended.set())
     signal.signal(signal.SIGTERM, lambda *_: ended.set())
     begin = time.monotonic()
     inputs = [sys.stdin]
-    while not ended.is_set() and (passed := time.monotonic() - begin) < seconds:
+    while not ended.is_set() and (passed := time.monotonic() - begin) < options.seconds:
         while script and script[0][0] <= passed:
-            _carry_out(script.pop(0)[1], plcs, ended)
+            carry_out(script.pop(0)[1])
         if select.select(inputs, [], [], 0.05)[0]:
             line = sys.stdin.readline()
             if line:
-                _carry_out(line, plcs, ended)
+                carry_out(line)
             else:
                 inputs = []  # closed; signals and --seconds still end us
-
-
-def _carry_out(line: str, plcs: Sequence[SimulatedPlc], ended: threading.Event) -> None:
-    if line.strip() == 'quit':
-        ended.set()
-    elif line.strip():
-        try:
-            _say(execute(line, plcs))
-        except CommandError as error:
-            _say(str(error))
 
 
 def _say(text: str) -> None:

@@ -151,8 +151,8 @@ class FrameDecoder:
     Turn bytes into symbols.
 
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
-    everything heard. Bytes outside of any symbol are noise: they are skipped, and the last
-    byte heard stays in ``last_byte`` for whoever reports it.
+    everything heard. Bytes outside of any symbol are noise: they are skipped and counted in
+    ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
@@ -163,6 +163,7 @@ class FrameDecoder:
         self._state = _State.IDLE
         self._station: int | None = None
         self.last_byte = 0
+        self.noise = 0
 
     @property
     def in_message(self) -> bool:
@@ -194,10 +195,9 @@ class FrameDecoder:
 
     def _idle(self) -> Symbol | None:
         start = self._buffer.find(Code.DLE)
-        if start < 0:
-            self._buffer.clear()
-            return None
-        del self._buffer[:start]
+        skipped = len(self._buffer) if start < 0 else start
+        self.noise += skipped
+        del self._buffer[:skipped]
         if len(self._buffer) < 2:
             return None
         code = self._buffer[1]
@@ -207,6 +207,7 @@ class FrameDecoder:
     def _begin(self, code: int) -> Symbol | None:
         half = self._duplex is Duplex.HALF
         if code == Code.DLE:
+            self.noise += 1
             return None  # a data byte of a message whose beginning we missed
         if code == Code.STX:
             self._begin_data(None)

@@ -46,9 +46,10 @@ class Step(NamedTuple):
     """
     What a procedure asks of the machine.
 
-    ``frame`` goes on the line (empty: only listen; None: rest, deaf to the line, until the
-    time is up or ``Machine.wake``). ``timeout`` is in seconds from the moment the last byte
-    has left (0: do not wait, None: no limit). ``delay`` seconds pass before the frame goes out.
+    ``frame`` goes on the line (empty: only listen; None: rest until the time is up or
+    ``Machine.wake``, deaf to a half-duplex line). ``timeout`` is in seconds from the moment the
+    last byte has left (0: do not wait, None: no limit, KEEP: what is left of the time of the
+    last step). ``delay`` seconds pass before the frame goes out.
     """
 
     frame: bytes | None
@@ -56,8 +57,8 @@ class Step(NamedTuple):
     delay: float = 0.0
 
 
-LISTEN_ON = Step(b'', math.nan)
-"""Give me the next symbol within what is left of the time of the last step."""
+KEEP = -1.0
+LISTEN_ON = Step(b'', KEEP)
 
 Procedure = Generator[Step, Symbol | None, None]
 
@@ -97,6 +98,7 @@ class Machine:
         self._procedure: Procedure | None = None
         self._out = bytearray()
         self._pending: Step | None = None  # waits for its delay before it goes out
+        self._kept_deadline: float | None = None
         self._resting = False
         self._line_free = -math.inf
         self._last_heard = -math.inf
@@ -145,7 +147,8 @@ class Machine:
         self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
-        if self._listening and self.decoder.in_message and self.deadline is not None:
+        if self._listening and not self._resting and self.decoder.in_message \
+                and self.deadline is not None:
             # An answer that has begun may take its time on the line, but not pause.
             self.deadline = max(self.deadline, now + self._pause_limit)
 
@@ -185,7 +188,8 @@ class Machine:
 
     @property
     def _listening(self) -> bool:
-        return self._procedure is not None and not self._resting and self._pending is None
+        deaf = self._resting and self._forget_on_send
+        return self._procedure is not None and not deaf and self._pending is None
 
     @property
     def _pause_limit(self) -> float:
@@ -220,15 +224,13 @@ class Machine:
 
     def _take_step(self, step: Step) -> bool:
         """Carry out a step; return whether the procedure goes on at once."""
-        if step is LISTEN_ON:
-            return False
         self._resting = step.frame is None
         if self._resting:
             self._set_deadline(step.timeout, self.now)
             return False
         delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
         if delay:
-            self._pending = step
+            self._pending, self._kept_deadline = step, self.deadline
             self.deadline = max(self.now, self._line_free) + delay
             return False
         return self._put_on_line(step)
@@ -246,9 +248,11 @@ class Machine:
         return step.timeout == 0
 
     def _transmit(self, step: Step) -> None:
-        self._pending = None
+        self._pending, self.deadline = None, self._kept_deadline
         if self._put_on_line(step):
             self._resume(None)
 
     def _set_deadline(self, timeout: float | None, start: float) -> None:
+        if timeout == KEEP:
+            return
         self.deadline = None if timeout is None else start + timeout

@@ -43,9 +43,10 @@ from typing import NoReturn, TypeGuard
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import LISTEN_ON, Machine, Procedure, Step
-from abdf1_ros.df1.packet import HEADER_SIZE, Packet, REPLY_BIT
+from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
@@ -318,29 +319,9 @@ class HalfDuplexMaster:
 
     def _note_fault(self, frame: Frame, number: int) -> Message:
         """Count and report what is wrong with a frame; return the message that names it."""
-        if frame.fault is Fault.BAD_CHECK:
-            return self._note_bad_check(frame, number)
-        self._counters.invalid_messages += 1
-        args: tuple[int, ...] = ()
-        if frame.fault is Fault.NO_ETX:
-            message = Message.NTC_NO_ETX_RCVD
-        elif frame.fault is Fault.TOO_SHORT:
-            message, args = Message.NTC_RCVD_MSG_TOO_SHORT, (HEADER_SIZE,)
-        else:
-            message, args = Message.NTC_RCVD_MSG_TOO_LONG, (frames.MAX_LINK_DATA,)
-        self._note(message, *args, station=number)
-        return message
-
-    def _note_bad_check(self, frame: Frame, number: int) -> Message:
-        if self._settings.checksum is Checksum.BCC:
-            self._counters.bcc_errors += 1
-            message = Message.ERR_BAD_BCC
-        else:
-            self._counters.crc_errors += 1
-            message = Message.ERR_BAD_CRC
-        self._note(message, *divmod(frame.received, 256), *divmod(frame.expected, 256),
-                   station=number)
-        return message
+        event = count_fault(frame, self._settings.checksum, self._counters, number)
+        self._report(event)
+        return event.message
 
     def _note(self, message: Message, *args: int, station: int) -> None:
         self._report(Event(message, args, station))

@@ -30,7 +30,8 @@ from typing import Protocol
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol
+from abdf1_ros.df1.faults import count_fault
+from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 
@@ -98,7 +99,7 @@ class HalfDuplexSlave:
         if frame.station not in (self._settings.station, BROADCAST):
             return b''
         if frame.fault is not None:
-            self._count_fault(frame.fault)
+            count_fault(frame, self._settings.checksum, self.counters)
             return b''
         packet = Packet.decode(frame.data)
         self.counters.messages_received += 1
@@ -151,14 +152,6 @@ class HalfDuplexSlave:
         self.counters.messages_sent += 1
         self._just_sent = True
         return frames.message_frame(held.packet.encode(), self._settings.checksum)
-
-    def _count_fault(self, fault: Fault) -> None:
-        if fault is not Fault.BAD_CHECK:
-            self.counters.invalid_messages += 1
-        elif self._settings.checksum is Checksum.BCC:
-            self.counters.bcc_errors += 1
-        else:
-            self.counters.crc_errors += 1
 
 
 class Station(Protocol):

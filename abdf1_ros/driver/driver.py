@@ -25,12 +25,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
+import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.mapping import Mapping
@@ -38,10 +41,12 @@ from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.scheduler import ReadJob, Scheduler
+from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import check_status, is_address_fault
 
 # What a station takes to answer, for the estimate of the scan time (M 14-2 counts two answers
@@ -76,7 +81,8 @@ class DriverSettings:
     """
     What is not in the net CSV; times in seconds.
 
-    ``stale_after`` counts periods; ``first_tns`` is the transaction number to begin with, which
+    ``stale_after`` counts periods; ``max_outstanding`` commands may wait for their reply at a
+    time in full duplex; ``first_tns`` is the transaction number to begin with, which
     should be random, or a restarted driver repeats itself and is taken for a duplicate.
     """
 
@@ -85,11 +91,12 @@ class DriverSettings:
     write_timeout: float = 2.0
     read_only: bool = False
     nak_on_command_timeout: bool = True
+    max_outstanding: int = 1
     first_tns: int = 0
 
 
 class Driver:
-    """Read and write the mapped addresses over one half-duplex line."""
+    """Read and write the mapped addresses over one line, and serve those that are ours."""
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
                  listener: Listener) -> None:
@@ -97,22 +104,26 @@ class Driver:
         self.mappings = tuple(mappings)
         self.counters = Counters()
         self.stations = ActiveStationList(
-            (mapping.station for mapping in mappings), listener.station_changed)
+            (mapping.station for mapping in mappings if not mapping.serves),
+            listener.station_changed)
         self.machine = Machine(
-            lambda machine: self._run(), checksum=network.checksum, timing=network.timing,
-            counters=self.counters, forget_on_send=True)
+            lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
+            timing=network.timing, counters=self.counters,
+            forget_on_send=network.duplex is Duplex.HALF)
         self.is_online = False
         self.transactions = 0
+        self._to_serve: deque[Write] = deque()
         self._tasks: set[_JobTask] = set()
         self._under_way: deque[_JobTask] = deque()
         self._settings = settings
         self._listener = listener
-        self._master = HalfDuplexMaster(
-            self.machine, _master_settings(network, settings), self.stations, listener.happened)
+        self._served = Served(PlcType(network.plc_type), mappings, self._serve_written)
+        self._link = self._make_link()
         self._tns = settings.first_tns
         self._last_tns: dict[int, int] = {}
         self._planner = Planner(
-            network.checksum, network.timing.char_time, settings.default_period)
+            network.checksum, network.duplex, network.timing.char_time,
+            settings.default_period)
         blocks = self._planner.plan(mappings)
         self.expected_scan_time = sum(
             block.line_time + 2 * _USUAL_RESPONSE * len(block.requests) for block in blocks)
@@ -145,7 +156,11 @@ class Driver:
                 raise FormatError('the port is not open')
             if self._scheduler.is_full:
                 raise FormatError('too many writes are waiting')
-            self._scheduler.add_write(Write(mapping, values, now))
+            write = Write(mapping, values, now)
+            if mapping.serves:
+                self._to_serve.append(write)
+            else:
+                self._scheduler.add_write(write)
         except FormatError as error:
             self.refuse(mapping, str(error), values)
 
@@ -154,7 +169,28 @@ class Driver:
         self._listener.written(
             WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
 
+    def _make_link(self) -> HalfDuplexMaster | FullDuplexPeer:
+        network, settings = self.network, self._settings
+        timeout, cmd_timeout = network.timeout / 1000, network.cmd_timeout / 1000
+        if network.duplex is Duplex.FULL:
+            peer_settings = PeerSettings(
+                network.checksum, network.nak_retries, network.enq_retries, timeout,
+                cmd_timeout, settings.max_outstanding)
+            return FullDuplexPeer(self.machine, peer_settings, self.stations,
+                                  self._served.serve, self._listener.happened)
+        master_settings = MasterSettings(
+            network.station, network.checksum, network.nak_retries, network.enq_retries,
+            timeout, cmd_timeout, settings.nak_on_command_timeout)
+        return HalfDuplexMaster(
+            self.machine, master_settings, self.stations, self._listener.happened)
+
     def _point(self, mapping: Mapping) -> ReadPoint:
+        if mapping.serves:
+            # Without a Period nobody expects the other end to write.
+            expected = math.inf if mapping.period is None else mapping.period / 1000
+            point = ReadPoint(mapping, expected, self._settings.stale_after * expected)
+            point.last_good = 0.0 if mapping.period is None else None
+            return point
         period = self._settings.default_period if mapping.period is None \
             else mapping.period / 1000
         stale_time = self._settings.stale_after * max(period, self.expected_scan_time)
@@ -165,6 +201,8 @@ class Driver:
 
     def next_task(self, now: float) -> Task | None:
         """Return the next command: of a write, of a job that is under way, or of a new one."""
+        while self._to_serve:
+            self._store(self._to_serve.popleft())
         write = self._scheduler.next_write(now, bool(self._under_way))
         if write is not None:
             return self._start(write.mapping.station, self._write_steps(write))
@@ -177,13 +215,22 @@ class Driver:
         """Return when the next read is due (clock value in s), None for never."""
         return self._scheduler.next_due()
 
+    def _store(self, write: Write) -> None:
+        """Put values where the other end reads them."""
+        self._served.store(write.mapping, write.values)
+        self._listener.written(write.result(Outcome.WRITTEN, '', self.machine.now))
+
+    def _serve_written(self, mapping: Mapping, words: bytes) -> None:
+        """Hand on what the other end has written to words of ours."""
+        self._update(self.points[mapping], words)
+
     def _run(self) -> Procedure:
         """Work as long as there is a port."""
         self._scheduler.drop_writes('requested while the port was not open', self.machine.now)
         self.is_online = True
         reason = 'internal error, see the log'
         try:
-            yield from self._master.run(self)
+            yield from self._link.run(self)
         except PortLost as error:
             reason = error.args[0]
             raise
@@ -196,9 +243,14 @@ class Driver:
         for task in list(self._tasks):
             task.fail(error)
         self._under_way.clear()
-        for point in self.points.values():
-            point.fail(str(error))
+        for mapping, point in self.points.items():
+            if mapping.polls:
+                point.fail(str(error))
         self._scheduler.drop_writes(str(error), self.machine.now)
+        while self._to_serve:
+            write = self._to_serve.popleft()
+            self._listener.written(
+                write.result(Outcome.NOT_SENT, str(error), self.machine.now))
 
     def _start(self, station: int, steps: Steps) -> Task:
         task = _JobTask(self, station, steps)
@@ -239,14 +291,16 @@ class Driver:
 
     def _distribute(self, job: ReadJob, data: bytes) -> None:
         for point in job.points:
-            try:
-                words = job.block.words_of(point.mapping, data)
-                values = point.update(words, self.machine.now)
-            except FormatError as error:
-                point.fail(str(error))
-            else:
-                if values is not None:
-                    self._listener.read(point.mapping, values)
+            self._update(point, job.block.words_of(point.mapping, data))
+
+    def _update(self, point: ReadPoint, words: bytes) -> None:
+        try:
+            values = point.update(words, self.machine.now)
+        except FormatError as error:
+            point.fail(str(error))
+        else:
+            if values is not None:
+                self._listener.read(point.mapping, values)
 
     def _read_failed(self, job: ReadJob, reason: str, divisible: bool) -> None:
         """Fail the points; a block with a bad address is divided until that one is alone."""
@@ -332,11 +386,3 @@ class _JobTask:
         self.sent = False
         self.command = self._driver.new_command(self._station, request)
         self._driver.advanced(self, is_done=False)
-
-
-def _master_settings(network: Network, settings: DriverSettings) -> MasterSettings:
-    return MasterSettings(
-        station=network.station, checksum=network.checksum, nak_retries=network.nak_retries,
-        enq_retries=network.enq_retries, timeout=network.timeout / 1000,
-        cmd_timeout=network.cmd_timeout / 1000,
-        nak_on_command_timeout=settings.nak_on_command_timeout)

@@ -46,6 +46,7 @@ class Command(Enum):
     READ = 'Read'
     WRITE = 'Write'
     READ_WRITE = 'ReadWrite'
+    SERVE = 'Serve'
 
 
 class Publish(Enum):
@@ -82,6 +83,16 @@ class Mapping:
     maximum: float = math.inf
 
     @property
+    def serves(self) -> bool:
+        """Tell whether the words are ours, for the PLC to read and write."""
+        return self.command is Command.SERVE
+
+    @property
+    def polls(self) -> bool:
+        """Tell whether we read the words from the PLC."""
+        return self.command in (Command.READ, Command.READ_WRITE)
+
+    @property
     def reads(self) -> bool:
         """Tell whether values are published."""
         return self.command is not Command.WRITE
@@ -100,7 +111,7 @@ class Mapping:
         """Return a column's value as text, defaults filled in."""
         limits = {'Min': self.minimum, 'Max': self.maximum}
         if column in limits:
-            return '' if math.isinf(limits[column]) else f'{limits[column]:g}'
+            return '' if math.isinf(limits[column]) else f'{limits[column]:.15g}'
         value = getattr(self, column.lower())
         return '' if value is None else str(value.value if isinstance(value, Enum) else value)
 
@@ -140,7 +151,7 @@ class _RowReader:
         if self.problems:
             return None
         name = self._name('Tag', self._row.get('Tag'))
-        topic = self._name('Topic', self._row.get('Topic') or self._row.get('Tag'))
+        topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
         command = self._choice('Command', Command, None)
         station = self._number('Station', 0, _MAX_STATION, None, Message.ERR_BAD_STATION,
                                _MAX_STATION + 1)

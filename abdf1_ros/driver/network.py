@@ -21,13 +21,14 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.driver.csv_table import read_rows, whole_number
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Message
 
 MODES = ('Master', 'Slave', 'Peer')
-SUPPORTED_MODES = ('Master',)
+SUPPORTED_MODES = ('Master', 'Peer')
 PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 
@@ -138,6 +139,11 @@ class Network:
         return Checksum(self.error_code)
 
     @property
+    def duplex(self) -> Duplex:
+        """Return the line discipline of the mode."""
+        return Duplex.FULL if self.mode == 'Peer' else Duplex.HALF
+
+    @property
     def port(self) -> str:
         """Return the device path or URL that Com_Port stands for."""
         if self.com_port.isdigit():
@@ -204,6 +210,7 @@ def _check_mode(name: str, value: int | str, where: str) -> None:
 def _check_port(name: str, value: int | str, where: str) -> None:
     text = str(value)
     named = text.startswith('/') or '://' in text
-    if name == 'com_port' and not named and not (text.isdigit() and int(text) >= 1):
+    if name == 'com_port' and not named and not (
+            text.isdigit() and (whole_number(text) or 0) >= 1):
         raise Problem(where, f'Com_Port = "{text}" should be a number from 1, a device path '
                              'such as /dev/ttyUSB0, or a URL such as socket://host:port')

@@ -30,6 +30,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import HEADER_SIZE
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.pccc.address import Address
@@ -97,10 +98,12 @@ class _Span:
 
 
 class Planner:
-    """Plan reads for a half-duplex line with this check and this time per character (s)."""
+    """Plan reads for a line with this check and this time per character (s)."""
 
-    def __init__(self, checksum: Checksum, char_time: float, default_period: float) -> None:
+    def __init__(self, checksum: Checksum, duplex: Duplex, char_time: float,
+                 default_period: float) -> None:
         self._checksum = checksum
+        self._duplex = duplex
         self._char_time = char_time
         self._default_period = default_period
 
@@ -108,7 +111,7 @@ class Planner:
         """Return the blocks that serve every mapping that reads."""
         groups = defaultdict(list)
         for mapping in mappings:
-            if mapping.reads:
+            if mapping.polls:
                 key = mapping.station, mapping.address.area, self._period(mapping)
                 groups[key].append(mapping)
         return [block for group in groups.values() for block in self._plan_area(group)]
@@ -124,9 +127,12 @@ class Planner:
         """Return the seconds that a read takes on the line, answered at the first poll."""
         command = bytes(HEADER_SIZE) + dialect.read(request.start, request.words)
         reply = bytes(HEADER_SIZE + dialect.reply_size(request.start, request.words))
-        characters = (
-            len(frames.master_frame(0, command, self._checksum)) + 2 * len(frames.ACK)
-            + len(frames.poll_frame(0)) + len(frames.message_frame(reply, self._checksum)))
+        characters = len(frames.message_frame(reply, self._checksum)) + 2 * len(frames.ACK)
+        if self._duplex is Duplex.HALF:
+            characters += len(frames.master_frame(0, command, self._checksum))
+            characters += len(frames.poll_frame(0))
+        else:
+            characters += len(frames.message_frame(command, self._checksum))
         return characters * self._char_time
 
     def _period(self, mapping: Mapping) -> float:

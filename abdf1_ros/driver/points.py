@@ -54,7 +54,7 @@ class ReadPoint:
         self.error: str | None = None
         self.failures = 0
         self._codec = mapping.codec
-        self._published: bytes | None = None
+        self._published: bytes | str | None = None
 
     def update(self, words: bytes, now: float) -> Values | None:
         """
@@ -63,9 +63,11 @@ class ReadPoint:
         Raises FormatError when the words are no value of the mapping's type.
         """
         values = self._codec.decode(words)
-        changed = words != self._published or self.error is not None
+        # Neither words nor floats: neighbours' bits are no change, and a NaN is like itself.
+        content = values if isinstance(values, str) else values.tobytes()
+        changed = content != self._published or self.error is not None
         self.last_good, self.error = now, None
-        self._published = words
+        self._published = content
         if self.mapping.publish is Publish.CHANGE and not changed:
             return None
         return values
@@ -133,6 +135,7 @@ class Write:
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
         self.mapping = mapping
         self.requested = now
+        self.values = values
         self.value = show(values)
         mapping.codec.check(values)
         _check_limits(mapping, values)
@@ -152,9 +155,13 @@ def show(values: Sequence[float] | str) -> str:
     """Return values as text for people, cut short when there are many."""
     if isinstance(values, str):
         return repr(values)
-    text = ', '.join(f'{value:g}' for value in values[:_SHOWN_VALUES])
+    text = ', '.join(map(_text, values[:_SHOWN_VALUES]))
     rest = len(values) - _SHOWN_VALUES
     return f'[{text}, and {rest} more]' if rest > 0 else f'[{text}]'
+
+
+def _text(value: float) -> str:
+    return str(value) if isinstance(value, int) else f'{value:.7g}'  # what a float32 is good for
 
 
 def _check_limits(mapping: Mapping, values: Sequence[float] | str) -> None:
@@ -162,8 +169,8 @@ def _check_limits(mapping: Mapping, values: Sequence[float] | str) -> None:
         return
     for index, value in enumerate(values):
         if not mapping.minimum <= value <= mapping.maximum:
-            raise FormatError(f'value {value:g} at index {index} is outside '
-                              f'Min {mapping.minimum:g}, Max {mapping.maximum:g}')
+            raise FormatError(f'value {_text(value)} at index {index} is outside '
+                              f'Min {mapping.minimum:.15g}, Max {mapping.maximum:.15g}')
 
 
 def _commands(mapping: Mapping, values: Sequence[float] | str) -> list[bytes]:

@@ -67,12 +67,12 @@ class DataTable:
 
     def read(self, address: Address, words: int) -> bytes:
         """Return ``words`` words."""
-        store, start = self._find(address, words)
+        store, start = self.find(address, words)
         return bytes(store[start:start + 2 * words])
 
     def write(self, address: Address, data: bytes) -> None:
         """Store whole words."""
-        store, start = self._find(address, len(data) // 2)
+        store, start = self.find(address, len(data) // 2)
         store[start:start + len(data)] = data
 
     def write_bits(self, address: Address, mask: int, bits: int) -> None:
@@ -80,7 +80,8 @@ class DataTable:
         old = int.from_bytes(self.read(address, 1), 'little')
         self.write(address, (old & ~mask | bits & mask).to_bytes(2, 'little'))
 
-    def _find(self, address: Address, words: int) -> tuple[bytearray, int]:
+    def find(self, address: Address, words: int) -> tuple[bytearray, int]:
+        """Return the bytes of the area and where in them the words begin."""
         store = self._words.get(address.area)
         if store is None:
             raise NoSuchFile(f'there is no {address}')

@@ -26,7 +26,7 @@ from typing import Protocol
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import plc5, slc, status, typed_data
+from abdf1_ros.pccc import diagnostics, plc5, slc, status, typed_data
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.fields import Reader
@@ -60,6 +60,11 @@ class Server:
 
     def __init__(self, table: DataTable) -> None:
         self._family = _FAMILIES[table.plc_type](table)
+        identity = diagnostics.identity(table.plc_type)
+        self._commands: _Commands = self._family.commands | {
+            (diagnostics.CMD, diagnostics.ECHO): Reader.rest,
+            (diagnostics.CMD, diagnostics.STATUS): lambda reader: identity,
+        }
 
     def serve(self, command: Packet) -> Packet:
         """Return the reply to ``command``; every command has one."""
@@ -72,7 +77,7 @@ class Server:
     def _execute(self, command: Packet) -> bytes:
         reader = Reader(command.data)
         try:
-            function = self._family.commands.get((command.cmd, reader.byte()))
+            function = self._commands.get((command.cmd, reader.byte()))
             if function is None:
                 raise Refusal(status.STS_ILLEGAL_COMMAND)
             return function(reader)

@@ -602,7 +602,7 @@ def test_tx_delay_passes_before_a_nak_too() -> None:
 def test_timeout_begins_when_the_last_byte_has_left() -> None:
     script = MasterScript(SETTINGS, LineTiming(char_time=0.01))
     leaving = len(SENT.data) * 0.01
-    error = script.run(COMMAND, *[SENT, Silence(leaving + 0.5)] * 3)
+    error = script.run(COMMAND, *(SENT, Silence(leaving + 0.5)) * 3)
     assert isinstance(error, StationInactive)
 
 

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hypothesis import given, strategies as st
-import pytest
-
 from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
 from abdf1_ros.errors import ConfigurationError
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
 from support.properties import PROPERTY
 
 KNOWN = ('Tag', 'Address', 'Length')

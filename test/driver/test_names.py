@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import re
 
-from hypothesis import given, strategies as st
-import pytest
-
 from abdf1_ros.driver.names import MAX_LENGTH, sanitise
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
 from support.properties import PROPERTY
 
 # What rcl accepts as a relative name (ROS.md 4.4).

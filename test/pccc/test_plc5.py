@@ -26,7 +26,8 @@ import pytest
 from support.properties import PROPERTY
 from support.vectors import commands, Vector
 
-COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {0x68: TypedRead, 0x67: TypedWrite, 0x26: ReadModifyWrite}
+COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {
+    0x68: TypedRead, 0x67: TypedWrite, 0x26: ReadModifyWrite}
 
 levels = st.integers(0, 0xFFFF)
 addresses = st.builds(SystemAddress, levels, levels, st.one_of(st.none(), levels))

@@ -223,7 +223,7 @@ def test_slc_masked_write_masks_every_word() -> None:
 
 @pytest.mark.parametrize('family', [PLC5, SLC])
 @pytest.mark.parametrize(('cmd', 'data'), [
-    (0x0F, ''), (0x0F, '00'), (0x0F, 'FF'), (0x06, '03'), (0x00, ''), (0x4F, '68'),
+    (0x0F, ''), (0x0F, '00'), (0x0F, 'FF'), (0x06, '02'), (0x00, ''), (0x4F, '68'),
     (0x0F, '68'), (0x0F, '67 00'), (0x0F, '26'), (0x0F, 'A2'), (0x0F, 'AA 02'), (0x0F, 'AB')])
 def test_what_is_no_command_of_the_family(family: PlcType, cmd: int, data: str) -> None:
     assert ask(table(family), data, cmd) == (0x10, '')
@@ -288,3 +288,19 @@ def test_refusals_leave_nothing_behind(family: PlcType, data: str,
     for _ in range(10):
         server.serve(Packet(1, 5, 0x0F, 0, 7, bytes.fromhex(data)))
     assert depths == [depths[0]] * 10
+
+
+@pytest.mark.parametrize('family', [PLC5, SLC])
+@pytest.mark.parametrize('data', ['', '10', '10 01 02 03 10 10'])
+def test_echo_gives_the_data_back(family: PlcType, data: str) -> None:
+    assert ask(table(family), f'00 {data}', 0x06) == (0, data)
+
+
+@pytest.mark.parametrize(('family', 'size', 'begin'), [
+    (PLC5, 36, '06 EB 15'), (SLC, 24, '00 EE 34 49')])
+def test_diagnostic_status_names_the_emulated_processor(
+        family: PlcType, size: int, begin: str) -> None:
+    sts, data = ask(table(family), '03', 0x06)
+    assert sts == 0
+    assert data.startswith(begin)
+    assert len(bytes.fromhex(data)) == size

@@ -32,7 +32,8 @@ import pytest
 from support.properties import PROPERTY
 from support.vectors import commands, Vector
 
-COMMANDS: dict[int, type[LogicalRead | LogicalWrite | MaskedWrite]] = {0xA2: LogicalRead, 0xAA: LogicalWrite, 0xAB: MaskedWrite}
+COMMANDS: dict[int, type[LogicalRead | LogicalWrite | MaskedWrite]] = {
+    0xA2: LogicalRead, 0xAA: LogicalWrite, 0xAB: MaskedWrite}
 
 levels = st.integers(0, 0xFFFF)
 addresses = st.builds(LogicalAddress, levels, st.integers(0, 255), levels, levels)

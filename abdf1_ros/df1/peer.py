@@ -1,0 +1,310 @@
+"""
+The full-duplex peer: both ends send commands and replies whenever they like (M 4-1..4-13).
+
+Theory of operation. The transmitter sends one message at a time and waits for its response
+(M 4-5)::
+
+    DLE ACK   delivered
+    DLE NAK   send it again, up to NAK_Retries
+    silence   DLE ENQ asks for the response again, up to ENQ_Retries
+
+The receiver answers every message at once with ACK or NAK and remembers what it answered, for
+an ENQ (M 4-7..4-9). That memory begins as NAK, and falls back to NAK with everything heard
+that was no message: an old ACK must not stand for a new message that got lost.
+
+Responses name no message. A transfer that needed a retry is therefore followed by Timeout in
+which responses that come late are passed over; they would stand for the next message.
+
+An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
+at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
+A reply that overtakes its ACK counts as one (M 4-13).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.faults import count_fault
+from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
+from abdf1_ros.df1.machine import KEEP, Machine, Procedure, Step
+from abdf1_ros.df1.packet import Packet, REPLY_BIT
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import Task, TaskSource
+from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
+from abdf1_ros.messages import Event, Message
+
+# Repeated NAKs mostly mean that the other end is out of buffers: from the second on, each
+# repetition waits this much longer (s).
+_NAK_PAUSE = 0.25
+
+# Replies that wait for their turn on the line; with more, commands are answered with NAK.
+MAX_WAITING_REPLIES = 8
+
+_MIN_RESPONSE_TIME = 0.02
+
+Hearing = Generator[Step, Symbol | None, None]
+
+
+@dataclass(frozen=True, slots=True)
+class PeerSettings:
+    """The settings of a full-duplex peer, named as in S0; times in seconds."""
+
+    checksum: Checksum = Checksum.CRC
+    nak_retries: int = 3
+    enq_retries: int = 3
+    timeout: float = 1.0
+    cmd_timeout: float = 1.0
+    max_outstanding: int = 1
+
+
+@dataclass(slots=True)
+class _Outstanding:
+    """A command that waits for its reply; ``deadline`` (clock value in s) runs from its ACK."""
+
+    task: Task
+    deadline: float | None = None
+
+
+class FullDuplexPeer:
+    """
+    Carry out tasks on the line of ``machine`` and answer the commands that come in.
+
+    ``serve`` executes a command and returns its reply; it is called once for each command,
+    never for a repetition. ``report`` is called with every numbered error and notice.
+    """
+
+    def __init__(self, machine: Machine, settings: PeerSettings, stations: ActiveStationList,
+                 serve: Callable[[Packet], Packet],
+                 report: Callable[[Event], None] = lambda event: None) -> None:
+        self._machine = machine
+        self._settings = settings
+        self._stations = stations
+        self._serve = serve
+        self._report = report
+        self._timeout = max(settings.timeout, _MIN_RESPONSE_TIME)
+        self._forget()
+
+    @property
+    def _counters(self) -> Counters:
+        return self._machine.counters
+
+    def run(self, source: TaskSource) -> Procedure:
+        """Carry out the tasks of ``source`` and serve the other end, for ever."""
+        self._forget()
+        while True:
+            self._expire()
+            if self._replies:
+                yield from self._send_reply(self._replies.popleft())
+                continue
+            task = self._next_task(source)
+            if task is not None:
+                yield from self._send_command(task)
+                continue
+            symbol = yield Step(None, self._idle_time(source))
+            if symbol is not None:
+                yield Step(self._hear(symbol), 0)
+
+    def _forget(self) -> None:
+        self._replies: deque[Packet] = deque()
+        self._outstanding: dict[tuple[int, int], _Outstanding] = {}
+        self._last_response = frames.NAK
+        self._last_key: tuple[int, int, int] | None = None
+        self._noise = 0
+        self._is_aborted = False
+
+    def _next_task(self, source: TaskSource) -> Task | None:
+        if len(self._outstanding) >= self._settings.max_outstanding:
+            return None
+        return source.next_task(self._machine.now)
+
+    def _idle_time(self, source: TaskSource) -> float | None:
+        """Return the seconds until a reply is overdue or, with room for it, a task is due."""
+        moments = [entry.deadline for entry in self._outstanding.values()]
+        if len(self._outstanding) < self._settings.max_outstanding:
+            moments.append(source.next_due())
+        known = [moment for moment in moments if moment is not None]
+        return max(0.0, min(known) - self._machine.now) if known else None
+
+    def _send_command(self, task: Task) -> Hearing:
+        number = task.command.dst
+        key = number, task.command.tns
+        entry = self._outstanding[key] = _Outstanding(task)
+        self._counters.commands_sent += 1
+        task.sent = True
+        # A station that did not answer last time gets one try, not a whole cycle of them.
+        is_delivered = yield from self._transfer(
+            task.command, lambda: key not in self._outstanding,
+            is_probe=not self._stations[number].active)
+        if is_delivered:
+            entry.deadline = self._machine.now + self._settings.cmd_timeout
+        elif self._outstanding.pop(key, None):
+            self._stations.lost(number, self._machine.now)
+            self._note(Message.ERR_INACTIVE_STATION, number, station=number)
+            task.fail(StationInactive(number))
+
+    def _send_reply(self, reply: Packet) -> Hearing:
+        self._counters.replies_sent += 1
+        self._counters.error_messages_sent += reply.sts != 0
+        yield from self._transfer(reply, lambda: False, is_probe=False)
+
+    def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
+                  is_probe: bool) -> Generator[Step, Symbol | None, bool]:
+        """Return whether the message was delivered (M 4-5, TRANSFER)."""
+        message = frames.message_frame(packet.encode(), self._settings.checksum)
+        station = packet.dst
+        naks = enqs = 0
+        sending = message
+        while True:
+            self._counters.messages_sent += sending is message
+            response = yield from self._response(sending, is_answered)
+            if response in (Code.ACK, Code.STX):
+                break
+            if response is Code.NAK:
+                naks += 1
+                self._note(Message.NTC_RCVD_NAK_SYMBOL, station=station)
+                if is_probe or naks > self._settings.nak_retries:
+                    self._counters.nak_limit_exceeded += 1
+                    self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries,
+                               station=station)
+                    break
+                self._counters.nak_retries += 1
+                self._note(Message.NTC_NAK_RETRY, naks, Message.ERR_RCVD_NAK_SYMBOL.number,
+                           station=station)
+                yield from self._listen((naks - 1) * _NAK_PAUSE)
+                sending = message
+            else:
+                enqs += 1
+                if is_probe or enqs > self._settings.enq_retries:
+                    self._counters.enq_limit_exceeded += 1
+                    self._note(Message.NTC_ENQ_LIMIT_EXCEEDED, self._settings.enq_retries,
+                               station=station)
+                    break
+                self._counters.enq_retries += 1
+                self._note(Message.NTC_ENQ_RETRY, enqs, Message.NTC_ACK_EXPECTED.number,
+                           station=station)
+                sending = frames.ENQ
+        if naks or enqs or response is Code.STX:
+            yield from self._listen(self._timeout)
+        return response in (Code.ACK, Code.STX)
+
+    def _response(self, sending: bytes,
+                  is_answered: Callable[[], bool]) -> Generator[Step, Symbol | None, Code | None]:
+        """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
+        symbol = yield Step(sending, self._timeout)
+        while symbol is not None:
+            if symbol in (Control(Code.ACK), Control(Code.NAK)):
+                assert isinstance(symbol, Control)
+                self._count_response(symbol.code)
+                return symbol.code
+            answer = self._hear(symbol)
+            if is_answered():
+                yield Step(answer, 0)
+                return Code.STX
+            symbol = yield Step(answer, KEEP)
+        self._note(Message.NTC_ACK_EXPECTED, self._machine.decoder.last_byte, station=None)
+        return None
+
+    def _listen(self, seconds: float) -> Hearing:
+        """Only receive for a while; responses that come now belong to nothing."""
+        if not seconds:
+            return
+        symbol = yield Step(b'', seconds)
+        while symbol is not None:
+            symbol = yield Step(self._hear(symbol), KEEP)
+
+    def _hear(self, symbol: Symbol) -> bytes:
+        """Return what the receiver answers to a symbol (M 4-7..4-9)."""
+        is_aborted, self._is_aborted = self._is_aborted, False
+        if isinstance(symbol, Frame):
+            return self._message(symbol)
+        if symbol == Control(Code.ENQ):
+            # What was heard since the last response was no message, or it would have had one.
+            is_clean = self._machine.decoder.noise == self._noise
+            return self._respond(self._last_response if is_clean else frames.NAK)
+        if isinstance(symbol, Control) and symbol.code in (Code.ACK, Code.NAK):
+            self._count_response(symbol.code)
+            return b''
+        self._last_response = frames.NAK
+        if isinstance(symbol, Unknown):
+            self._note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=None)
+        return self._respond(frames.NAK) if is_aborted else b''
+
+    def _message(self, frame: Frame) -> bytes:
+        """Judge a message and return the response to it."""
+        if frame.fault is not None:
+            self._report(count_fault(frame, self._settings.checksum, self._counters))
+            if frame.fault is not Fault.NO_ETX:
+                return self._respond(frames.NAK)
+            # Its sender asks with ENQ, begins anew with DLE STX, or has sent what is no
+            # symbol; only the last of these needs a NAK now (M 4-8).
+            self._last_response, self._is_aborted = frames.NAK, True
+            return b''
+        packet = Packet.decode(frame.data)
+        self._counters.messages_received += 1
+        if packet.duplicate_key == self._last_key:
+            self._counters.duplicate_messages += 1
+            self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
+            return self._respond(frames.ACK)
+        if not packet.is_reply and len(self._replies) >= MAX_WAITING_REPLIES:
+            return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
+        self._last_key = packet.duplicate_key
+        if packet.is_reply:
+            self._take_reply(packet)
+        else:
+            self._counters.commands_received += 1
+            self._replies.append(self._serve(packet))
+        return self._respond(frames.ACK)
+
+    def _take_reply(self, packet: Packet) -> None:
+        """Hand a reply to the command it belongs to."""
+        self._counters.replies_received += 1
+        self._counters.error_messages_received += packet.sts != 0
+        entry = self._outstanding.pop((packet.src, packet.tns), None)
+        if entry is None:
+            self._counters.stale_messages += 1
+            self._note(Message.ERR_WRONG_MESSAGE, packet.src, packet.dst, packet.tns,
+                       station=packet.src)
+            return
+        station = self._stations[packet.src]
+        station.last_tns = packet.tns
+        self._stations.heard(packet.src, self._machine.now)
+        expected = entry.task.command.cmd | REPLY_BIT
+        if packet.cmd != expected:
+            self._counters.invalid_messages += 1
+            details = packet.src, packet.cmd, expected
+            self._note(Message.ERR_BAD_FUNCTION_CODE, *details, station=packet.src)
+            entry.task.fail(WrongCommandCode(*details))
+            return
+        station.replies += 1
+        self._note(Message.NTC_REPLY_MSG_RCVD, packet.src, station=packet.src)
+        entry.task.reply(packet)
+
+    def _expire(self) -> None:
+        """End the commands whose reply is overdue (S0, counter 2545)."""
+        now = self._machine.now
+        overdue = [key for key, entry in self._outstanding.items()
+                   if entry.deadline is not None and entry.deadline <= now]
+        for key in overdue:
+            entry = self._outstanding.pop(key)
+            self._counters.command_timeouts += 1
+            self._note(Message.ERR_COMMAND_TIMEOUT, station=key[0])
+            entry.task.fail(CommandTimeout())
+
+    def _respond(self, response: bytes) -> bytes:
+        self._last_response = response
+        self._noise = self._machine.decoder.noise
+        self._counters.acks_sent += response == frames.ACK
+        self._counters.naks_sent += response == frames.NAK
+        return response
+
+    def _count_response(self, code: Code) -> None:
+        self._counters.acks_received += code is Code.ACK
+        self._counters.naks_received += code is Code.NAK
+
+    def _note(self, message: Message, *args: int, station: int | None) -> None:
+        self._report(Event(message, args, station))

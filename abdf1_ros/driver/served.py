@@ -1,0 +1,128 @@
+"""What we serve: the words of Serve rows, which the PLC reads and writes with commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.values import ValueType
+from abdf1_ros.errors import Problem
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.server import SERVED_FAMILIES, Server
+from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
+
+
+class _MappedTable(DataTable):
+    """A data table that has only the mapped words, and tells what is written from outside."""
+
+    def __init__(self, plc_type: PlcType) -> None:
+        super().__init__(plc_type)
+        self.changed: list[tuple[Address, int]] = []
+        self._mapped: set[Address] = set()
+
+    def create(self, address: Address, words: int) -> None:
+        """Map these words."""
+        super().create(address, words)
+        self._mapped.update(_words(address, words))
+
+    def find(self, address: Address, words: int) -> tuple[bytearray, int]:
+        """Return where the words are, if all of them are mapped."""
+        place = super().find(address, words)
+        if not self._mapped.issuperset(_words(address, words)):
+            raise OutOfRange(f'not all of {words} words at {address} are mapped')
+        return place
+
+    def write(self, address: Address, data: bytes) -> None:
+        """Store whole words and remember which."""
+        super().write(address, data)
+        self.changed.append((address, len(data) // 2))
+
+
+def _words(address: Address, words: int) -> Iterable[Address]:
+    return (address.at_offset(address.offset + n) for n in range(words))
+
+
+class Served:
+    """
+    The served mappings, and the commands that come for them.
+
+    ``on_write`` is called with a mapping and its words after the other end has written any of
+    them. All of it belongs to the link thread.
+    """
+
+    def __init__(self, plc_type: PlcType, mappings: Sequence[Mapping],
+                 on_write: Callable[[Mapping, bytes], None]) -> None:
+        self._mappings = [mapping for mapping in mappings if mapping.serves]
+        self._on_write = on_write
+        self._table = _MappedTable(plc_type)
+        for mapping in self._mappings:
+            self._table.create(_first_word(mapping), mapping.codec.words)
+        self._server = Server(self._table) if plc_type in SERVED_FAMILIES else None
+
+    def serve(self, command: Packet) -> Packet:
+        """Execute a command from outside and return its reply."""
+        if self._server is None:
+            return command.reply(sts=STS_ILLEGAL_COMMAND)
+        self._table.changed.clear()
+        reply = self._server.serve(command)
+        for mapping in self._mappings:
+            if any(_overlap(mapping, *change) for change in self._table.changed):
+                self._on_write(mapping, self.words_of(mapping))
+        return reply
+
+    def words_of(self, mapping: Mapping) -> bytes:
+        """Return the words of a mapping as they are now."""
+        return self._table.read(_first_word(mapping), mapping.codec.words)
+
+    def store(self, mapping: Mapping, values: Sequence[float] | str) -> None:
+        """Put checked values where the other end reads them."""
+        start = _first_word(mapping)
+        if mapping.type is ValueType.BOOL:
+            assert not isinstance(values, str)
+            for number, (mask, bits) in enumerate(mapping.codec.bit_changes(values)):
+                self._table.write_bits(start.at_offset(start.offset + number), mask, bits)
+        else:
+            self._table.write(start, mapping.codec.encode(values))
+
+
+def served_problems(mappings: Sequence[Mapping], network: Network,
+                    path: str) -> list[tuple[Mapping, Problem]]:
+    """Return the Serve rows that do not fit ``network`` or each other, each with its fault."""
+    found: list[tuple[Mapping, Problem]] = []
+    table = _MappedTable(PlcType(network.plc_type))
+    for mapping in mappings:
+        text = _fault(mapping, network, table) if mapping.serves else None
+        if text is not None:
+            where = f'{path}:{mapping.line}'
+            found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
+    return found
+
+
+def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:
+    if network.mode != 'Peer':
+        return f'Command Serve needs Mode Peer, the net file says {network.mode}'
+    if mapping.plc_type.value != network.plc_type:
+        return (f'a Serve row has the PLC_Type we emulate, which is {network.plc_type} '
+                'in the net file')
+    if mapping.station != network.station:
+        return f'a Serve row has our own Station, which is {network.station} in the net file'
+    try:
+        table.create(_first_word(mapping), mapping.codec.words)
+    except NoSuchFile as error:
+        return f'{mapping.address} does not fit an earlier Serve row: {error}'
+    return None
+
+
+def _first_word(mapping: Mapping) -> Address:
+    return mapping.address.at_offset(mapping.address.offset)
+
+
+def _overlap(mapping: Mapping, address: Address, words: int) -> bool:
+    if mapping.address.area != address.area:
+        return False
+    first = mapping.address.offset
+    return first < address.offset + words and address.offset < first + mapping.codec.words

@@ -1,0 +1,20 @@
+"""The diagnostic commands that every node answers: echo and diagnostic status (M 7-6, 7-9)."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.file_types import PlcType
+
+CMD = 0x06
+ECHO = 0x00
+STATUS = 0x03
+
+# Remote run, type extender and processor as M 10-3 to 10-6 lay them out. What does not exist
+# here (memory, faults, programs) is 0.
+_SLC_5_03 = bytes((0x00, 0xEE, 0x34, 0x49, 0x00)) + b'5/03'.ljust(11) + bytes((
+    0, 0, 0x06, 0, 0, 0, 0, 0xFC))
+_PLC_5_40 = bytes((0x06, 0xEB, 0x15)) + bytes(33)
+
+
+def identity(plc_type: PlcType) -> bytes:
+    """Return the diagnostic status of an emulated processor: SLC 24 bytes, PLC-5 36."""
+    return _SLC_5_03 if plc_type is PlcType.SLC else _PLC_5_40

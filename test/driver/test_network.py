@@ -1,0 +1,280 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The net CSV: ranges, defaults and the numbered texts of its errors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.driver.network import (
+    BAUD_RATES,
+    FIELDS,
+    load_network,
+    make_network,
+    Network,
+    SUPPORTED_MODES,
+)
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.messages import Severity
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+
+# Column, field, default, good values, bad values (spec/abdf1-driver.txt, network table).
+NUMBERS = [
+    ('Station', 'station', 5, ('0', '1', '254'), ('-1', '255', '1.5', 'x')),
+    ('NAK_Retries', 'nak_retries', 3, ('0', '10'), ('-1', '11', 'x')),
+    ('ENQ_Retries', 'enq_retries', 3, ('0', '10'), ('-1', '11', 'x')),
+    ('Cmd_Timeout', 'cmd_timeout', 1000, ('500', '5000'), ('499', '5001', 'x')),
+    ('Baud', 'baud', 9600, tuple(map(str, BAUD_RATES)), ('0', '9601', '300', '230400', 'x')),
+    ('Data_Bits', 'data_bits', 8, ('5', '6', '7', '8'), ('4', '9', 'x')),
+    ('Stop_Bits', 'stop_bits', 1, ('1', '2'), ('0', '3', '1.5')),
+    ('Timeout', 'timeout', 1000, ('0', '360000'), ('-1', '360001', '1 s')),
+    ('TX_Delay', 'tx_delay', 0, ('0', '65535'), ('-1', '65536', '0.5')),
+]
+CHOICES = [
+    ('Mode', 'mode', 'Master', SUPPORTED_MODES),
+    ('PLC_Type', 'plc_type', 'PLC5', ('PLC2', 'PLC3', 'PLC5', 'SLC')),
+    ('Error_Code', 'error_code', 'CRC', ('BCC', 'CRC')),
+    ('Parity', 'parity', 'None', ('None', 'Even', 'Odd')),
+    ('Handshake', 'handshake', 'No', ('Yes', 'No')),
+]
+COLUMNS = [entry[0] for entry in NUMBERS + CHOICES] + ['Com_Port']
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / 'net.csv'
+
+
+def load(path: Path, header: str, row: str) -> Network:
+    path.write_text(f'{header}\n{row}\n', encoding='utf-8')
+    return load_network(str(path))
+
+
+def faults(path: Path, header: str, row: str) -> list[str]:
+    with pytest.raises(ConfigurationError) as caught:
+        load(path, header, row)
+    return [str(problem).replace(str(path), 'FILE') for problem in caught.value.problems]
+
+
+def test_columns_are_those_of_the_specification() -> None:
+    assert [entry.column for entry in FIELDS.values()] == [
+        'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
+        'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
+        'TX_Delay', 'Handshake']
+
+
+def test_defaults() -> None:
+    network = Network()
+    for _, field, default, *_ in NUMBERS + CHOICES:
+        assert getattr(network, field) == default, field
+        assert FIELDS[field].default == default
+    assert network.com_port == '1'
+
+
+@pytest.mark.parametrize('column', COLUMNS)
+def test_empty_cell_and_missing_column_take_the_default(path: Path, column: str) -> None:
+    other = 'Baud' if column == 'Station' else 'Station'
+    value = {'Station': '7', 'Baud': '1200'}[other]
+    expected = make_network({other.lower(): (value, '')})
+    assert load(path, f'{column},{other}', f',{value}') == expected
+    assert load(path, other, value) == expected
+
+
+@pytest.mark.parametrize('column, field, text', [
+    (column, field, text) for column, field, _, good, _ in NUMBERS for text in good])
+def test_number_in_its_range(path: Path, column: str, field: str, text: str) -> None:
+    assert getattr(load(path, column, text), field) == int(text)
+
+
+@pytest.mark.parametrize('column, text', [
+    (column, text) for column, _, _, _, bad in NUMBERS for text in bad])
+def test_number_out_of_its_range(path: Path, column: str, text: str) -> None:
+    fault, = faults(path, f'Handshake,{column}', f'No,{text}')
+    assert fault.startswith(f'FILE:2:2 ({column}): ')
+    assert f'{column} = "{text}" should be ' in fault
+
+
+@pytest.mark.parametrize('column, field, text', [
+    (column, field, text) for column, field, _, good in CHOICES for text in good])
+def test_choice_in_any_letter_case(path: Path, column: str, field: str, text: str) -> None:
+    for written in (text, text.lower(), text.upper()):
+        assert getattr(load(path, column, written), field) == text
+
+
+@pytest.mark.parametrize('column, field, default, good', CHOICES)
+def test_choice_that_is_none(
+        path: Path, column: str, field: str, default: str, good: tuple[str, ...]) -> None:
+    fault, = faults(path, column, 'Mars')
+    assert fault.startswith(f'FILE:2:1 ({column}): ')
+    assert f'{column} = "Mars" should be one of ' in fault
+    assert all(choice in fault for choice in good)
+
+
+@pytest.mark.parametrize('column, text, expected', [
+    ('Station', '255',
+     '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
+     'Station = "255" should be a whole number from 0 to 254'),
+    ('Station', 'abc',
+     '2552 CRT_BAD_STATION_ID: Invalid station number (abc) must be less than 255; '
+     'Station = "abc" should be a whole number from 0 to 254'),
+    ('Mode', 'Boss',
+     '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Boss), should be one of Master, Slave, or '
+     'Peer; Mode = "Boss" should be one of Master, Slave, Peer'),
+    ('PLC_Type', 'PLC4',
+     '2555 CRT_BAD_PLC_TYPE: Invalid or Unsupported PLC Type (PLC4) should be one of PLC2, '
+     'PLC3, PLC5, SLC; PLC_Type = "PLC4" should be one of PLC2, PLC3, PLC5, SLC'),
+    ('Error_Code', 'XOR',
+     '2556 CRT_BAD_ERROR_CODE: Invalid Error Code (XOR), should be either BCC, or CRC; '
+     'Error_Code = "XOR" should be one of BCC, CRC'),
+    ('NAK_Retries', '11',
+     '2557 CRT_BAD_NAK_RETRIES: Invalid NAK Retries (11) should be in range [0, 10]; '
+     'NAK_Retries = "11" should be a whole number from 0 to 10'),
+    ('ENQ_Retries', '-1',
+     '2558 CRT_BAD_ENQ_RETRIES: Invalid ENQ Retries (-1) should be in range [0, 10]; '
+     'ENQ_Retries = "-1" should be a whole number from 0 to 10'),
+    ('Cmd_Timeout', '499',
+     '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (499) should be in range [500, 5000]; '
+     'Cmd_Timeout = "499" should be a whole number from 500 to 5000'),
+    ('Baud', '9601',
+     'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200'),
+    ('Data_Bits', '9', 'Data_Bits = "9" should be a whole number from 5 to 8'),
+    ('Parity', 'Mark', 'Parity = "Mark" should be one of None, Even, Odd'),
+    ('Com_Port', 'COM1',
+     'Com_Port = "COM1" should be a number from 1, a device path such as /dev/ttyUSB0, or a '
+     'URL such as socket://host:port'),
+])
+def test_exact_text(path: Path, column: str, text: str, expected: str) -> None:
+    assert faults(path, column, text) == [f'FILE:2:1 ({column}): {expected}']
+
+
+@pytest.mark.parametrize('mode, number', [('Slave', 1), ('peer', 2)])
+def test_mode_that_this_version_does_not_have(
+        path: Path, monkeypatch: pytest.MonkeyPatch, mode: str, number: int) -> None:
+    monkeypatch.setattr('abdf1_ros.driver.network.SUPPORTED_MODES', ('Master',))
+    assert faults(path, 'Mode', mode) == [
+        f'FILE:2:1 (Mode): 2554 CRT_UNSUPPORTED_MODE: Unsupported Driver Mode ({number}), '
+        f'Supported Mode(s): Master; Mode = "{mode.title()}" is not available yet']
+
+
+def test_every_numbered_fault_is_critical(path: Path) -> None:
+    row = ','.join(['300', 'Boss', 'PLC4', 'XOR', '11', '11', '1'])
+    header = 'Station,Mode,PLC_Type,Error_Code,NAK_Retries,ENQ_Retries,Cmd_Timeout'
+    with pytest.raises(ConfigurationError) as caught:
+        load(path, header, row)
+    messages = [problem.message for problem in caught.value.problems]
+    assert all(message and message.severity is Severity.CRITICAL for message in messages)
+    assert [message and message.number for message in messages] == [
+        2552, 2553, 2555, 2556, 2557, 2558, 2559]
+
+
+def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
+    header = 'Baud,Station,Com_Port,Parity,Timeout'
+    path.write_text(f'# a comment\n\n{header}\n\n1,999,x,y,-5\n', encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        load_network(str(path))
+    assert sorted(problem.where for problem in caught.value.problems) == [
+        f'{path}:5:{cell} ({column})' for cell, column in enumerate(header.split(','), 1)]
+
+
+@pytest.mark.parametrize('column, field, default, good', CHOICES)
+def test_parameter_name_is_the_column_in_lower_case(
+        column: str, field: str, default: str, good: tuple[str, ...]) -> None:
+    assert FIELDS[field].parameter == f'net.{column.lower()}'
+
+
+@pytest.mark.parametrize('text, port', [
+    ('1', '/dev/ttyS0'), ('8', '/dev/ttyS7'), ('32', '/dev/ttyS31'),
+    ('/dev/ttyUSB0', '/dev/ttyUSB0'),
+    ('/dev/serial/by-id/usb-FTDI_x-if00', '/dev/serial/by-id/usb-FTDI_x-if00'),
+    ('socket://10.0.0.7:4001', 'socket://10.0.0.7:4001'),
+    ('rfc2217://host:2217', 'rfc2217://host:2217')])
+def test_com_port(path: Path, text: str, port: str) -> None:
+    assert load(path, 'Com_Port', text).port == port
+
+
+@pytest.mark.parametrize('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³'])
+def test_bad_com_port(path: Path, text: str) -> None:
+    fault, = faults(path, 'Com_Port', text)
+    assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')
+
+
+def test_checksum() -> None:
+    assert Network().checksum is Checksum.CRC
+    assert Network(error_code='BCC').checksum is Checksum.BCC
+
+
+@pytest.mark.parametrize('options, bits', [
+    ({}, 10), ({'parity': 'Even'}, 11), ({'parity': 'Odd', 'stop_bits': 2}, 12),
+    ({'data_bits': 7}, 9), ({'data_bits': 5, 'stop_bits': 2}, 8)])
+def test_character_time_counts_start_parity_and_stop_bits(
+        options: dict[str, int | str], bits: int) -> None:
+    network = make_network({name: (str(value), name) for name, value in options.items()})
+    assert network.timing.char_time == pytest.approx(bits / 9600)
+
+
+def test_character_time_and_delay_are_in_seconds() -> None:
+    timing = Network(baud=19200, tx_delay=40).timing
+    assert timing.char_time == pytest.approx(10 / 19200)
+    assert timing.tx_delay == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize('content, text', [
+    ('Station\n', ': a net file has one data row, this one has 0'),
+    ('Station\n1\n\n2\n', ':4: a net file has one data row, this one has 2'),
+    ('Station\n1\n2\n3\n', ':3: a net file has one data row, this one has 3')])
+def test_number_of_rows(path: Path, content: str, text: str) -> None:
+    path.write_text(content, encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        load_network(str(path))
+    assert str(caught.value) == f'{path}{text}'
+
+
+def test_overrides_keep_the_rest_of_the_base() -> None:
+    base = Network(station=9, baud=1200)
+    changed = make_network({'baud': ('57600', 'net.baud'), 'mode': ('master', 'net.mode')}, base)
+    assert changed == Network(station=9, baud=57600)
+    assert base.baud == 1200
+    assert make_network({}, base) == base
+
+
+def test_fault_of_an_override_names_the_parameter() -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        make_network({'baud': ('1', 'net.baud'), 'station': ('-1', 'net.station')})
+    assert [str(problem) for problem in caught.value.problems] == [
+        'net.baud: Baud = "1" should be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, '
+        '115200',
+        'net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (-1) must be less than '
+        '255; Station = "-1" should be a whole number from 0 to 254']
+
+
+@PROPERTY
+@given(st.sampled_from(sorted(FIELDS)), st.text(max_size=8))
+def test_any_text_gives_a_network_or_a_configuration_error(name: str, text: str) -> None:
+    try:
+        network = make_network({name: (text, 'here')})
+    except ConfigurationError as error:
+        assert str(error).startswith('here: ')
+    else:
+        assert network.port.startswith('/') or '://' in network.port
+        assert network.timing.char_time > 0
+
+
+def test_shipped_file_is_good() -> None:
+    path = Path(__file__).resolve().parent.parent.parent / 'config' / 'net.csv'
+    assert load_network(str(path)).baud == 19200

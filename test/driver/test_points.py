@@ -1,0 +1,286 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Points and writes: what is published, how fresh it is, and the bytes of a write."""
+
+from __future__ import annotations
+
+from array import array
+
+from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, show, Write
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.server import Server
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.driver_bench import simulated_plc, stored
+from support.mappings import make_mapping
+from support.properties import PROPERTY
+
+
+def point(publish: str = 'Always', **cells: str) -> ReadPoint:
+    return ReadPoint(make_mapping(publish=publish, **cells), 0.1, 0.6)
+
+
+def test_value_is_waited_for_at_first() -> None:
+    new = point()
+    assert new.freshness(0.0) is new.freshness(1e9) is Freshness.WAITING
+    assert new.age(5.0) is None
+
+
+@pytest.mark.parametrize('age, freshness', [
+    (0.0, Freshness.FRESH), (0.29, Freshness.FRESH), (0.31, Freshness.LATE),
+    (0.6, Freshness.LATE), (0.61, Freshness.STALE), (1e6, Freshness.STALE)])
+def test_value_ages(age: float, freshness: Freshness) -> None:
+    fresh = point()
+    fresh.update(b'\1\0', 0.0)
+    assert fresh.freshness(age) is freshness
+    assert fresh.age(age) == age
+
+
+def test_value_is_late_after_one_and_a_half_periods_where_periods_are_long() -> None:
+    slow = ReadPoint(make_mapping(), 10.0, 30.0)
+    slow.update(b'\1\0', 0.0)
+    assert slow.freshness(14.9) is Freshness.FRESH
+    assert slow.freshness(15.1) is Freshness.LATE
+    assert slow.freshness(30.1) is Freshness.STALE
+
+
+def test_failure_outweighs_age_and_ends_with_the_next_good_read() -> None:
+    failing = point()
+    failing.fail('before the first')
+    assert failing.freshness(0.0) is Freshness.FAILED
+    failing.update(b'\1\0', 1.0)
+    assert (failing.freshness(1.0), failing.error) == (Freshness.FRESH, None)
+    failing.fail('again')
+    assert failing.freshness(1.0) is Freshness.FAILED
+    assert (failing.failures, failing.error, failing.age(1.5)) == (2, 'again', 0.5)
+
+
+def test_every_read_is_published() -> None:
+    always = point()
+    assert [always.update(words, 0.0) for words in (b'\1\0', b'\1\0', b'\2\0')] == [
+        array('h', [1]), array('h', [1]), array('h', [2])]
+
+
+def test_only_changes_are_published() -> None:
+    changing = point('Change')
+    assert changing.update(b'\1\0', 0.0) == array('h', [1])
+    assert changing.update(b'\1\0', 1.0) is None
+    assert changing.last_good == 1.0
+    assert changing.update(b'\2\0', 2.0) == array('h', [2])
+    assert changing.update(b'\1\0', 3.0) == array('h', [1])
+
+
+def test_first_good_read_after_an_outage_is_published_though_nothing_changed() -> None:
+    changing = point('Change')
+    changing.update(b'\1\0', 0.0)
+    changing.fail('cable')
+    assert changing.update(b'\1\0', 1.0) == array('h', [1])
+    assert changing.update(b'\1\0', 2.0) is None
+
+
+def test_words_that_are_no_value_are_not_published_and_do_not_count_as_the_last() -> None:
+    digits = ReadPoint(make_mapping(kind='bcd16', publish='Change'), 0.1, 0.6)
+    digits.update(b'\x12\0', 0.0)
+    with pytest.raises(FormatError):
+        digits.update(b'\x1a\0', 1.0)
+    assert digits.last_good == 0.0
+    digits.fail('no BCD')
+    assert digits.update(b'\x12\0', 2.0) == array('H', [12])
+
+
+def test_bits_that_are_not_ours_are_not_a_change_of_value() -> None:
+    bits = point('Change', text='B3:0/4')
+    assert bits.update(b'\x10\0', 0.0) == array('B', [1])
+    assert bits.update(b'\x11\xff', 1.0) is None
+
+
+def commands(text: str, values: list[float] | str, plc: str = 'PLC5', length: int = 1,
+             kind: str | None = None) -> list[str]:
+    mapping = make_mapping(text, 'Write', plc=plc, length=length, kind=kind)
+    return [command.hex(' ') for command in Write(mapping, values, 0.0).commands]
+
+
+@pytest.mark.parametrize('plc, text, length, values, expected', [
+    # Typed write: FNC 67, offset, total, address 07 area file element, descriptor, data.
+    ('PLC5', 'N7:3', 1, [0x1234], ['67 00 00 01 00 07 00 07 03 93 09 42 34 12']),
+    ('PLC5', 'N7:300', 2, [1, -1],
+     ['67 00 00 02 00 07 00 07 ff 2c 01 95 09 42 01 00 ff ff']),
+    ('PLC5', 'F8:1', 1, [1.5], ['67 00 00 01 00 07 00 08 01 96 09 94 08 00 00 c0 3f']),
+    # Protected typed logical write: FNC AA, size, file, type, element, sub-element, data.
+    ('SLC', 'N7:3', 2, [1, -1], ['aa 04 07 89 03 00 01 00 ff ff']),
+    ('SLC', 'F8:4', 1, [1.5], ['aa 04 08 8a 04 00 00 00 c0 3f']),
+    ('SLC', 'L10:2', 1, [-2], ['aa 04 0a 91 02 00 fe ff ff ff']),
+    ('SLC', 'I:1.2', 1, [7], ['aa 02 01 8c 01 02 07 00']),
+    ('SLC', 'O:3.0', 1, [7], ['aa 02 00 8b 03 00 07 00']),
+])
+def test_bytes_of_a_write_of_words(
+        plc: str, text: str, length: int, values: list[float], expected: list[str]) -> None:
+    assert commands(text, values, plc, length) == expected
+
+
+@pytest.mark.parametrize('text, length, values, expected', [
+    # FNC 26, address, AND mask, OR mask.
+    ('B3:1/5', 1, [1], ['26 07 00 03 01 df ff 20 00']),
+    ('B3:1/5', 1, [0], ['26 07 00 03 01 df ff 00 00']),
+    ('N7:0/4', 3, [1, 0, 1], ['26 07 00 07 00 8f ff 50 00']),
+    ('B3:0/14', 4, [1, 1, 0, 1],
+     ['26 07 00 03 00 ff 3f 00 c0', '26 07 00 03 01 fc ff 02 00']),
+    ('I:017/12', 1, [1], ['26 07 00 01 0f ff fb 00 04']),
+    ('T4:7/DN', 1, [1], ['26 0f 00 04 07 00 ff df 00 20']),
+])
+def test_bits_of_a_plc5_are_a_read_modify_write(
+        text: str, length: int, values: list[float], expected: list[str]) -> None:
+    assert commands(text, values, 'PLC5', length) == expected
+
+
+@pytest.mark.parametrize('text, length, values, expected', [
+    # FNC AB, size, file, type, element, sub-element, mask, bits.
+    ('B3:1/5', 1, [1], ['ab 02 03 85 01 00 20 00 20 00']),
+    ('B3:1/5', 1, [0], ['ab 02 03 85 01 00 20 00 00 00']),
+    ('B3:0/14', 4, [1, 1, 0, 1],
+     ['ab 02 03 85 00 00 00 c0 00 c0', 'ab 02 03 85 01 00 03 00 02 00']),
+    ('I:1.2/3', 1, [1], ['ab 02 01 8c 01 02 08 00 08 00']),
+    ('T4:7/DN', 1, [0], ['ab 02 04 86 07 00 00 20 00 00']),
+])
+def test_bits_of_an_slc_are_a_masked_write(
+        text: str, length: int, values: list[float], expected: list[str]) -> None:
+    assert commands(text, values, 'SLC', length) == expected
+
+
+def test_members_of_a_structure_are_written_one_by_one() -> None:
+    assert commands('T4:2.PRE', [5, 6], 'SLC', 2) == [
+        'aa 02 04 86 02 01 05 00', 'aa 02 04 86 02 02 06 00']
+    first, second = commands('T4:2.PRE', [5, 6], 'PLC5', 2)
+    assert first == '67 00 00 01 00 0f 00 04 02 01 93 09 42 05 00'
+    assert second == '67 00 00 01 00 0f 00 04 02 02 93 09 42 06 00'
+
+
+@pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 117)])
+def test_long_write_is_divided_at_the_limit_of_a_packet(plc: str, limit: int) -> None:
+    assert len(commands('N7:0', [0] * limit, plc, limit)) == 1
+    assert len(commands('N7:0', [0] * (limit + 1), plc, limit + 1)) == 2
+
+
+@pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('text, length, kind, natural', [
+    ('N7:0', 250, None, -5), ('F8:0', 120, None, 0.5), ('N7:1', 60, 'int32', 70000),
+    ('D9:3', 10, 'bcd16', 1234), ('N7:7', 3, 'uint16', 40000), ('T4:1.PRE', 2, None, 9),
+    ('B3:0/3', 40, None, 1)])
+def test_plc_holds_what_was_written_and_nothing_else_changes(
+        plc: str, text: str, length: int, kind: str | None, natural: float) -> None:
+    mapping = make_mapping(text, 'Write', plc=plc, length=length, kind=kind)
+    machine = simulated_plc(1, plc, lambda: 0.0, (text, 300))
+    whole = 2 * (mapping.address.offset + 300)
+    values = [natural if n % 2 else 0 for n in range(length)]
+    _serve_all(machine.table, Write(mapping, values, 0.0))
+    codec = mapping.codec
+    words = machine.table.read(mapping.address, codec.words)
+    assert list(codec.decode(words)) == values
+    everything = machine.table.read(mapping.address.at_offset(0), whole // 2)
+    at = 2 * mapping.address.offset
+    outside = everything[:at] + everything[at + 2 * codec.words:]
+    assert not any(outside)
+
+
+def _serve_all(table: DataTable, write: Write) -> None:
+    from abdf1_ros.df1.packet import Packet
+
+    for number, data in enumerate(write.commands):
+        cmd = DIALECTS[table.plc_type].cmd
+        assert Server(table).serve(Packet(1, 5, cmd, 0, number, data)).sts == 0
+
+
+def test_string_is_written_whole() -> None:
+    machine = simulated_plc(1, 'SLC', lambda: 0.0, ('ST9:0', 84))
+    mapping = make_mapping('ST9:1', 'Write', plc='SLC')
+    _serve_all(machine.table, Write(mapping, 'Hello', 0.0))
+    assert stored(machine, 'ST9:1', 4) == b'\5\0eHll\0o'
+    assert not any(stored(machine, 'ST9:0', 42))
+
+
+@PROPERTY
+@given(st.sampled_from(list(DIALECTS)), st.integers(0, 15), st.integers(1, 40),
+       st.data())
+def test_bit_writes_touch_only_their_bits(
+        plc_type: PlcType, bit: int, length: int, data: st.DataObject) -> None:
+    values = data.draw(st.lists(st.integers(0, 1), min_size=length, max_size=length))
+    mapping = make_mapping(f'B3:1/{bit}', 'Write', plc=plc_type.value, length=length)
+    before = data.draw(st.binary(min_size=12, max_size=12))
+    machine = simulated_plc(1, plc_type.value, lambda: 0.0, ('B3:0', 6))
+    start = mapping.address.at_offset(0)
+    machine.table.write(start, before)
+    _serve_all(machine.table, Write(mapping, values, 0.0))
+    after = int.from_bytes(machine.table.read(start, 6), 'little')
+    mask = (1 << length) - 1 << 16 + bit
+    assert after & ~mask == int.from_bytes(before, 'little') & ~mask
+    assert [after >> 16 + bit + n & 1 for n in range(length)] == values
+
+
+@pytest.mark.parametrize('values, error', [
+    ([11, 20], None), ([10, 20], None), ([10, 21], 'value 21 at index 1 is outside Min 10, '
+                                                   'Max 20'),
+    ([9, 20], 'value 9 at index 0 is outside Min 10, Max 20'),
+    ([1], '1 values, the mapping has 2'),
+    ([40000, 0], 'value 40000 at index 0 is no int16')])
+def test_limits_hold_for_every_element(values: list[float], error: str | None) -> None:
+    mapping = make_mapping(command='Write', length=2, minimum=10, maximum=20)
+    if error is None:
+        Write(mapping, values, 0.0)
+        return
+    with pytest.raises(FormatError) as caught:
+        Write(mapping, values, 0.0)
+    assert str(caught.value) == error
+
+
+def test_one_limit_alone() -> None:
+    low = make_mapping(command='Write', minimum=0)
+    Write(low, [32767], 0.0)
+    with pytest.raises(FormatError, match='^value -1 at index 0 is outside Min 0, Max inf$'):
+        Write(low, [-1], 0.0)
+
+
+def test_limit_in_the_message_is_the_limit_of_the_file() -> None:
+    mapping = make_mapping('L10:0', 'Write', plc='SLC', maximum=1234567)
+    with pytest.raises(FormatError,
+                       match='^value 1234568 at index 0 is outside Min -inf, Max 1234567$'):
+        Write(mapping, [1234568], 0.0)
+
+
+@pytest.mark.parametrize('text, pulse', [
+    ('B3:0/1', True), ('T4:0/DN', True), ('N7:0', False), ('B3:0', False), ('F8:0', False)])
+def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
+    assert Write(make_mapping(text, 'Write'), [1], 0.0).is_pulse is pulse
+
+
+def test_result_of_a_write() -> None:
+    write = Write(make_mapping(command='Write', length=2), [1, -2], 10.0)
+    result = write.result(Outcome.UNKNOWN, 'no reply', 12.5)
+    assert (result.value, result.latency, result.mapping) == ('[1, -2]', 2.5, write.mapping)
+    assert str(result) == 'unknown whether written: no reply'
+    assert str(write.result(Outcome.WRITTEN, '', 10.5)) == 'written'
+
+
+@pytest.mark.parametrize('values, text', [
+    ([1, 0, 1], '[1, 0, 1]'), ([], '[]'), ("it's", '"it\'s"'), ([0.1, -2.5], '[0.1, -2.5]'),
+    (array('f', [0.1]), '[0.1]'), ([1234567, -2147483648], '[1234567, -2147483648]'),
+    ([4294967295], '[4294967295]'), (array('f', [1234567, 0.3]), '[1234567, 0.3]'),
+    (list(range(16)), str(list(range(16)))),
+    (list(range(18)), str(list(range(16)))[:-1] + ', and 2 more]')])
+def test_values_as_text(values: list[float] | str, text: str) -> None:
+    assert show(values) == text

@@ -1,0 +1,223 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Values become words and words become values."""
+
+from __future__ import annotations
+
+from array import array
+import math
+import struct
+from typing import Any
+
+from abdf1_ros.driver.values import Codec, types_of, ValueType
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.file_types import FileType
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+
+_NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
+    ValueType.BOOL: st.integers(0, 1),
+    ValueType.INT16: st.integers(-32768, 32767),
+    ValueType.UINT16: st.integers(0, 65535),
+    ValueType.INT32: st.integers(-2**31, 2**31 - 1),
+    ValueType.UINT32: st.integers(0, 2**32 - 1),
+    ValueType.FLOAT32: st.floats(width=32, allow_nan=False, allow_infinity=False),
+    ValueType.BCD16: st.integers(0, 9999),
+}
+_WORD_TYPES = [kind for kind in _NUMBERS if kind is not ValueType.BOOL]
+
+
+@pytest.mark.parametrize('kind', _WORD_TYPES)
+def test_values_survive_a_round_trip(kind: ValueType) -> None:
+    @PROPERTY
+    @given(st.lists(_NUMBERS[kind], min_size=1, max_size=20))
+    def check(values: list[float]) -> None:
+        codec = Codec(kind, len(values))
+        codec.check(values)
+        words = codec.encode(values)
+        assert len(words) == 2 * codec.words
+        decoded = codec.decode(words)
+        assert decoded == array(kind.array_code, values)
+        assert decoded.typecode == kind.array_code
+    check()
+
+
+@PROPERTY
+@given(st.lists(st.integers(0, 1), min_size=1, max_size=50), st.integers(0, 15),
+       st.binary(min_size=8, max_size=8))
+def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
+        values: list[int], bit: int, words: bytes) -> None:
+    codec = Codec(ValueType.BOOL, len(values), bit)
+    before = int.from_bytes(words[:2 * codec.words], 'little')
+    changes = codec.bit_changes(values)
+    assert len(changes) == codec.words
+    after = before
+    for number, (mask, bits) in enumerate(changes):
+        after = after & ~(mask << 16 * number) | (bits & mask) << 16 * number
+        assert bits & ~mask == 0
+    ours = (1 << len(values)) - 1 << bit
+    assert after & ~ours == before & ~ours
+    decoded = codec.decode(after.to_bytes(2 * codec.words, 'little'))
+    assert decoded == array('B', values)
+
+
+@PROPERTY
+@given(st.text(st.characters(max_codepoint=255), max_size=82))
+def test_strings_survive_a_round_trip(text: str) -> None:
+    codec = Codec(ValueType.STRING, 1)
+    codec.check(text)
+    words = codec.encode(text)
+    assert len(words) == 84 == 2 * codec.words
+    assert codec.decode(words) == text
+
+
+@pytest.mark.parametrize('kind', list(ValueType))
+def test_any_words_give_values_or_a_format_error(kind: ValueType) -> None:
+    @PROPERTY
+    @given(st.integers(1, 5), st.integers(0, 15), st.data())
+    def check(length: int, bit: int, data: st.DataObject) -> None:
+        codec = Codec(kind, 1 if kind is ValueType.STRING else length, bit)
+        words = data.draw(st.binary(min_size=2 * codec.words, max_size=2 * codec.words))
+        try:
+            values = codec.decode(words)
+        except FormatError:
+            assert kind in (ValueType.BCD16, ValueType.STRING)
+        else:
+            assert kind is ValueType.STRING or len(values) == length
+    check()
+
+
+@pytest.mark.parametrize('kind, words, values', [
+    (ValueType.INT16, '01 00 ff ff 00 80', [1, -1, -32768]),
+    (ValueType.UINT16, '01 00 ff ff 34 12', [1, 65535, 0x1234]),
+    (ValueType.BCD16, '34 12 99 99', [1234, 9999]),
+    (ValueType.INT32, '02 00 01 00 ff ff ff ff', [0x10002, -1]),  # low word first
+    (ValueType.UINT32, '02 00 01 00 ff ff ff ff', [0x10002, 2**32 - 1]),
+    (ValueType.FLOAT32, '00 00 c0 3f 00 00 20 c1', [1.5, -10.0]),
+])
+def test_order_of_bytes_and_words(kind: ValueType, words: str, values: list[float]) -> None:
+    codec = Codec(kind, len(values))
+    assert list(codec.decode(bytes.fromhex(words))) == values
+    assert codec.encode(values) == bytes.fromhex(words)
+
+
+def test_infinity_and_nan_that_a_plc_holds_are_passed_on() -> None:
+    words = struct.pack('<3f', math.inf, -math.inf, math.nan)
+    values = Codec(ValueType.FLOAT32, 3).decode(words)
+    assert (values[0], values[1]) == (math.inf, -math.inf)
+    assert math.isnan(values[2])
+
+
+@pytest.mark.parametrize('word, text', [
+    ('0a 00', 'word 000A is not BCD'), ('00 a0', 'word A000 is not BCD'),
+    ('f0 12', 'word 12F0 is not BCD')])
+def test_word_that_is_not_bcd(word: str, text: str) -> None:
+    with pytest.raises(FormatError, match=f'^{text}$'):
+        Codec(ValueType.BCD16, 2).decode(bytes.fromhex('34 12' + word))
+
+
+@pytest.mark.parametrize('words, text', [
+    ('05 00', '\0' * 5), ('00 00', ''),
+    ('03 00 62 61 00 63', 'abc'),  # the first character is the high byte of the first word
+    ('04 00 62 61 64 63', 'abcd'),
+    ('01 00 62 61 64 63', 'a'), ('01 00 00 e4', 'ä')])
+def test_string_of_a_plc(words: str, text: str) -> None:
+    data = bytes.fromhex(words).ljust(84, b'\0')
+    assert Codec(ValueType.STRING, 1).decode(data) == text
+
+
+@pytest.mark.parametrize('text, words', [
+    ('', '00 00 00 00'), ('a', '01 00 00 61'), ('abc', '03 00 62 61 00 63')])
+def test_string_for_a_plc(text: str, words: str) -> None:
+    assert Codec(ValueType.STRING, 1).encode(text) == bytes.fromhex(words).ljust(84, b'\0')
+
+
+def test_string_length_that_no_plc_has() -> None:
+    with pytest.raises(FormatError, match='^string length 83 is more than 82$'):
+        Codec(ValueType.STRING, 1).decode(b'\x53\0' + bytes(82))
+    assert len(Codec(ValueType.STRING, 1).decode(b'\x52\0' + bytes(82))) == 82
+
+
+@pytest.mark.parametrize('text, error', [
+    ('x' * 83, '83 characters, a PLC string has 82'),
+    ('5 \u20ac', "character '\u20ac' does not exist in a PLC")])
+def test_string_that_cannot_be_written(text: str, error: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        Codec(ValueType.STRING, 1).check(text)
+    assert str(caught.value) == error
+
+
+@pytest.mark.parametrize('kind, values, error', [
+    (ValueType.INT16, [1], '1 values, the mapping has 2'),
+    (ValueType.INT16, [1, 2, 3], '3 values, the mapping has 2'),
+    (ValueType.INT16, [], '0 values, the mapping has 2'),
+    (ValueType.INT16, [0, 32768], 'value 32768 at index 1 is no int16'),
+    (ValueType.INT16, [-32769, 0], 'value -32769 at index 0 is no int16'),
+    (ValueType.UINT16, [0, -1], 'value -1 at index 1 is no uint16'),
+    (ValueType.UINT16, [65536, 0], 'value 65536 at index 0 is no uint16'),
+    (ValueType.BCD16, [0, 10000], 'value 10000 at index 1 is no bcd16'),
+    (ValueType.BCD16, [-1, 0], 'value -1 at index 0 is no bcd16'),
+    (ValueType.INT32, [2**31, 0], 'value 2147483648 at index 0 is no int32'),
+    (ValueType.UINT32, [0, 2**32], 'value 4294967296 at index 1 is no uint32'),
+    (ValueType.BOOL, [0, 2], 'value 2 at index 1 is no bool'),
+    (ValueType.BOOL, [0, 255], 'value 255 at index 1 is no bool'),
+    (ValueType.FLOAT32, [0.0, math.nan], 'value nan at index 1 is no float32'),
+    (ValueType.FLOAT32, [math.inf, 0.0], 'value inf at index 0 is no float32'),
+    (ValueType.FLOAT32, [-math.inf, 0.0], 'value -inf at index 0 is no float32'),
+    (ValueType.FLOAT32, [0.0, 3.5e38], 'value 3.5e+38 at index 1 is no float32'),
+    (ValueType.INT16, [math.nan, 0], 'value nan at index 0 is no int16'),
+])
+def test_values_that_cannot_be_written(
+        kind: ValueType, values: list[float], error: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        Codec(kind, 2).check(values)
+    assert str(caught.value) == error
+
+
+@pytest.mark.parametrize('kind', list(_NUMBERS))
+def test_both_ends_of_the_range_can_be_written(kind: ValueType) -> None:
+    low, high = kind.range
+    codec = Codec(kind, 2)
+    codec.check([low, high])
+    if kind is not ValueType.BOOL:
+        assert list(codec.decode(codec.encode([low, high]))) == [low, high]
+
+
+@pytest.mark.parametrize('kind, length, bit, words', [
+    (ValueType.BOOL, 1, 0, 1), (ValueType.BOOL, 16, 0, 1), (ValueType.BOOL, 17, 0, 2),
+    (ValueType.BOOL, 1, 15, 1), (ValueType.BOOL, 2, 15, 2), (ValueType.BOOL, 33, 15, 3),
+    (ValueType.INT16, 7, 0, 7), (ValueType.BCD16, 7, 0, 7), (ValueType.INT32, 7, 0, 14),
+    (ValueType.UINT32, 1, 0, 2), (ValueType.FLOAT32, 3, 0, 6), (ValueType.STRING, 1, 0, 42)])
+def test_words_that_elements_take(kind: ValueType, length: int, bit: int, words: int) -> None:
+    assert Codec(kind, length, bit).words == words
+
+
+def test_bits_across_words() -> None:
+    codec = Codec(ValueType.BOOL, 4, 14)
+    assert list(codec.decode(bytes.fromhex('00 40 02 00'))) == [1, 0, 0, 1]
+    assert codec.bit_changes([1, 0, 0, 1]) == [(0xC000, 0x4000), (0x0003, 0x0002)]
+
+
+@pytest.mark.parametrize('file_type, natural', [
+    (FileType.INTEGER, 'int16'), (FileType.BINARY, 'uint16'), (FileType.INPUT, 'uint16'),
+    (FileType.OUTPUT, 'uint16'), (FileType.STATUS, 'uint16'), (FileType.BCD, 'uint16'),
+    (FileType.ASCII, 'uint16'), (FileType.FLOAT, 'float32'), (FileType.LONG, 'int32'),
+    (FileType.TIMER, 'int16'), (FileType.COUNTER, 'int16'), (FileType.CONTROL, 'int16'),
+    (FileType.STRING, 'string')])
+def test_natural_type_of_a_file(file_type: FileType, natural: str) -> None:
+    assert types_of(file_type)[0].value == natural
+    assert ValueType.BOOL not in types_of(file_type)

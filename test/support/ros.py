@@ -1,0 +1,315 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Real rclpy over the loopback: processes, an observer of topics, and PLCs on a pseudo-terminal.
+
+Importing this module keeps everything on this machine and in a domain of its own, so that
+test sessions side by side do not hear each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from typing import Any, TypeVar
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.node_messages import latched_qos
+from abdf1_ros.port import LinkThread
+from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
+from abdf1_ros.simulator import execute, PtyLine
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+
+# Read when the first context is made, here and in every child process.
+_LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
+os.environ |= {
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
+    'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0'}
+
+PATIENCE = 20.0  # s; what takes longer does not happen
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+_Result = TypeVar('_Result')
+
+
+class Process:
+    """A module of the package as a process; everything it says is kept, line by line."""
+
+    def __init__(self, module: str, *args: str) -> None:
+        self.lines: list[str] = []
+        self._said = threading.Condition()
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', f'abdf1_ros.{module}', *args], text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self._readers = [
+            threading.Thread(target=self._read, args=(stream,))
+            for stream in (self._process.stdout, self._process.stderr)]
+        for reader in self._readers:
+            reader.start()
+
+    def __enter__(self) -> Process:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """End the process in any case."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self.result()
+
+    @property
+    def text(self) -> str:
+        """Return all that it has said."""
+        with self._said:
+            return '\n'.join(self.lines)
+
+    @property
+    def is_running(self) -> bool:
+        """Tell whether it has not ended."""
+        return self._process.poll() is None
+
+    def _read(self, stream: Any) -> None:
+        with stream:
+            for line in stream:
+                with self._said:
+                    self.lines.append(line.rstrip('\n'))
+                    self._said.notify_all()
+        with self._said:
+            self._said.notify_all()
+
+    def wait_for(self, *texts: str, after: int = 0) -> str:
+        """Wait for a line, not one of the first ``after``, that holds all ``texts``."""
+        def found() -> str | None:
+            return next((line for line in self.lines[after:]
+                         if all(text in line for text in texts)), None)
+
+        with self._said:
+            line = self._said.wait_for(found, PATIENCE)
+        assert line is not None, f'nothing with {texts} in:\n{self.text}'
+        return line
+
+    def say(self, line: str) -> None:
+        """Give a line to its standard input, and wait for the answer that contains it."""
+        after = len(self.lines)
+        assert self._process.stdin is not None
+        self._process.stdin.write(f'{line}\n')
+        self._process.stdin.flush()
+        self.wait_for('simulator: station', after=after)
+
+    def send(self, *numbers: signal.Signals) -> None:
+        """Send signals, one straight after the other."""
+        for number in numbers:
+            self._process.send_signal(number)
+
+    def result(self) -> int:
+        """Wait for the end; return the exit status, once all that was said has been read."""
+        try:
+            status = self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise AssertionError(f'does not end; it has said:\n{self.text}') from None
+        for reader in self._readers:
+            reader.join()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        return status
+
+    def end(self, *numbers: signal.Signals) -> None:
+        """End it by signals, and check that it ends as it should."""
+        self.send(*numbers or (signal.SIGINT,))
+        assert self.result() == 0, self.text
+        assert 'Traceback' not in self.text, self.text
+
+
+class Inbox(list[Any]):
+    """The messages that a subscription has got, and the events that it has seen."""
+
+    def __init__(self, observer: Observer, topic: str) -> None:
+        super().__init__()
+        self.topic = topic
+        self.deadlines: list[Any] = []
+        self.liveliness: list[Any] = []
+        self.incompatible: list[Any] = []
+        self._observer = observer
+
+    def until(self, condition: Callable[[Any], bool], what: str) -> Any:
+        """Wait for a message that fulfils ``condition``; return it."""
+        return self._observer.until(
+            lambda: next((message for message in self if condition(message)), None),
+            lambda: f'{what} on {self.topic}; got {list(self)[-3:]}')
+
+    def first(self) -> Any:
+        """Wait for the first message."""
+        return self.until(lambda message: True, 'a message')
+
+    def next(self) -> Any:
+        """Wait for a message that is not here yet."""
+        self.clear()
+        return self.first()
+
+    def values(self, expected: Sequence[float] | str) -> Any:
+        """Wait for a message with these values."""
+        return self.until(lambda message: values_in(message) == expected, f'{expected}')
+
+
+def values_in(message: Any) -> list[float] | str:
+    """Return the values of a std_msgs message as something to compare."""
+    return message.data if isinstance(message.data, str) else list(message.data)
+
+
+class Observer:
+    """A ROS node that looks at others from outside; also runs nodes that are added to it."""
+
+    def __init__(self, name: str = 'observer') -> None:
+        self.context = Context()
+        self.context.init(args=[])
+        self.node = Node(name, context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def __enter__(self) -> Observer:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def until(self, condition: Callable[[], _Result | None],
+              what: str | Callable[[], str]) -> _Result:
+        """Spin until ``condition`` gives something true; return that."""
+        end = time.monotonic() + PATIENCE
+        while not (result := condition()):
+            if time.monotonic() > end:
+                raise AssertionError(f'waited for {what() if callable(what) else what}')
+            self.executor.spin_once(timeout_sec=0.05)
+        return result
+
+    def listen(self, message_type: Any, topic: str, qos: QoSProfile | None = None) -> Inbox:
+        """Subscribe; the default profile also gets what has been published before."""
+        inbox = Inbox(self, topic)
+        events = SubscriptionEventCallbacks(
+            deadline=inbox.deadlines.append, liveliness=inbox.liveliness.append,
+            incompatible_qos=inbox.incompatible.append)
+        inbox.subscription = self.node.create_subscription(
+            message_type, topic, inbox.append, qos or latched_qos(), event_callbacks=events)
+        return inbox
+
+    def forget(self, inbox: Inbox) -> None:
+        """End a subscription."""
+        self.node.destroy_subscription(inbox.subscription)
+
+    def results(self, name: str = '/abdf1') -> Inbox:
+        """Listen to the results of writes, and wait until none can be missed."""
+        qos = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+        inbox = self.listen(DiagnosticStatus, f'{name}/write_results', qos)
+        topic = f'{name}/write_results'
+        self.until(lambda: self.node.count_publishers(topic), f'a publisher of {topic}')
+        return inbox
+
+    def diagnostics(self) -> Inbox:
+        """Listen to /diagnostics."""
+        return self.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
+
+    def publisher(self, message_type: Any, topic: str) -> Any:
+        """Return a publisher that a subscriber has been found for."""
+        qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.VOLATILE)
+        publisher = self.node.create_publisher(message_type, topic, qos)
+        self.until(publisher.get_subscription_count, f'a subscriber of {topic}')
+        return publisher
+
+    def call(self, service_type: Any, name: str, request: Any) -> Any:
+        """Call a service and return its response."""
+        client = self.node.create_client(service_type, name)
+        self.until(client.service_is_ready, f'the service {name}')
+        future = client.call_async(request)
+        self.until(future.done, f'an answer of {name}')
+        self.node.destroy_client(client)
+        return future.result()
+
+
+def find_status(array: DiagnosticArray, name: str) -> DiagnosticStatus:
+    """Return the status ``<node>: <name>`` of an array."""
+    return next(status for status in array.status if status.name.partition(': ')[2] == name)
+
+
+def details(status: DiagnosticStatus) -> dict[str, str]:
+    """Return the values of a status."""
+    return {value.key: value.value for value in status.values}
+
+
+def until_status(inbox: Inbox, name: str, level: bytes,
+                 condition: Callable[[DiagnosticStatus], bool] = lambda status: True,
+                 ) -> DiagnosticStatus:
+    """Wait until a status has a level and fulfils ``condition``; return it."""
+    def matches(array: DiagnosticArray) -> bool:
+        status = find_status(array, name)
+        return status.level == level and condition(status)
+
+    return find_status(inbox.until(matches, f'{name} at level {level!r}'), name)
+
+
+class Plcs:
+    """Simulated PLCs in this process, on a pseudo-terminal."""
+
+    def __init__(self, data: Path) -> None:
+        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
+        self._line = PtyLine(None)
+        self.port = self._line.name
+        self.faults: list[Exception] = []
+        machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)
+        self._link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
+        self._link.start()
+
+    def __enter__(self) -> Plcs:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._link.stop()
+        self._line.close()
+        assert not self.faults
+
+    def __getitem__(self, station: int) -> SimulatedPlc:
+        return next(plc for plc in self._plcs if plc.station == station)
+
+    def say(self, command: str) -> None:
+        """Carry out a command of the simulator."""
+        execute(command, self._plcs)
+
+
+def write_csv(path: Path, header: str, rows: Iterable[str]) -> Path:
+    """Write a CSV file and return its path."""
+    path.write_text('\n'.join([header, *rows, '']), encoding='utf-8')
+    return path
+
+
+def ros_args(*assignments: str) -> list[str]:
+    """Return the arguments that set parameters, each given as ``name:=value``."""
+    return ['--ros-args', *(word for text in assignments for word in ('-p', text))]
