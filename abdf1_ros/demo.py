@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import signal
@@ -44,8 +45,32 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 _PATIENCE = 15.0
+_OK = DiagnosticStatus.OK
 _WRITTEN = (211, 222, 233, 244)
 _TOO_LARGE = (1, 2, 3, 5000)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is shown: files, the simulated line, and who plays which part."""
+
+    title: str
+    net_file: str
+    map_file: str
+    simulator: tuple[str, ...]
+    failing_station: int
+    watched: str
+    surviving: str | None
+    push: str | None = None
+
+
+HALF_DUPLEX = Scene(
+    'A PLC-5 (station 1) and an SLC 5/03 (station 2), simulated on one half-duplex DF1 line',
+    'net.csv', 'map.csv', (), 2, 'part_counter', 'line_speed')
+FULL_DUPLEX = Scene(
+    'A PLC-5 (station 1), simulated on a full-duplex DF1 line',
+    'peer_net.csv', 'peer_map.csv', ('--full-duplex', '1'), 1, 'line_speed', None,
+    'msg 1 N7:50 11 22 33 44')
 
 
 class Interrupted(Exception):
@@ -93,24 +118,29 @@ class Watcher(Node):
 class Demo:
     """Tell the story; every step waits for what it shows to have happened."""
 
-    def __init__(self, mappings: list[Mapping], link: Path) -> None:
+    def __init__(self, scene: Scene, link: Path) -> None:
+        net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
+        mappings, _ = load_mappings(str(map_file))
+        self._scene = scene
         self._mappings = {mapping.tag: mapping for mapping in mappings}
         self._begin = time.monotonic()
-        self._simulator = _start('abdf1_ros.simulator', '--pty', str(link))
-        self._bridge = _start('abdf1_ros.node', '--ros-args', '-p', f'port:={link}')
+        self._simulator = _start('abdf1_ros.simulator', '--pty', str(link), *scene.simulator)
+        self._bridge = _start('abdf1_ros.node', '--ros-args', '-p', f'port:={link}',
+                              '-p', f'net_file:={net_file}', '-p', f'map_file:={map_file}')
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._watcher = Watcher(mappings)
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
-        self._title('A PLC-5 (station 1) and an SLC 5/03 (station 2), simulated on one '
-                    'half-duplex DF1 line')
+        self._title(self._scene.title)
         domain = os.environ['ROS_DOMAIN_ID']
         self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} '
                   'ros2 topic echo /diagnostics')
         self._show_reads()
         self._show_writes()
-        self._show_failure()
+        if self._scene.push:
+            self._show_push(self._scene.push)
+        self._show_failure(f'station {self._scene.failing_station}')
         self._show_diagnostics()
         while not seconds or time.monotonic() - self._begin < seconds:
             self._pause(5.0)
@@ -118,19 +148,18 @@ class Demo:
             self._print_values()
 
     def close(self) -> None:
-        """End both processes."""
+        """End both processes, the bridge first."""
         for process in (self._bridge, self._simulator):
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
-        for process in (self._bridge, self._simulator):
             process.wait(_PATIENCE)
         self._watcher.destroy_node()
         rclpy.try_shutdown()
 
     def _show_reads(self) -> None:
-        reads = [mapping for mapping in self._mappings.values() if mapping.reads]
-        self._wait('every mapped topic', lambda: len(self._watcher.values) == len(reads))
-        self._title('1. Reads: every row of config/map.csv is a topic')
+        polled = {tag for tag, mapping in self._mappings.items() if mapping.polls}
+        self._wait('every mapped topic', lambda: polled <= self._watcher.values.keys())
+        self._title(f'1. Reads: every row of config/{self._scene.map_file} is a topic')
         self._print_values()
         self._pause(2.0)
         self._say('two seconds later:')
@@ -165,31 +194,41 @@ class Demo:
         latency = {pair.key: pair.value for pair in result.values}['latency_ms']
         self._say(f'result: {result.message} ({latency} ms)')
 
-    def _show_failure(self) -> None:
-        self._title('3. Station 2 loses its power')
-        counter = self._mappings['part_counter']
-        point = '/abdf1/read/part_counter'
-        self._watcher.expect(counter, 2.0)
+    def _show_push(self, command: str) -> None:
+        self._title('   Serve: the PLC writes to words of ours, without being asked')
+        tag = next(tag for tag, mapping in self._mappings.items() if mapping.serves)
+        self._command(command)
+        self._wait('the values', lambda: tag in self._watcher.values)
+        self._say(f'/abdf1/read/{tag} shows {_shown(self._watcher.values[tag])}')
+
+    def _show_failure(self, station: str) -> None:
+        self._title(f'3. {station.capitalize()} loses its power')
+        watched = self._mappings[self._scene.watched]
+        self._watcher.expect(watched, 2.0)
         self._pause(1.0)
         self._watcher.missed = 0
-        self._command('silent 2')
+        self._command(f'silent {self._scene.failing_station}')
         self._wait('the loss to be noticed', lambda: self._watcher.missed > 0)
-        self._say(f'a subscriber of {point} with a deadline of 2 s is told: no more values')
-        self._wait('the station to be inactive', lambda: self._level('station 2') != b'\x00')
-        self._print_statuses('link', 'station 2', 'mappings')
-        self._say('station 1 goes on:')
-        before = list(self._watcher.values['line_speed'])
-        self._wait('new values', lambda: list(self._watcher.values['line_speed']) != before)
-        self._say(f'/abdf1/read/line_speed {before} -> '
-                  f'{_shown(self._watcher.values["line_speed"])}')
+        self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of 2 s is told: '
+                  'no more values')
+        self._wait('the station to be inactive', lambda: self._level(station) != _OK)
+        self._print_statuses('link', station, 'mappings')
+        if self._scene.surviving:
+            self._show_survivor(self._scene.surviving)
         self._title('   ... and gets it back')
-        self._command('normal 2')
-        self._wait('the station to answer', lambda: self._level('mappings') == b'\x00')
-        self._print_statuses('link', 'station 2', 'mappings')
+        self._command(f'normal {self._scene.failing_station}')
+        self._wait('the station to answer', lambda: self._level('mappings') == _OK)
+        self._print_statuses('link', station, 'mappings')
+
+    def _show_survivor(self, tag: str) -> None:
+        before = list(self._watcher.values[tag])
+        self._wait('new values', lambda: list(self._watcher.values[tag]) != before)
+        self._say(f'the other goes on: /abdf1/read/{tag} {before} -> '
+                  f'{_shown(self._watcher.values[tag])}')
 
     def _show_diagnostics(self) -> None:
         self._title('4. Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
-        self._print_statuses('link', 'counters', 'station 1', 'station 2', 'mappings', 'writes')
+        self._print_statuses(*(name.partition(': ')[2] for name in self._watcher.statuses))
         self._say('the counters of the line that are not 0:')
         for pair in self._watcher.statuses['abdf1: counters'].values:
             if pair.value != '0':
@@ -253,13 +292,14 @@ def main(args: Sequence[str] | None = None) -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--seconds', type=float, default=20.0,
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
+    parser.add_argument('--peer', action='store_true',
+                        help='show a full-duplex line, on which the PLC writes by itself')
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    mappings, _ = load_mappings(str(config_file('map.csv')))
     with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
-        demo = Demo(mappings, Path(folder) / 'line')
+        demo = Demo(FULL_DUPLEX if options.peer else HALF_DUPLEX, Path(folder) / 'line')
         try:
             demo.run(options.seconds)
         except Interrupted as reason:

@@ -26,12 +26,6 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 # A cause that has been quiet for so long (s) is news again.
 _QUIET = 60.0
 
-_LEVELS = {
-    Severity.CRITICAL: LoggingSeverity.FATAL,
-    Severity.ERROR: LoggingSeverity.ERROR,
-    Severity.NOTICE: LoggingSeverity.INFO,
-}
-
 # What every transaction brings, and what goes with an event that is logged itself.
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
@@ -68,7 +62,16 @@ class EventLog:
             return
         again = f' ({cause.repeats} more like it were not logged)' if cause else ''
         self._causes[key] = _Cause(now)
-        self._logger.log(str(event) + again, _LEVELS[event.message.severity])
+        self._write(event.message.severity, str(event) + again)
+
+    def _write(self, severity: Severity, text: str) -> None:
+        # rclpy raises ValueError when one place in the code logs at two levels.
+        if severity is Severity.CRITICAL:
+            self._logger.fatal(text)
+        elif severity is Severity.ERROR:
+            self._logger.error(text)
+        else:
+            self._logger.info(text)
 
     def forget(self, station: int) -> None:
         """Log the next events of a station anew: its state has changed."""

@@ -197,6 +197,8 @@ class Scheduler:
         self._writes.append(write)
 
     def _take_probe(self, now: float) -> ReadJob | None:
+        for number in [number for number in self._parked if self._stations[number].active]:
+            self._release(number, now)  # it has answered a write
         if not self._parked or now < self._next_probe:
             return None
         station = next(iter(self._parked))
@@ -207,19 +209,17 @@ class Scheduler:
         return job
 
     def _take_read(self, now: float) -> ReadJob | None:
-        while self._is_read_due(now):
-            job = heapq.heappop(self._heap)[2]
-            if self._stations[job.station].active:
-                return job
-            self._park(job)
-        return None
+        return heapq.heappop(self._heap)[2] if self._is_read_due(now) else None
 
     def _is_read_due(self, now: float) -> bool:
+        """Tell whether a read of an active station is due; those of others are set aside."""
         while self._heap:
             due, ticket, job = self._heap[0]
             if ticket == job.ticket and job in self._jobs:
-                return due <= now
-            heapq.heappop(self._heap)  # an entry that a later one has replaced
+                if due > now or self._stations[job.station].active:
+                    return due <= now
+                self._park(job)
+            heapq.heappop(self._heap)  # or a later entry has replaced this one
         return False
 
     def _push(self, job: ReadJob, due: float) -> None:

@@ -99,7 +99,9 @@ class Plc5Dialect:
         size = words * 2 // asked
         if typed.element_size < size and len(typed.data) == words * 2:
             return typed.data  # bytes or characters: the same words in smaller elements
-        if typed.count != asked or typed.element_size < size:
+        layout = address.file_type.layout
+        if typed.count != asked or typed.element_size not in (
+                size, 2 * (layout.plc5_words or layout.words)):
             raise FormatError(f'the reply holds {typed.count} elements of '
                               f'{typed.element_size} bytes, asked were {asked} of {size}')
         if typed.element_size == size:

@@ -117,7 +117,7 @@ def test_nothing_is_bridged_across_files_stations_and_periods(mappings: list[Map
     blocks = plan(*mappings)
     check_plan(mappings, blocks)
     for block in blocks:
-        assert len({(mapping.station, mapping.address.area, mapping.period or 100
+        assert len({(mapping.station, mapping.address.area, 100
                      if mapping.period is None else mapping.period)
                     for mapping in block.mappings}) == 1
 

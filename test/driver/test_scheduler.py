@@ -1,0 +1,493 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who has the line next, on a clock that the test moves."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.planner import Planner
+from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
+from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, MAX_WRITES_IN_A_ROW, ReadJob, Scheduler
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from support.mappings import make_mapping
+from support.properties import PROPERTY
+
+PROBE_TIME = 0.5
+
+
+def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob:
+    mapping = make_mapping(text, station=station, period=period)
+    block, = Planner(Checksum.CRC, Duplex.HALF, 0.001, 0.1).plan([mapping])
+    return ReadJob(block, [ReadPoint(mapping, period / 1000, 1.0)])
+
+
+class Bench:
+    """A scheduler whose jobs are done by hand."""
+
+    def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
+        self.results: list[WriteResult] = []
+        self.stations = ActiveStationList([job.station for job in jobs])
+        self.scheduler = Scheduler(
+            self.stations, probe_time=PROBE_TIME, write_timeout=write_timeout,
+            report=self.results.append)
+        self.scheduler.add_reads(jobs, 0.0)
+
+    def next(self, now: float) -> ReadJob | Write | None:
+        """Return the next job, as the driver asks for it."""
+        return self.scheduler.next_write(now) or self.scheduler.next_read(now)
+
+    def read(self, now: float, took: float = 0.0) -> ReadJob | None:
+        """Take the next read and give it back done."""
+        job = self.scheduler.next_read(now)
+        if job is not None:
+            self.scheduler.finished(job, now, now + took)
+        return job
+
+    def write(self, mapping: Mapping, value: float, now: float) -> Write:
+        write = Write(mapping, [value], now)
+        self.scheduler.add_write(write)
+        return write
+
+    def outcomes(self) -> list[Outcome]:
+        return [result.outcome for result in self.results]
+
+
+WORD = make_mapping('N7:5', 'Write')
+OTHER = make_mapping('N7:6', 'Write')
+BIT = make_mapping('B3:0/5', 'Write')
+
+
+def test_reads_go_by_their_due_time() -> None:
+    slow, fast = make_job('N7:0', period=1000), make_job('N9:0', period=100)
+    bench = Bench(slow, fast)
+    assert [bench.read(0.0), bench.read(0.0), bench.read(0.0)] == [slow, fast, None]
+    assert bench.scheduler.next_due() == 0.1
+    assert bench.read(0.099) is None
+    assert bench.read(0.1) is fast
+    done = [bench.read(time / 10 + 0.01) for time in range(2, 11)]
+    assert done == [fast] * 8 + [slow]
+    assert bench.read(1.01) is fast
+
+
+def test_period_counts_from_the_due_time_and_not_from_the_end() -> None:
+    job = make_job(period=100)
+    bench = Bench(job)
+    assert bench.read(0.03, took=0.05) is job
+    assert job.due == 0.1
+
+
+def test_reads_that_were_missed_are_not_made_up_for() -> None:
+    job = make_job(period=100)
+    bench = Bench(job)
+    bench.read(5.0, took=0.2)
+    assert job.due == 5.0
+    bench.read(5.2)
+    assert job.due == 5.2
+
+
+def test_saturated_line_is_shared_by_all_in_turn() -> None:
+    jobs = [make_job(f'N{file}:0', period=0) for file in (7, 9, 10)]
+    bench = Bench(*jobs)
+    now, done = 0.0, []
+    for _ in range(9):
+        done.append(bench.read(now, took=0.05))
+        now += 0.05
+    assert done == jobs * 3
+
+
+def test_slow_job_is_not_starved_by_fast_ones_on_a_saturated_line() -> None:
+    fast = [make_job(f'N{file}:0', period=10) for file in range(9, 19)]
+    slow = make_job('N7:0', period=1000)
+    bench = Bench(*fast, slow)
+    now, count = 0.0, Counter[ReadJob]()
+    while now < 20.0:
+        job = bench.read(now, took=0.05)
+        if job is not None:
+            count[job] += 1
+        now += 0.05
+    assert count[slow] >= 13
+    assert max(count[job] for job in fast) - min(count[job] for job in fast) <= 1
+
+
+def test_nothing_is_ever_due_without_reads() -> None:
+    bench = Bench()
+    assert (bench.scheduler.next_due(), bench.next(1e9), bench.scheduler.scan_time) == (
+        None, None, None)
+
+
+def test_write_goes_before_a_read_that_is_due() -> None:
+    job = make_job()
+    bench = Bench(job)
+    write = bench.write(WORD, 1, 0.0)
+    assert bench.next(0.0) is write
+    assert bench.next(0.0) is job
+
+
+def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
+    job = make_job(period=0)
+    bench = Bench(job)
+    writes = [bench.write(BIT, n % 2, 0.0) for n in range(10)]
+    order = []
+    for _ in range(12):
+        taken = bench.next(0.0)
+        order.append(taken)
+        if isinstance(taken, ReadJob):
+            bench.scheduler.finished(taken, 0.0, 0.0)
+    assert MAX_WRITES_IN_A_ROW == 4
+    assert order == [*writes[:4], job, *writes[4:8], job, *writes[8:]]
+
+
+def test_read_that_has_begun_gets_its_turn_as_well() -> None:
+    bench = Bench()
+    for n in range(6):
+        bench.write(BIT, n % 2, 0.0)
+    taken = [bench.scheduler.next_write(0.0, is_read_waiting=True) for _ in range(7)]
+    assert [write is not None for write in taken] == [True] * 4 + [False] + [True] * 2
+
+
+def test_writes_go_on_when_no_read_is_due() -> None:
+    bench = Bench(make_job(period=1000))
+    bench.read(0.0)
+    writes = [bench.write(BIT, n % 2, 0.5) for n in range(10)]
+    assert [bench.next(0.5) for _ in range(11)] == [*writes, None]
+
+
+def test_writes_go_on_when_the_only_read_that_is_due_is_of_an_inactive_station() -> None:
+    bench = Bench(make_job(station=9))
+    bench.stations.lost(9, 0.0)
+    bench.read(0.0)
+    assert bench.scheduler.next_read(0.0) is not None  # the first probe
+    late = make_job('N9:0', station=9)
+    bench.scheduler.add_reads([late], 0.0)
+    writes = [bench.write(BIT, n % 2, 0.0) for n in range(6)]
+    assert [bench.next(0.0) for _ in range(6)] == writes
+
+
+def test_waiting_writes_of_a_word_collapse_to_the_newest() -> None:
+    bench = Bench()
+    old, other, new = (bench.write(WORD, 1, 0.0), bench.write(OTHER, 2, 0.1),
+                       bench.write(WORD, 3, 0.2))
+    assert [bench.next(0.5), bench.next(0.5), bench.next(0.5)] == [other, new, None]
+    result, = bench.results
+    assert (result.mapping, result.value, result.outcome, result.latency) == (
+        WORD, '[1]', Outcome.SUPERSEDED, 0.5)
+    assert str(result) == 'not written: superseded by a newer value'
+    assert old is not new
+
+
+def test_write_that_is_on_its_way_is_not_superseded() -> None:
+    bench = Bench()
+    first = bench.write(WORD, 1, 0.0)
+    assert bench.next(0.0) is first
+    second = bench.write(WORD, 2, 0.0)
+    assert bench.next(0.0) is second
+    assert bench.results == []
+
+
+def test_writes_of_bits_are_all_sent_in_their_order() -> None:
+    bench = Bench()
+    writes = [bench.write(BIT, value, 0.0) for value in (1, 0, 1, 0)]
+    assert [bench.next(0.0) for _ in range(4)] == writes
+    assert bench.results == []
+
+
+def test_write_that_has_waited_too_long_is_not_sent() -> None:
+    bench = Bench(write_timeout=2.0)
+    bench.write(WORD, 1, 0.0)
+    young = bench.write(OTHER, 2, 1.0)
+    assert bench.next(2.001) is young
+    result, = bench.results
+    assert str(result) == 'not written: not sent: waited longer than 2 s for the line'
+    assert result.latency == 2.001
+
+
+def test_write_is_sent_up_to_its_last_moment() -> None:
+    bench = Bench(write_timeout=2.0)
+    write = bench.write(WORD, 1, 0.0)
+    assert bench.next(2.0) is write
+
+
+def test_writes_that_were_too_old_do_not_use_up_the_turn_of_writes() -> None:
+    bench = Bench(make_job(), write_timeout=1.0)
+    for n in range(5):
+        bench.write(BIT, n % 2, 0.0)
+    young = [bench.write(BIT, n % 2, 5.0) for n in range(4)]
+    assert [bench.next(5.0) for _ in range(4)] == young
+
+
+def test_queue_of_writes_has_an_end() -> None:
+    bench = Bench()
+    for n in range(MAX_WAITING_WRITES):
+        assert not bench.scheduler.is_full
+        bench.write(BIT, n % 2, 0.0)
+        if n == 10:
+            bench.next(0.0)  # now some wait in the inbox, some in the queue
+            bench.write(BIT, 0, 0.0)
+    assert bench.scheduler.is_full
+    bench.next(0.0)
+    assert not bench.scheduler.is_full
+
+
+def test_dropped_writes_all_have_their_result() -> None:
+    bench = Bench()
+    bench.write(BIT, 1, 0.0)
+    bench.next(0.0)
+    for n in range(3):
+        bench.write(BIT, n % 2, 0.0)
+    bench.scheduler.next_write(0.0)
+    bench.write(WORD, 1, 0.5)
+    bench.scheduler.drop_writes('the cable is off', 1.0)
+    assert bench.outcomes() == [Outcome.NOT_SENT] * 3
+    assert {result.detail for result in bench.results} == {'the cable is off'}
+    assert [result.latency for result in bench.results] == [1.0, 1.0, 0.5]
+    assert bench.next(1.0) is None
+
+
+def test_reads_of_an_inactive_station_are_set_aside() -> None:
+    dead, living = make_job(station=1), make_job('N9:0', station=2)
+    bench = Bench(dead, living)
+    assert bench.scheduler.next_read(0.0) is dead
+    bench.stations.lost(1, 0.5)
+    bench.scheduler.finished(dead, 0.0, 0.5)
+    assert bench.read(0.5) is living
+    assert [bench.read(0.5 + n / 10) for n in range(1, 35)] == [living] * 34
+    assert bench.read(4.0) is dead  # 7 times the probe time after the last
+
+
+def _simulate(dead: list[ReadJob], living: list[ReadJob], seconds: float,
+              took: float = 0.02) -> Counter[int]:
+    """Return how often each station was read while some do not answer, and the time of that."""
+    bench = Bench(*dead, *living)
+    lost = {job.station for job in dead}
+    now, reads = 0.0, Counter[int]()
+    while now < seconds:
+        job = bench.scheduler.next_read(now)
+        if job is None:
+            due = bench.scheduler.next_due()
+            assert due is not None
+            now = max(now + 1e-3, due)
+            continue
+        started = now
+        if job.station in lost:
+            now += PROBE_TIME
+            bench.stations.lost(job.station, now)
+        else:
+            now += took
+            bench.stations.heard(job.station, now)
+        reads[job.station] += 1
+        bench.scheduler.finished(job, started, now)
+    return reads
+
+
+def test_dead_stations_take_no_more_than_an_eighth_of_a_busy_line() -> None:
+    dead = [make_job(f'N{file}:0', station=station) for station in range(1, 6)
+            for file in (7, 9, 10)]
+    living = [make_job(f'N{file}:0', station=99, period=0) for file in (7, 9)]
+    reads = _simulate(dead, living, 400.0)
+    lost_time = sum(reads[station] for station in range(1, 6)) * PROBE_TIME
+    assert 0.9 / 8 < lost_time / 400 < 1.1 / 8
+    assert reads[99] * 0.02 > 0.85 * 400
+    probes = [reads[station] for station in range(1, 6)]
+    assert max(probes) - min(probes) <= 1
+
+
+def test_line_that_has_nobody_else_probes_every_period() -> None:
+    reads = _simulate([make_job(station=1, period=1000)], [], 60.0)
+    assert 38 <= reads[1] <= 41  # a period and a time-out each
+
+
+def test_station_that_answers_again_has_all_its_reads_at_once() -> None:
+    jobs = [make_job(f'N{file}:0', station=1) for file in (7, 9, 10, 11)]
+    bench = Bench(*jobs)
+    bench.stations.lost(1, 0.0)
+    assert bench.scheduler.next_read(0.0) is None
+    probe = bench.scheduler.next_read(0.0)
+    assert probe is not None
+    bench.stations.heard(1, 0.1)
+    bench.scheduler.finished(probe, 0.0, 0.1)
+    assert {bench.read(0.1) for _ in range(4)} == set(jobs)
+
+
+def test_station_that_a_write_has_brought_back_has_its_reads_at_once() -> None:
+    job = make_job(station=1)
+    bench = Bench(job, make_job(station=2))
+    bench.stations.lost(1, 0.0)
+    probe = bench.scheduler.next_read(0.0) or bench.scheduler.next_read(0.0)
+    while probe is not job:
+        assert probe is not None
+        bench.scheduler.finished(probe, 0.0, 0.0)
+        probe = bench.scheduler.next_read(0.0)
+    bench.scheduler.finished(job, 0.0, 0.5)
+    assert job not in [bench.read(0.6), bench.read(0.6)]
+    bench.stations.heard(1, 0.7)  # it refused a write, say
+    assert job in [bench.read(0.7), bench.read(0.7)]
+
+
+def test_read_that_shows_a_write_is_due_at_once() -> None:
+    covers, beside = make_job('N7:5', period=10_000), make_job('N9:5', period=10_000)
+    elsewhere = make_job('N7:5', station=2, period=10_000)
+    bench = Bench(covers, beside, elsewhere)
+    for _ in range(3):
+        bench.read(0.0)
+    write = bench.write(WORD, 1, 1.0)
+    assert bench.next(1.0) is write
+    bench.scheduler.hasten(write, 1.5)
+    assert bench.scheduler.next_due() == 1.5
+    assert [bench.read(1.5), bench.read(1.5)] == [covers, None]
+    assert bench.read(5.0) is None  # the entry of before is void
+    assert covers.due == 11.5
+    assert bench.read(11.4) in (beside, elsewhere)
+
+
+def test_coverage_of_a_write_is_by_words() -> None:
+    job = make_job('N7:5')
+    for text, length, covered in [
+            ('N7:5', 1, True), ('N7:4', 1, False), ('N7:6', 1, False), ('N7:4', 2, True),
+            ('N7:5/3', 1, True), ('N7:4/15', 2, True), ('N7:4/14', 2, False)]:
+        mapping = make_mapping(text, 'Write', length=length)
+        assert job.covers(Write(mapping, [0] * length, 0.0)) is covered, text
+
+
+def test_parts_replace_a_job() -> None:
+    whole, left, right = make_job(), make_job('N7:1'), make_job('N7:2')
+    bench = Bench(whole)
+    assert bench.scheduler.next_read(0.0) is whole
+    bench.scheduler.replace(whole, [left, right], 0.0)
+    bench.scheduler.finished(whole, 0.0, 0.0)
+    assert bench.scheduler.jobs == {left, right}
+    assert [bench.read(0.0), bench.read(0.0), bench.read(0.0)] == [left, right, None]
+
+
+def test_scan_time_is_that_of_the_slowest_job() -> None:
+    one, other = make_job(), make_job('N9:0')
+    bench = Bench(one, other)
+    one.done(1.0)
+    assert bench.scheduler.scan_time is None
+    one.done(1.5)
+    other.done(1.0)
+    other.done(3.0)
+    assert bench.scheduler.scan_time == 2.0
+    other.done(3.1)
+    assert bench.scheduler.scan_time == 0.5
+
+
+class AnyOrder(RuleBasedStateMachine):
+    """Whatever happens in whatever order, nothing is lost and nothing is there twice."""
+
+    @initialize()
+    def start(self) -> None:
+        self.now = 0.0
+        self.jobs = [make_job(f'N{file}:0', station, period) for station in (1, 2)
+                     for file, period in ((7, 0), (9, 100), (10, 1000))]
+        self.bench = Bench(*self.jobs)
+        self.taken: list[ReadJob] = []
+        self.accepted: list[Write] = []
+        self.sent: list[Write] = []
+        self.spare = 20
+
+    @rule(seconds=st.sampled_from([0.0, 0.01, 0.1, 0.5, 3.0]))
+    def time_passes(self, seconds: float) -> None:
+        self.now += seconds
+
+    @rule()
+    def take_read(self) -> None:
+        job = self.bench.scheduler.next_read(self.now)
+        if job is not None:
+            assert job not in self.taken
+            self.taken.append(job)
+
+    @precondition(lambda self: self.taken)
+    @rule(answers=st.booleans(), which=st.integers(0, 5))
+    def finish_read(self, answers: bool, which: int) -> None:
+        job = self.taken.pop(which % len(self.taken))
+        self.change_station(job.station, answers)
+        self.bench.scheduler.finished(job, self.now, self.now)
+
+    @precondition(lambda self: self.taken and self.spare < 40)
+    @rule()
+    def replace_read(self) -> None:
+        job = self.taken.pop()
+        self.jobs.remove(job)
+        self.spare += 2
+        parts = [make_job(f'N{self.spare + n}:0', job.station) for n in range(2)]
+        self.jobs += parts
+        self.bench.scheduler.replace(job, parts, self.now)
+        self.bench.scheduler.finished(job, self.now, self.now)
+
+    @rule(station=st.integers(1, 2), answers=st.booleans())
+    def change_station(self, station: int, answers: bool) -> None:
+        if answers:
+            self.bench.stations.heard(station, self.now)
+        else:
+            self.bench.stations.lost(station, self.now)
+
+    @rule(text=st.sampled_from(['N7:0', 'N9:0/3', 'N10:0']), station=st.integers(1, 2))
+    def ask_for_write(self, text: str, station: int) -> None:
+        mapping = make_mapping(text, 'Write', station=station)
+        self.accepted.append(self.bench.write(mapping, 1, self.now))
+
+    @rule(reading=st.booleans(), worked=st.booleans())
+    def take_write(self, reading: bool, worked: bool) -> None:
+        write = self.bench.scheduler.next_write(self.now, reading)
+        if write is not None:
+            self.sent.append(write)
+            if worked:
+                self.bench.stations.heard(write.mapping.station, self.now)
+                self.bench.scheduler.hasten(write, self.now)
+
+    @rule()
+    def drop(self) -> None:
+        self.bench.scheduler.drop_writes('port', self.now)
+        assert self.bench.scheduler.next_write(self.now) is None
+
+    @invariant()
+    def every_write_is_in_one_place(self) -> None:
+        waiting = len(self.bench.scheduler._writes) + len(self.bench.scheduler._inbox)
+        assert len(self.accepted) == len(self.sent) + len(self.bench.results) + waiting
+
+    @invariant()
+    def every_job_is_in_one_place(self) -> None:
+        scheduler = self.bench.scheduler
+        queued = [job for _, ticket, job in scheduler._heap
+                  if ticket == job.ticket and job in scheduler.jobs and job not in self.taken]
+        parked = [job for jobs in scheduler._parked.values() for job in jobs]
+        assert scheduler.jobs == set(self.jobs)
+        # A job that was popped and parked keeps its ticket, but its entry is gone.
+        assert Counter(queued + parked + self.taken) == Counter(self.jobs)
+
+    def teardown(self) -> None:
+        """Let everything answer: then every job is read again."""
+        for job in self.taken:
+            self.bench.scheduler.finished(job, self.now, self.now)
+        for station in (1, 2):
+            self.bench.stations.heard(station, self.now)
+        self.now += 100.0
+        seen = set()
+        for _ in range(10 * len(self.jobs)):
+            job = self.bench.read(self.now)
+            seen.add(job)
+            self.now += 0.3
+        assert seen >= set(self.jobs)
+
+
+TestAnyOrder = AnyOrder.TestCase
+TestAnyOrder.settings = settings(PROPERTY, max_examples=60, stateful_step_count=40)
