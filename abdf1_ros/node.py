@@ -53,8 +53,9 @@ from abdf1_ros.node_parameters import Configuration, configure
 from abdf1_ros.port import LinkThread, open_port, PortState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -105,7 +106,9 @@ class BridgeNode(Node):
         self._next_diagnostics = 0.0
         self._levels: list[bytes] = []
         self.create_service(Trigger, '~/reset_counters', self._reset_counters)
-        self.create_timer(_LEVEL_CHECK_PERIOD, self._check_diagnostics)
+        # Not the node's clock: that may be a simulation's, which need not run.
+        self.create_timer(_LEVEL_CHECK_PERIOD, self._check_diagnostics,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._port = configuration.port
         self.link = LinkThread(
             self.driver.machine, lambda: open_port(configuration.network, configuration.port),
@@ -155,8 +158,10 @@ class BridgeNode(Node):
     def _writer(self, mappings: Sequence[Mapping]) -> Any:
         """Return the callback that writes a message to every mapping of its topic."""
         def write(message: Any, info: Any) -> None:
-            # A message may have waited for us, after a pause of this process for example.
-            waited = max(0.0, (time.time_ns() - info['received_timestamp']) / 1e9)
+            # It may have waited, while this process was paused or the network was down.
+            now = time.time_ns()
+            stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
+            waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
             requested = time.monotonic() - waited
             for mapping in mappings:
                 try:
@@ -254,13 +259,15 @@ def main(args: Sequence[str] | None = None) -> int:
             get_logger(NODE_NAME).fatal(str(problem))
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
-    except (ParameterException, RuntimeError, ValueError) as error:
+    except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
         # rclpy's own words for arguments and names that it does not take
-        print(f'{NODE_NAME}: {error}', file=sys.stderr)
+        print(f'{NODE_NAME}: bad arguments: {" ".join(str(error).split())}', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
-    _spin(node, ended)
-    node.stop()
+    try:
+        _spin(node, ended)
+    finally:
+        node.stop()
     failed = node.link.has_failed
     node.destroy_node()
     rclpy.try_shutdown()

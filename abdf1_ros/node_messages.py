@@ -41,8 +41,8 @@ MESSAGES: dict[ValueType, Any] = {
     ValueType.STRING: String,
 }
 
-# Pulses are written one by one, so a burst of them has to fit.
-_WRITE_DEPTH = 50
+# Pulses are written one by one, so a burst of them has to fit; it costs no memory before.
+_WRITE_DEPTH = 1000
 
 
 def new_message(mapping: Mapping) -> Any:

@@ -217,6 +217,8 @@ class LinkThread(threading.Thread):
             back_off = _FIRST_BACK_OFF
             self._set_state(True, 'open')
             self._run_on(port)
+        if self.state.is_open:
+            self.state = PortState(False, 'closed')
 
     def _run_on(self, port: Port) -> None:
         end = 'the driver is stopping'

@@ -287,7 +287,8 @@ class Driver:
         else:
             job.done(self.machine.now)
             self._distribute(job, data)
-        self._scheduler.finished(job, started, self.machine.now)
+        finally:
+            self._scheduler.finished(job, started, self.machine.now)
 
     def _distribute(self, job: ReadJob, data: bytes) -> None:
         for point in job.points:
@@ -383,6 +384,9 @@ class _JobTask:
         except StopIteration:
             self._driver.advanced(self, is_done=True)
             return
+        except Exception:  # a bug has ended the job
+            self._driver.advanced(self, is_done=True)
+            raise
         self.sent = False
         self.command = self._driver.new_command(self._station, request)
         self._driver.advanced(self, is_done=False)

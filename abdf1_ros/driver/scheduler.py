@@ -111,7 +111,7 @@ class Scheduler:
     @property
     def scan_time(self) -> float | None:
         """Return the longest time (s) between the last two good reads of any job."""
-        return max((job.interval for job in self._jobs if job.interval is not None),
+        return max((job.interval for job in self.jobs if job.interval is not None),
                    default=None)
 
     def add_reads(self, jobs: Iterable[ReadJob], now: float) -> None:

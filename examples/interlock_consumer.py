@@ -1,0 +1,111 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A robot cell that reads one interlock and decides "not permitted" unless it knows better.
+
+Run it beside the bridge; it prints every change of its decision::
+
+    python3 examples/interlock_consumer.py --topic /abdf1/read/cell_interlocks --bit 0
+
+It is no safety function: emergency stops and guards stay hard-wired or safety-rated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import remove_ros_args
+from std_msgs.msg import UInt8MultiArray
+
+
+class InterlockConsumer(Node):
+    """
+    Permit motion only while a fresh value says so.
+
+    ``patience`` (s) is what the cell can live without a value; the bridge has to offer as much
+    (see its lifespan with ``ros2 topic info -v``), or nothing is received at all.
+    """
+
+    def __init__(self, topic: str, bit: int, patience: float) -> None:
+        super().__init__('interlock_consumer')
+        self._bit = bit
+        self._reason = ''
+        self.permitted = False
+        time = Duration(seconds=patience)
+        qos = QoSProfile(
+            depth=1, reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=time,
+            liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=time)
+        self.create_subscription(
+            UInt8MultiArray, topic, self._received, qos,
+            event_callbacks=SubscriptionEventCallbacks(
+                deadline=lambda event: self._decide(False, 'no value within the deadline'),
+                liveliness=self._liveliness,
+                incompatible_qos=lambda event: self._decide(
+                    False, 'the bridge does not promise values that often')))
+        # DDS reports no missed deadline before the first value, so the start has a timer.
+        self._start_timer = self.create_timer(patience, self._still_silent)
+        self._decide(False, 'no value yet')
+
+    def _received(self, message: UInt8MultiArray) -> None:
+        self._start_timer.cancel()
+        is_set = len(message.data) > self._bit and message.data[self._bit] == 1
+        self._decide(is_set, 'the PLC permits' if is_set else 'the PLC does not permit')
+
+    def _liveliness(self, event: Any) -> None:
+        if event.alive_count == 0:
+            self._decide(False, 'the bridge or its PLC is gone')
+
+    def _still_silent(self) -> None:
+        self._start_timer.cancel()
+        self._decide(False, 'nothing heard since the start')
+
+    def _decide(self, permitted: bool, reason: str) -> None:
+        if (permitted, reason) != (self.permitted, self._reason):
+            self.permitted, self._reason = permitted, reason
+            print(f'{"PERMITTED" if permitted else "not permitted"}: {reason}', flush=True)
+
+
+def main() -> int:
+    """Run until Ctrl-C."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--topic', default='/abdf1/read/cell_interlocks')
+    parser.add_argument('--bit', type=int, default=0, help='index in the array')
+    parser.add_argument('--patience', type=float, default=2.0,
+                        help='seconds without a value after which motion is not permitted')
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    rclpy.init()
+    node = InterlockConsumer(options.topic, options.bit, options.patience)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
