@@ -72,7 +72,8 @@ EXIT_FAULT = 1
 _LEVEL_CHECK_PERIOD = 0.1
 
 _RESULT_LEVELS = {
-    Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.SUPERSEDED: DiagnosticStatus.WARN}
+    Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
+    Outcome.SUPERSEDED: DiagnosticStatus.WARN}
 
 
 class BridgeNode(Node):
@@ -133,6 +134,10 @@ class BridgeNode(Node):
             read_only=parameters.read_only,
             nak_on_command_timeout=parameters.nak_on_command_timeout,
             max_outstanding=parameters.max_outstanding,
+            accept_slave_messages=parameters.accept_slave_messages,
+            polling=configuration.polling, eot_suppression=parameters.eot_suppression,
+            duplicate_detection=parameters.duplicate_detection,
+            poll_timeout=parameters.poll_timeout,
             first_tns=random.randrange(0x10000))
         return Driver(configuration.network, configuration.mappings, settings, self)
 

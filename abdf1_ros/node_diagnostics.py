@@ -21,6 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
+from abdf1_ros.df1.polling import StandardPollingMaster
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
@@ -137,6 +138,7 @@ class Diagnostics:
             'line load': f'{self._rate.load:.0f} %',
             'scan time': 'unknown' if scan_time is None else f'{scan_time * 1000:.0f} ms',
             'expected scan time': f'{self._driver.expected_scan_time * 1000:.0f} ms',
+            **_poll_scans(self._driver),
             'last error': 'none',
         }
         if self._last_error is not None:
@@ -205,7 +207,7 @@ class WriteLog:
     def add(self, result: WriteResult, now: float) -> None:
         """Count a result."""
         self._counts[result.outcome] += 1
-        if result.outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED):
+        if result.outcome not in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED):
             self._last_failure = result, now
 
     def judge(self, now: float) -> Verdict:
@@ -249,6 +251,17 @@ class _Rate:
             on_line = (total - characters) * driver.network.timing.char_time
             self.load = min(100.0, 100 * on_line / (now - before))
             self._seen = now, driver.transactions, total
+
+
+def _poll_scans(driver: Driver) -> dict[str, str]:
+    """Return last and longest scan times of the poll lists, where there are any."""
+    if not isinstance(driver.link, StandardPollingMaster):
+        return {}
+    scans = {'normal': driver.link.normal_scan, 'priority': driver.link.priority_scan}
+    return {
+        f'{name} poll scan': f'last {times.last * 1000:.0f} ms, '
+                             f'longest {(times.longest or 0.0) * 1000:.0f} ms'
+        for name, times in scans.items() if times.last is not None}
 
 
 def _judge_station(station: Station, now: float) -> Verdict:

@@ -19,6 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.driver.csv_table import whole_number
 from abdf1_ros.driver.mapping import COLUMNS, load_mappings, Mapping
 from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
 from abdf1_ros.driver.served import served_problems
@@ -56,8 +60,29 @@ class Parameters:
         True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
     max_outstanding: int = _parameter(
         1, 'commands that may wait for their reply at a time, Mode Peer only', 1, 16)
+    accept_slave_messages: bool = _parameter(
+        True, 'serve or pass on what slaves send by themselves; false: acknowledge and drop it')
+    poll_list: str = _parameter(
+        '', 'stations to poll with Polling Standard, as in 1,3-5; empty: all mapped ones')
+    priority_poll_list: str = _parameter('', 'stations to poll first in every scan')
+    poll_group_size: int = _parameter(
+        0, 'stations of poll_list polled in each scan; 0: all', 0, 255)
+    poll_multiple: bool = _parameter(
+        False, 'poll a station until it has nothing more; false: one message a scan')
+    send_in_sequence: bool = _parameter(
+        False, 'send commands when our own station comes up in the list; false: between polls')
+    eot_suppression: bool = _parameter(
+        False, 'Mode Slave: stay silent instead of answering EOT')
+    duplicate_detection: bool = _parameter(
+        True, 'Mode Slave: execute a repeated command only once')
+    poll_timeout: float = _parameter(
+        60.0, 'Mode Slave: s without a poll after which own commands fail; 0: never', 0.0,
+        3600.0)
     expose_map_parameters: bool = _parameter(
         True, 'show every mapping as read-only parameters map.<tag>.<column>')
+
+
+_KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +94,7 @@ class Configuration:
     port: str
     mappings: list[Mapping]
     map_problems: list[Problem]
+    polling: PollingSettings | None = None
 
 
 def configure(node: Node) -> Configuration:
@@ -97,12 +123,40 @@ def configure(node: Node) -> Configuration:
         problems += error.problems
     if parameters.strict_map:
         problems += map_problems
+    polling = _polling(parameters, mappings, problems)
     if problems:
         raise ConfigurationError(problems)
     if parameters.expose_map_parameters:
         _declare_map(node, mappings)
     port = parameters.port or network.port
-    return Configuration(parameters, network, port, mappings, map_problems)
+    return Configuration(parameters, network, port, mappings, map_problems, polling)
+
+
+def _polling(parameters: Parameters, mappings: list[Mapping],
+             problems: list[Problem]) -> PollingSettings:
+    """Return how a master with standard polling polls."""
+    priority = _stations('priority_poll_list', parameters.priority_poll_list, problems)
+    normal = _stations('poll_list', parameters.poll_list, problems)
+    if not parameters.poll_list:
+        mapped = {mapping.station for mapping in mappings if not mapping.serves}
+        normal = tuple(sorted(mapped - {BROADCAST, *priority}))
+    return PollingSettings(normal, priority, parameters.poll_group_size,
+                           parameters.poll_multiple, parameters.send_in_sequence)
+
+
+def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
+    """Return the stations of a list such as "1,3-5", in its order."""
+    stations: list[int] = []
+    for part in filter(None, text.replace(' ', '').split(',')):
+        first, _, last = part.partition('-')
+        low, high = whole_number(first), whole_number(last or first)
+        if low is None or high is None or not 0 <= low <= high <= MAX_STATION:
+            problems.append(Problem(
+                f'parameter {name}', f'"{part}" should be a station from 0 to {MAX_STATION}, '
+                'or a range such as 3-5'))
+        else:
+            stations += range(low, high + 1)
+    return tuple(dict.fromkeys(stations))
 
 
 def _declare(node: Node, name: str, default: Any, description: str, low: float | None = None,
@@ -139,8 +193,9 @@ def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
         if kind is str and isinstance(value, int | float):
             value = str(value)
         if type(value) is not kind or (low is not None and not low <= value <= high):
-            right = f'a {kind.__name__}' if low is None else f'a {kind.__name__} from ' \
-                                                             f'{low:g} to {high:g}'
+            right = _KINDS[kind]
+            if low is not None:
+                right += f' from {low:.15g} to {high:.15g}'
             problems.append(Problem(
                 f'parameter {entry.name}', f'{entry.name} = {value!r} should be {right}'))
             value = entry.default
@@ -157,7 +212,7 @@ def _declare_network(node: Node, network: Network) -> Network:
         if entry.choices:
             description += f' ({", ".join(map(str, entry.choices))})'
         value = _declare(node, entry.parameter, default, description, entry.low, entry.high)
-        if value != default:
+        if _text(value) != str(default):  # 5.0 equals 5, but is no station
             given[name] = _text(value), f'parameter {entry.parameter}'
     return make_network(given, network)
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import math
 import os
 import select
+import termios
 import threading
 import time
 from typing import Protocol
@@ -141,8 +142,8 @@ def open_port(network: Network, name: str | None = None) -> Port:
             name or network.port, baudrate=network.baud, bytesize=network.data_bits,
             parity=_PARITIES[network.parity], stopbits=network.stop_bits,
             rtscts=network.handshake == 'Yes', timeout=0, exclusive=True)
-    except ValueError as error:
-        raise OSError(str(error)) from error
+    except (ValueError, termios.error) as error:  # the second: not every device has parity
+        raise OSError(*error.args) from error
     try:
         return DescriptorPort(port.fileno(), port.close)
     except (OSError, AttributeError):
@@ -249,7 +250,7 @@ class LinkThread(threading.Thread):
             data = port.read(timeout, self._wake_reader)
             if data:
                 machine.receive_data(data, clock())
-            elif self._take_wake():
+            elif self._take_wake() and not self._stopping:
                 machine.wake(clock())
             machine.handle_timeout(clock())
 

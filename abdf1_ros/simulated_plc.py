@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from enum import Enum
 import random
@@ -165,13 +165,17 @@ class SimulatedPlc:
             command = Packet(station, self.station, dialect.cmd, 0, self._tns, body)
             self.outbox.append(Sending(command, report))
 
-    def next_task(self, now: float) -> Sending | None:
+    def next_task(self, now: float, busy: Container[int] = ()) -> Sending | None:
         """Return a command of our own that waits to be sent."""
-        return self.outbox.popleft() if self.outbox else None
+        is_free = self.outbox and self.outbox[0].command.dst not in busy
+        return self.outbox.popleft() if is_free else None
 
     def next_due(self) -> float | None:
         """Return None: we send when we are told to, not by the clock."""
         return None
+
+    def expire(self, now: float) -> None:
+        """Do nothing: what is to be sent waits for ever."""
 
     def damaged(self, data: bytes) -> bytes:
         """Return what arrives of ``data`` at the other end."""
@@ -227,6 +231,8 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     if row.get('Values'):
         _store(plc.table, address, codec, _values(row, codec))
     if motion is not Motion.NONE:
+        if codec.type is ValueType.STRING:
+            raise Problem(row.where('Motion'), 'a string does not move')
         period = _number(row, 'Period', 1, 3_600_000)
         plc.move(_Mover(address, codec, motion, period / 1000))
 
@@ -253,11 +259,11 @@ def _choice(row: Row, column: str, choices: dict[str, _Choice]) -> _Choice:
 
 
 def _values(row: Row, codec: Codec) -> list[float] | str:
-    if codec.type is ValueType.STRING:
-        return row.get('Values')
+    values: list[float] | str = row.get('Values')
     try:
-        values = numbers(row.get('Values').split())
-        values += [0] * (codec.length - len(values))
+        if codec.type is not ValueType.STRING:
+            values = numbers(row.get('Values').split())
+            values += [0] * (codec.length - len(values))
         codec.check(values)
     except ValueError as error:
         raise Problem(row.where('Values'), str(error)) from None

@@ -43,6 +43,7 @@ from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.csv_table import whole_number
 from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file
@@ -152,7 +153,8 @@ class PtyLine:
         self.name = link or os.ttyname(self._theirs)
         self._link = Path(link) if link else None
         if self._link:
-            self._link.unlink(missing_ok=True)
+            if self._link.is_symlink():  # of an earlier run; anything else is not ours
+                self._link.unlink()
             self._link.symlink_to(os.ttyname(self._theirs))
 
     def open(self) -> Port:
@@ -173,7 +175,10 @@ class TcpLine:
 
     def __init__(self, address: str) -> None:
         host, _, port = address.rpartition(':')
-        self._listener = socket.create_server((host or '127.0.0.1', int(port)))
+        number = whole_number(port)
+        if number is None or not 0 <= number <= 65535:
+            raise ValueError(f'--tcp "{address}" should be HOST:PORT')
+        self._listener = socket.create_server((host or '127.0.0.1', number))
         self._listener.settimeout(0.2)
         self.name = 'socket://{}:{}'.format(*self._listener.getsockname()[:2])
 
@@ -303,16 +308,18 @@ def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]], lin
     signal.signal(signal.SIGINT, lambda *_: ended.set())
     signal.signal(signal.SIGTERM, lambda *_: ended.set())
     begin = time.monotonic()
-    inputs = [sys.stdin]
+    inputs = [sys.stdin.fileno()] if sys.stdin else []
+    rest = b''
     while not ended.is_set() and (passed := time.monotonic() - begin) < options.seconds:
         while script and script[0][0] <= passed:
             carry_out(script.pop(0)[1])
         if select.select(inputs, [], [], 0.05)[0]:
-            line = sys.stdin.readline()
-            if line:
-                carry_out(line)
-            else:
-                inputs = []  # closed; signals and --seconds still end us
+            data = os.read(inputs[0], 4096)
+            *lines, rest = (rest + data).split(b'\n')
+            if not data:
+                lines, inputs = [rest], []  # closed; signals and --seconds still end us
+            for line in lines:
+                carry_out(line.decode(errors='replace'))
 
 
 def _say(text: str) -> None:

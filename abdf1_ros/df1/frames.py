@@ -172,6 +172,7 @@ class FrameDecoder:
 
     def reset(self) -> None:
         """Forget everything heard so far."""
+        self.noise += len(self._buffer) + self.in_message
         self._buffer.clear()
         self._state = _State.IDLE
         self.last_byte = 0

@@ -105,6 +105,11 @@ class Machine:
         self._echoes = False
         self._echo_due = 0
 
+    @property
+    def char_time(self) -> float:
+        """Return the seconds that a character takes on the line."""
+        return self._timing.char_time
+
     def start(self, now: float) -> None:
         """Begin the procedure from its beginning."""
         self.stop()
@@ -141,8 +146,8 @@ class Machine:
         data = self._without_echo(data)
         if self._forget_on_send and not self._listening:
             return
-        if self._listening and self.deadline is None and (
-                now - self._last_heard > self._pause_limit):
+        is_idle = self._resting or self.deadline is None
+        if self._listening and is_idle and now - self._last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
         self._last_heard = now
         self.decoder.feed(data)

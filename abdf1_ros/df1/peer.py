@@ -112,6 +112,7 @@ class FullDuplexPeer:
         self._forget()
         while True:
             self._expire()
+            source.expire(self._machine.now)
             if self._replies:
                 yield from self._send_reply(self._replies.popleft())
                 continue
@@ -151,11 +152,11 @@ class FullDuplexPeer:
         self._counters.commands_sent += 1
         task.sent = True
         # A station that did not answer last time gets one try, not a whole cycle of them.
-        is_delivered = yield from self._transfer(
+        delivered = yield from self._transfer(
             task.command, lambda: key not in self._outstanding,
             is_probe=not self._stations[number].active)
-        if is_delivered:
-            entry.deadline = self._machine.now + self._settings.cmd_timeout
+        if delivered is not None:
+            entry.deadline = delivered + self._settings.cmd_timeout
         elif self._outstanding.pop(key, None):
             self._stations.lost(number, self._machine.now)
             self._note(Message.ERR_INACTIVE_STATION, number, station=number)
@@ -167,8 +168,8 @@ class FullDuplexPeer:
         yield from self._transfer(reply, lambda: False, is_probe=False)
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
-                  is_probe: bool) -> Generator[Step, Symbol | None, bool]:
-        """Return whether the message was delivered (M 4-5, TRANSFER)."""
+                  is_probe: bool) -> Generator[Step, Symbol | None, float | None]:
+        """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
         station = packet.dst
         naks = enqs = 0
@@ -202,9 +203,10 @@ class FullDuplexPeer:
                 self._note(Message.NTC_ENQ_RETRY, enqs, Message.NTC_ACK_EXPECTED.number,
                            station=station)
                 sending = frames.ENQ
+        delivered = self._machine.now if response in (Code.ACK, Code.STX) else None
         if naks or enqs or response is Code.STX:
             yield from self._listen(self._timeout)
-        return response in (Code.ACK, Code.STX)
+        return delivered
 
     def _response(self, sending: bytes,
                   is_answered: Callable[[], bool]) -> Generator[Step, Symbol | None, Code | None]:

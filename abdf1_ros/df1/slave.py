@@ -42,13 +42,35 @@ class SlaveSettings:
     The settings of a slave, with the defaults of Allen-Bradley's.
 
     ``retries`` is how often a message is sent again before it is given up; ``queue_size`` how
-    many replies may wait for a poll before the sink is full.
+    many replies may wait for a poll before the sink is full. With ``eot_suppression`` a poll
+    is answered with silence instead of EOT, which spares modems and looks dead to the master.
     """
 
     station: int
     checksum: Checksum = Checksum.CRC
     retries: int = 3
     queue_size: int = 4
+    eot_suppression: bool = False
+    duplicate_detection: bool = True
+
+
+class Initiator(Protocol):
+    """Where a slave gets commands of its own, and who is told what becomes of them."""
+
+    def polled(self) -> None:
+        """Take note that the master has polled us."""
+
+    def next_command(self) -> Packet | None:
+        """Return a command to send in answer to a poll."""
+
+    def delivered(self, command: Packet) -> None:
+        """Take note that the master has acknowledged a command."""
+
+    def undelivered(self, command: Packet) -> None:
+        """Take note that a command was given up, or dropped by the reset of the line."""
+
+    def replied(self, reply: Packet) -> None:
+        """Take a reply that the master has passed on to us."""
 
 
 @dataclass(slots=True)
@@ -64,17 +86,20 @@ class HalfDuplexSlave:
     One station on a half-duplex line.
 
     ``serve`` executes a command and returns its reply. It is called after the command has been
-    accepted, once for each command, never for a repetition.
+    accepted, once for each command, never for a repetition. ``initiator`` has commands of its
+    own to send, if there are any.
     """
 
     def __init__(self, settings: SlaveSettings, serve: Callable[[Packet], Packet],
-                 counters: Counters | None = None) -> None:
+                 counters: Counters | None = None, initiator: Initiator | None = None) -> None:
         self.counters = counters or Counters()
+        self._initiator = initiator
         self._settings = settings
         self._serve = serve
         self._queue: deque[Packet] = deque()
         self._held: _Held | None = None
         self._just_sent = False
+        self._sent_reply = True
         self._last_key: tuple[int, int, int] | None = None
 
     def handle(self, symbol: Symbol) -> bytes:
@@ -87,12 +112,22 @@ class HalfDuplexSlave:
         if symbol == Control(Code.ACK) and just_sent:
             # An ACK names no station: it is ours only straight after our own message.
             self.counters.acks_received += 1
-            self._held = None
+            self._release(is_delivered=True)
         elif symbol == Control(Code.NAK):
             self.counters.naks_received += 1
-            self._held = None
+            self._release(is_delivered=False)
             self._queue.clear()  # the reset of the whole line (M 2-7, 3-11)
         return b''
+
+    def _release(self, is_delivered: bool) -> None:
+        """Let go of the held message; a command's sender is told how it went (KF2 4-31)."""
+        held, self._held = self._held, None
+        if held is None or held.packet.is_reply or self._initiator is None:
+            return
+        if is_delivered:
+            self._initiator.delivered(held.packet)
+        else:
+            self._initiator.undelivered(held.packet)
 
     def _received(self, frame: Frame) -> bytes:
         """Take a master's frame (KF2 4-31)."""
@@ -103,7 +138,7 @@ class HalfDuplexSlave:
             return b''
         packet = Packet.decode(frame.data)
         self.counters.messages_received += 1
-        if packet.duplicate_key == self._last_key:
+        if packet.duplicate_key == self._last_key and self._settings.duplicate_detection:
             self.counters.duplicate_messages += 1
             return self._ack(frame)
         if len(self._queue) >= self._settings.queue_size:
@@ -115,6 +150,9 @@ class HalfDuplexSlave:
     def _execute(self, packet: Packet, wants_reply: bool) -> None:
         if packet.is_reply:
             self.counters.replies_received += 1
+            self.counters.error_messages_received += packet.sts != 0
+            if self._initiator is not None:
+                self._initiator.replied(packet)
             return
         self.counters.commands_received += 1
         reply = self._serve(packet)
@@ -134,19 +172,39 @@ class HalfDuplexSlave:
         self.counters.polls_received += 1
         if self._held is not None and self._held.sent > self._settings.retries:
             self.counters.nak_limit_exceeded += 1
-            self._held = None
-        if self._held is None and self._queue:
-            self._held = _Held(self._queue.popleft())
+            self._release(is_delivered=False)
+        if self._initiator is not None:
+            self._initiator.polled()
         if self._held is None:
-            self.counters.eots_sent += 1
-            return frames.EOT
-        return self._send(self._held)
+            packet = self._next_packet()
+            self._held = _Held(packet) if packet is not None else None
+        if self._held is not None:
+            return self._send(self._held)
+        if self._settings.eot_suppression:
+            return b''
+        self.counters.eots_sent += 1
+        return frames.EOT
+
+    def _next_packet(self) -> Packet | None:
+        """
+        Return a reply that waits, or a command of our own.
+
+        They take turns: a master that polls only for its replies would never get our commands.
+        """
+        if self._initiator is not None and (self._sent_reply or not self._queue):
+            command = self._initiator.next_command()
+            if command is not None:
+                self._sent_reply = False
+                return command
+        self._sent_reply = True
+        return self._queue.popleft() if self._queue else None
 
     def _send(self, held: _Held) -> bytes:
         if held.sent:
             self.counters.nak_retries += 1
         else:
-            self.counters.replies_sent += 1
+            self.counters.replies_sent += held.packet.is_reply
+            self.counters.commands_sent += not held.packet.is_reply
             self.counters.error_messages_sent += held.packet.sts != 0
         held.sent += 1
         self.counters.messages_sent += 1

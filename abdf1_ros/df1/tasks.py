@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Protocol
 
 from abdf1_ros.df1.packet import Packet
@@ -43,8 +44,11 @@ class Task(Protocol):
 class TaskSource(Protocol):
     """Where a link gets its tasks."""
 
-    def next_task(self, now: float) -> Task | None:
-        """Return what has the line next, or None when nothing is due."""
+    def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
+        """Return what has the line next, but not for a ``busy`` station; None for nothing."""
 
     def next_due(self) -> float | None:
         """Return when something will be due (clock value in s), None for never."""
+
+    def expire(self, now: float) -> None:
+        """Do what needs no line, such as ending what has waited too long to be sent."""

@@ -23,17 +23,20 @@ port and a clock; the tests give it a virtual line.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Container, Generator, Iterable, Sequence
 from dataclasses import dataclass
 import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.master_line import MasterSettings
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.mapping import Mapping
@@ -60,6 +63,9 @@ Request = tuple[int, bytes]
 Steps = Generator[Request, Packet, None]
 
 
+Link = HalfDuplexMaster | StandardPollingMaster | FullDuplexPeer | SlaveLink
+
+
 class Listener(Protocol):
     """Who wants to know; called in the link thread, ``written`` also in that of ``write``."""
 
@@ -81,9 +87,11 @@ class DriverSettings:
     """
     What is not in the net CSV; times in seconds.
 
-    ``stale_after`` counts periods; ``max_outstanding`` commands may wait for their reply at a
-    time in full duplex; ``first_tns`` is the transaction number to begin with, which
-    should be random, or a restarted driver repeats itself and is taken for a duplicate.
+    ``stale_after`` counts periods. ``max_outstanding`` commands may wait for their reply at a
+    time in full duplex. ``polling`` is for standard polling, None for one list of all mapped
+    stations. ``first_tns`` is the transaction number to begin with, which should be random, or
+    a restarted driver repeats itself and is taken for a duplicate. All else is explained with
+    the settings of masters and slaves in ``df1``.
     """
 
     default_period: float = 0.1
@@ -92,6 +100,11 @@ class DriverSettings:
     read_only: bool = False
     nak_on_command_timeout: bool = True
     max_outstanding: int = 1
+    accept_slave_messages: bool = True
+    polling: PollingSettings | None = None
+    eot_suppression: bool = False
+    duplicate_detection: bool = True
+    poll_timeout: float = 60.0
     first_tns: int = 0
 
 
@@ -104,12 +117,12 @@ class Driver:
         self.mappings = tuple(mappings)
         self.counters = Counters()
         self.stations = ActiveStationList(
-            (mapping.station for mapping in mappings if not mapping.serves),
-            listener.station_changed)
+            (mapping.station for mapping in mappings
+             if not mapping.serves and mapping.station != BROADCAST), self._station_changed)
         self.machine = Machine(
             lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
             timing=network.timing, counters=self.counters,
-            forget_on_send=network.duplex is Duplex.HALF)
+            forget_on_send=network.mode == 'Master')
         self.is_online = False
         self.transactions = 0
         self._to_serve: deque[Write] = deque()
@@ -118,7 +131,7 @@ class Driver:
         self._settings = settings
         self._listener = listener
         self._served = Served(PlcType(network.plc_type), mappings, self._serve_written)
-        self._link = self._make_link()
+        self.link = self._make_link()
         self._tns = settings.first_tns
         self._last_tns: dict[int, int] = {}
         self._planner = Planner(
@@ -169,20 +182,34 @@ class Driver:
         self._listener.written(
             WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
 
-    def _make_link(self) -> HalfDuplexMaster | FullDuplexPeer:
+    def _make_link(self) -> Link:
         network, settings = self.network, self._settings
         timeout, cmd_timeout = network.timeout / 1000, network.cmd_timeout / 1000
-        if network.duplex is Duplex.FULL:
+        serve, report = self._served.serve, self._listener.happened
+        if network.mode == 'Peer':
             peer_settings = PeerSettings(
                 network.checksum, network.nak_retries, network.enq_retries, timeout,
                 cmd_timeout, settings.max_outstanding)
-            return FullDuplexPeer(self.machine, peer_settings, self.stations,
-                                  self._served.serve, self._listener.happened)
+            return FullDuplexPeer(self.machine, peer_settings, self.stations, serve, report)
+        if network.mode == 'Slave':
+            slave_settings = SlaveSettings(
+                network.station, network.checksum, network.nak_retries,
+                eot_suppression=settings.eot_suppression,
+                duplicate_detection=settings.duplicate_detection)
+            return SlaveLink(self.machine, slave_settings, self.stations, serve,
+                             cmd_timeout=cmd_timeout, poll_timeout=settings.poll_timeout,
+                             report=report)
         master_settings = MasterSettings(
             network.station, network.checksum, network.nak_retries, network.enq_retries,
-            timeout, cmd_timeout, settings.nak_on_command_timeout)
+            timeout, cmd_timeout, settings.nak_on_command_timeout,
+            accept_slave_messages=settings.accept_slave_messages)
+        if network.polling == 'Standard':
+            mapped = tuple(station.number for station in self.stations)
+            polling = settings.polling or PollingSettings(mapped)
+            return StandardPollingMaster(
+                self.machine, master_settings, polling, self.stations, report, serve)
         return HalfDuplexMaster(
-            self.machine, master_settings, self.stations, self._listener.happened)
+            self.machine, master_settings, self.stations, report, serve)
 
     def _point(self, mapping: Mapping) -> ReadPoint:
         if mapping.serves:
@@ -199,21 +226,33 @@ class Driver:
     def _job(self, block: Block) -> ReadJob:
         return ReadJob(block, [self.points[mapping] for mapping in block.mappings])
 
-    def next_task(self, now: float) -> Task | None:
+    def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command: of a write, of a job that is under way, or of a new one."""
-        while self._to_serve:
-            self._store(self._to_serve.popleft())
-        write = self._scheduler.next_write(now, bool(self._under_way))
+        self.expire(now)
+        under_way = next((task for task in self._under_way if task.station not in busy), None)
+        write = self._scheduler.next_write(now, under_way is not None, busy)
         if write is not None:
             return self._start(write.mapping.station, self._write_steps(write))
-        if self._under_way:
-            return self._under_way.popleft()
-        job = self._scheduler.next_read(now)
+        if under_way is not None:
+            self._under_way.remove(under_way)
+            return under_way
+        job = self._scheduler.next_read(now, busy)
         return None if job is None else self._start(job.station, self._read_steps(job, now))
 
     def next_due(self) -> float | None:
         """Return when the next read is due (clock value in s), None for never."""
         return self._scheduler.next_due()
+
+    def expire(self, now: float) -> None:
+        """Do what needs no line: store what we serve, end what has waited too long for it."""
+        while self._to_serve:
+            self._store(self._to_serve.popleft())
+        self._scheduler.expire(now)
+
+    def _station_changed(self, station: Station) -> None:
+        if station.active:
+            self._scheduler.release(station.number, self.machine.now)
+        self._listener.station_changed(station)
 
     def _store(self, write: Write) -> None:
         """Put values where the other end reads them."""
@@ -230,7 +269,7 @@ class Driver:
         self.is_online = True
         reason = 'internal error, see the log'
         try:
-            yield from self._link.run(self)
+            yield from self.link.run(self)
         except PortLost as error:
             reason = error.args[0]
             raise
@@ -313,6 +352,8 @@ class Driver:
 
     def _link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
         """Fail what the end of a transaction without a reply concerns."""
+        if station == BROADCAST:
+            return
         self.stations[station].failures += 1
         if not self.stations[station].active:
             points = (point for point in self.points.values()
@@ -336,7 +377,9 @@ class Driver:
             self._finish_write(write, outcome, str(error), done)
             self._link_failed(station, (), error)
         else:
-            self._finish_write(write, Outcome.WRITTEN, '', done)
+            is_broadcast = station == BROADCAST
+            outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
+            self._finish_write(write, outcome, '', done)
         if done:
             self._scheduler.hasten(write, self.machine.now)
 
@@ -364,7 +407,7 @@ class _JobTask:
     def __init__(self, driver: Driver, station: int, steps: Steps) -> None:
         self.sent = False
         self._driver = driver
-        self._station = station
+        self.station = station
         self._steps = steps
         self.command = driver.new_command(station, next(steps))
 
@@ -388,5 +431,5 @@ class _JobTask:
             self._driver.advanced(self, is_done=True)
             raise
         self.sent = False
-        self.command = self._driver.new_command(self._station, request)
+        self.command = self._driver.new_command(self.station, request)
         self._driver.advanced(self, is_done=False)

@@ -21,6 +21,7 @@ from enum import Enum
 import math
 from typing import TypeVar
 
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
 from abdf1_ros.driver.names import MAX_LENGTH, sanitise
 from abdf1_ros.driver.values import Codec, types_of, ValueType
@@ -153,7 +154,9 @@ class _RowReader:
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
         command = self._choice('Command', Command, None)
-        station = self._number('Station', 0, _MAX_STATION, None, Message.ERR_BAD_STATION,
+        # 255 is everybody, who may be written to but cannot answer.
+        last_station = BROADCAST if command is Command.WRITE else _MAX_STATION
+        station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
                                _MAX_STATION + 1)
         plc_type = self._plc_type()
         length = self._number('Length', 1, 65535, 1)

@@ -28,7 +28,8 @@ from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Message
 
 MODES = ('Master', 'Slave', 'Peer')
-SUPPORTED_MODES = ('Master', 'Peer')
+SUPPORTED_MODES = MODES
+POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 
@@ -132,6 +133,8 @@ class Network:
         'TX_Delay', 0, 'ms to wait before each transmission', low=0, high=65535)
     handshake: str = _net(
         'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
+    polling: str = _net(
+        'Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
 
     @property
     def checksum(self) -> Checksum:
@@ -202,9 +205,9 @@ def make_network(values: MappingType[str, tuple[str, str]],
 
 def _check_mode(name: str, value: int | str, where: str) -> None:
     if name == 'mode' and value not in SUPPORTED_MODES:
-        supported = ', '.join(SUPPORTED_MODES)
         raise Problem(where, f'Mode = "{value}" is not available yet',
-                      Message.CRT_UNSUPPORTED_MODE, (MODES.index(str(value)), supported))
+                      Message.CRT_UNSUPPORTED_MODE,
+                      (MODES.index(str(value)), ', '.join(SUPPORTED_MODES)))
 
 
 def _check_port(name: str, value: int | str, where: str) -> None:

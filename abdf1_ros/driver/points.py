@@ -98,6 +98,7 @@ class Outcome(Enum):
     """How a write ended."""
 
     WRITTEN = 'written'
+    BROADCAST = 'sent to all stations; nobody confirms a broadcast'
     SUPERSEDED = 'not written: superseded by a newer value'
     REFUSED = 'not written: refused'
     NOT_SENT = 'not written: not sent'

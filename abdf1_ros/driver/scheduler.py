@@ -24,7 +24,7 @@ goes out as a probe, at a pace that leaves seven eighths of the line to the livi
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 import heapq
 import itertools
 
@@ -129,31 +129,37 @@ class Scheduler:
         """Queue a write; may be called from any thread."""
         self._inbox.append(write)
 
-    def next_write(self, now: float, is_read_waiting: bool = False) -> Write | None:
+    def next_write(self, now: float, is_read_waiting: bool = False,
+                   busy: Container[int] = ()) -> Write | None:
         """
         Return the next write, unless it is a read's turn.
 
-        ``is_read_waiting`` tells of a read that has begun and wants to go on.
+        ``is_read_waiting`` tells of a read that has begun and wants to go on. Writes to
+        stations in ``busy`` keep waiting.
         """
+        self.expire(now)
+        write = next((write for write in self._writes if write.mapping.station not in busy),
+                     None)
+        is_reads_turn = self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and (
+            is_read_waiting or self._is_read_due(now))
+        if write is None or is_reads_turn:
+            self._writes_in_a_row = 0
+            return None
+        self._writes.remove(write)
+        self._writes_in_a_row += 1
+        return write
+
+    def expire(self, now: float) -> None:
+        """End the writes that have waited too long."""
         while self._inbox:
             self._queue(self._inbox.popleft(), now)
-        while self._writes:
-            if self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and (
-                    is_read_waiting or self._is_read_due(now)):
-                self._writes_in_a_row = 0
-                return None
-            write = self._writes.popleft()
-            if now - write.requested <= self._write_timeout:
-                self._writes_in_a_row += 1
-                return write
+        while self._writes and now - self._writes[0].requested > self._write_timeout:
             detail = f'waited longer than {self._write_timeout:g} s for the line'
-            self._report(write.result(Outcome.NOT_SENT, detail, now))
-        self._writes_in_a_row = 0
-        return None
+            self._report(self._writes.popleft().result(Outcome.NOT_SENT, detail, now))
 
-    def next_read(self, now: float) -> ReadJob | None:
-        """Return the next read or probe, or None when nothing is due."""
-        return self._take_probe(now) or self._take_read(now)
+    def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
+        """Return the next read or probe of a station not in ``busy``, None for nothing due."""
+        return self._take_probe(now) or self._take_read(now, busy)
 
     def next_due(self) -> float | None:
         """Return when the next read or probe is due (clock value in s), None for never."""
@@ -171,12 +177,12 @@ class Scheduler:
             self._next_probe = now + (job.block.period if nobody_else else self._probe_interval)
             self._park(job)
             return
-        self._release(job.station, now)
+        self.release(job.station, now)
         self._push(job, max(job.due + job.block.period, started))
 
     def hasten(self, write: Write, now: float) -> None:
         """Make the reads that show what ``write`` changed due at once."""
-        self._release(write.mapping.station, now)
+        self.release(write.mapping.station, now)
         for job in self._jobs:
             if job.covers(write) and job.due > now:
                 self._push(job, now)
@@ -198,7 +204,7 @@ class Scheduler:
 
     def _take_probe(self, now: float) -> ReadJob | None:
         for number in [number for number in self._parked if self._stations[number].active]:
-            self._release(number, now)  # it has answered a write
+            self.release(number, now)  # it has answered a write
         if not self._parked or now < self._next_probe:
             return None
         station = next(iter(self._parked))
@@ -208,8 +214,20 @@ class Scheduler:
             self._parked[station] = jobs  # to the end: the next probe is another station's
         return job
 
-    def _take_read(self, now: float) -> ReadJob | None:
-        return heapq.heappop(self._heap)[2] if self._is_read_due(now) else None
+    def _take_read(self, now: float, busy: Container[int]) -> ReadJob | None:
+        found = None
+        passed_over = []
+        while found is None and self._is_read_due(now):
+            job = heapq.heappop(self._heap)[2]
+            if not self._stations[job.station].active:
+                self._park(job)
+            elif job.station in busy:
+                passed_over.append(job)
+            else:
+                found = job
+        for job in passed_over:
+            self._push(job, job.due)
+        return found
 
     def _is_read_due(self, now: float) -> bool:
         """Tell whether a read of an active station is due; those of others are set aside."""
@@ -226,7 +244,8 @@ class Scheduler:
         job.due, job.ticket = due, next(self._tickets)
         heapq.heappush(self._heap, (due, job.ticket, job))
 
-    def _release(self, station: int, now: float) -> None:
+    def release(self, station: int, now: float) -> None:
+        """Make the reads of a station that were set aside due at once."""
         for job in self._parked.pop(station, ()):
             self._push(job, now)
 

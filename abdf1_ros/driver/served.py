@@ -101,6 +101,7 @@ class Served:
                 self._table.write_bits(start.at_offset(start.offset + number), mask, bits)
         else:
             self._table.write(start, mapping.codec.encode(values))
+        self._table.changed.clear()  # nobody has to be told of what we write ourselves
 
 
 def served_problems(mappings: Sequence[Mapping], network: Network,
@@ -117,8 +118,6 @@ def served_problems(mappings: Sequence[Mapping], network: Network,
 
 
 def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:
-    if network.mode != 'Peer':
-        return f'Command Serve needs Mode Peer, the net file says {network.mode}'
     if mapping.plc_type.value != network.plc_type:
         return (f'a Serve row has the PLC_Type we emulate, which is {network.plc_type} '
                 'in the net file')

@@ -130,6 +130,8 @@ class Codec:
 
     def check(self, values: Sequence[float] | str) -> None:
         """Raise FormatError, saying which value is wrong, unless all can be written."""
+        if isinstance(values, str) is not (self.type is ValueType.STRING):
+            raise FormatError(f'{values!r} is no {self.type.value}')
         if isinstance(values, str):
             _encode_string(values)
             return
@@ -137,7 +139,8 @@ class Codec:
             raise FormatError(f'{len(values)} values, the mapping has {self.length}')
         low, high = self.type.range
         for index, value in enumerate(values):
-            if not low <= value <= high:  # also NaN
+            is_whole = self.type is ValueType.FLOAT32 or value % 1 == 0
+            if not low <= value <= high or not is_whole:  # also NaN
                 raise FormatError(f'value {value} at index {index} is no {self.type.value}')
 
     def encode(self, values: Sequence[float] | str) -> bytes:

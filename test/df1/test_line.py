@@ -23,7 +23,8 @@ from random import Random
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
-from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
+from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.df1.stations import ActiveStationList

@@ -22,7 +22,8 @@ from typing import Any
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame, STX
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings, MIN_RESPONSE_TIME
+from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.master_line import MasterSettings, MIN_RESPONSE_TIME
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
 import pytest
@@ -470,7 +471,7 @@ def test_command_from_a_slave_is_acknowledged_and_passed_over() -> None:
 
 @pytest.mark.parametrize('change', [{'dst': 6}, {'src': 18}])
 def test_reply_with_wrong_addresses_is_invalid(change: dict[str, Any]) -> None:
-    script = MasterScript(SETTINGS)
+    script = MasterScript(replace(SETTINGS, accept_slave_messages=False))
     wrong = replace(REPLY, **change)
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), ACKED, POLLED_AGAIN,
                       Answer(frame(replace(REPLY, tns=0x0101))), ACKED, POLLED_AGAIN,

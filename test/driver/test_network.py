@@ -72,11 +72,11 @@ def faults(path: Path, header: str, row: str) -> list[str]:
     return [str(problem).replace(str(path), 'FILE') for problem in caught.value.problems]
 
 
-def test_columns_are_those_of_the_specification() -> None:
+def test_columns_are_those_of_the_specification_and_polling() -> None:
     assert [entry.column for entry in FIELDS.values()] == [
         'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
         'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
-        'TX_Delay', 'Handshake']
+        'TX_Delay', 'Handshake', 'Polling']
 
 
 def test_defaults() -> None:

@@ -180,9 +180,12 @@ def test_string_that_cannot_be_written(text: str, error: str) -> None:
     (ValueType.FLOAT32, [-math.inf, 0.0], 'value -inf at index 0 is no float32'),
     (ValueType.FLOAT32, [0.0, 3.5e38], 'value 3.5e+38 at index 1 is no float32'),
     (ValueType.INT16, [math.nan, 0], 'value nan at index 0 is no int16'),
+    (ValueType.INT16, [1.0, 1.5], 'value 1.5 at index 1 is no int16'),
+    (ValueType.INT16, 'ab', "'ab' is no int16"),
+    (ValueType.STRING, [65, 66], '[65, 66] is no string'),
 ])
 def test_values_that_cannot_be_written(
-        kind: ValueType, values: list[float], error: str) -> None:
+        kind: ValueType, values: list[float] | str, error: str) -> None:
     with pytest.raises(FormatError) as caught:
         Codec(kind, 2).check(values)
     assert str(caught.value) == error

@@ -40,17 +40,21 @@ from abdf1_ros.port import LinkThread
 from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
 from abdf1_ros.simulator import execute, PtyLine
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import HistoryPolicy, QoSProfile
 
 # Read when the first context is made, here and in every child process.
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
     'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0'}
+
+EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 
 PATIENCE = 20.0  # s; what takes longer does not happen
 
@@ -154,6 +158,7 @@ class Inbox(list[Any]):
     def __init__(self, observer: Observer, topic: str) -> None:
         super().__init__()
         self.topic = topic
+        self.subscription: Any = None
         self.deadlines: list[Any] = []
         self.liveliness: list[Any] = []
         self.incompatible: list[Any] = []
@@ -227,21 +232,24 @@ class Observer:
         self.node.destroy_subscription(inbox.subscription)
 
     def results(self, name: str = '/abdf1') -> Inbox:
-        """Listen to the results of writes, and wait until none can be missed."""
-        qos = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-        inbox = self.listen(DiagnosticStatus, f'{name}/write_results', qos)
-        topic = f'{name}/write_results'
-        self.until(lambda: self.node.count_publishers(topic), f'a publisher of {topic}')
-        return inbox
+        """Listen to the results of writes; begin before the node does, to miss none."""
+        return self.listen(DiagnosticStatus, f'{name}/write_results', EVERYTHING)
 
-    def diagnostics(self) -> Inbox:
-        """Listen to /diagnostics."""
-        return self.listen(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
+    def diagnostics(self, port: object) -> Inbox:
+        """Listen to what the node on ``port`` says on /diagnostics."""
+        inbox = Inbox(self, '/diagnostics')
+
+        def take(array: DiagnosticArray) -> None:
+            if array.status[0].hardware_id == str(port):
+                inbox.append(array)
+
+        inbox.subscription = self.node.create_subscription(
+            DiagnosticArray, '/diagnostics', take, EVERYTHING)
+        return inbox
 
     def publisher(self, message_type: Any, topic: str) -> Any:
         """Return a publisher that a subscriber has been found for."""
-        qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.VOLATILE)
-        publisher = self.node.create_publisher(message_type, topic, qos)
+        publisher = self.node.create_publisher(message_type, topic, EVERYTHING)
         self.until(publisher.get_subscription_count, f'a subscriber of {topic}')
         return publisher
 
@@ -253,6 +261,14 @@ class Observer:
         self.until(future.done, f'an answer of {name}')
         self.node.destroy_client(client)
         return future.result()
+
+
+def get_parameters(observer: Observer, *names: str, node: str = '/abdf1') -> list[Any]:
+    """Return the values of a node's parameters."""
+    response = observer.call(
+        GetParameters, f'{node}/get_parameters', GetParameters.Request(names=names))
+    assert len(response.values) == len(names)
+    return [parameter_value_to_python(value) for value in response.values]
 
 
 def find_status(array: DiagnosticArray, name: str) -> DiagnosticStatus:
@@ -292,12 +308,17 @@ class Plcs:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._link.stop()
-        self._line.close()
+        if self._link.is_alive():
+            self.lose()
         assert not self.faults
 
     def __getitem__(self, station: int) -> SimulatedPlc:
         return next(plc for plc in self._plcs if plc.station == station)
+
+    def lose(self) -> None:
+        """Take the line away, as when an adapter is unplugged."""
+        self._link.stop()
+        self._line.close()
 
     def say(self, command: str) -> None:
         """Carry out a command of the simulator."""

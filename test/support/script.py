@@ -20,7 +20,8 @@ from dataclasses import asdict, dataclass
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
-from abdf1_ros.df1.master import HalfDuplexMaster, MasterSettings
+from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import LinkError

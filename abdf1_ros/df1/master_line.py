@@ -1,0 +1,336 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What every half-duplex master does on its line: deliver, poll, receive, pass on.
+
+The rules are S0's, "Functional Overview", and those of M 3-12..3-17; how they make up a
+transaction is in ``master``, how they make up a polling scan in ``polling``.
+
+Every good message is acknowledged, also one that is not wanted, because the slave holds it
+until then (M 3-15). A master never asks for a repetition with DLE NAK, which is the reset of
+the whole line (M 2-7, 3-11).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import NoReturn, TypeGuard
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.faults import count_fault
+from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol, Unknown
+from abdf1_ros.df1.machine import LISTEN_ON, Machine, Step
+from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.errors import StationInactive, WrongCommandCode
+from abdf1_ros.messages import Event, Message
+
+# What an operating system or USB adapter may hold a byte back; no wait is shorter, so that
+# Timeout = 0 (S0 allows it) still means "as short as the equipment can do".
+MIN_RESPONSE_TIME = 0.02
+
+# Nobody answers a broadcast; so long (s) the line is left to the slaves after one.
+BROADCAST_PAUSE = 0.05
+
+# Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
+MAX_FORWARDS = 16
+
+_NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
+
+Talk = Generator[Step, Symbol | None, None]
+
+
+@dataclass(frozen=True, slots=True)
+class MasterSettings:
+    """
+    The settings of a half-duplex master, named as in S0; times in seconds.
+
+    ``poll_pause`` passes between an EOT and the next poll of the same station, to let it
+    finish. With ``accept_slave_messages`` what slaves send by themselves is served or passed
+    on to the station it is for; otherwise it is acknowledged and dropped.
+    """
+
+    station: int = 5
+    checksum: Checksum = Checksum.CRC
+    nak_retries: int = 3
+    enq_retries: int = 3
+    timeout: float = 1.0
+    cmd_timeout: float = 1.0
+    nak_on_command_timeout: bool = True
+    poll_pause: float = 0.005
+    accept_slave_messages: bool = True
+
+
+class MasterLine:
+    """
+    The line of a half-duplex master.
+
+    ``serve`` executes commands of slaves for us and returns their replies; ``report`` is
+    called with every numbered error and notice as it happens.
+    """
+
+    def __init__(self, machine: Machine, settings: MasterSettings, stations: ActiveStationList,
+                 report: Callable[[Event], None] = lambda event: None,
+                 serve: Callable[[Packet], Packet] | None = None) -> None:
+        self.machine = machine
+        self.settings = settings
+        self.stations = stations
+        self._report = report
+        self._serve = serve
+        self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
+        self._last_code = 0
+        self._forwards: deque[Packet] = deque()
+
+    @property
+    def counters(self) -> Counters:
+        """Return the counters of the line."""
+        return self.machine.counters
+
+    def deliver(self, number: int, packet: Packet) -> Generator[Step, Symbol | None, None]:
+        """Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12)."""
+        frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
+        self._count_sent(packet)
+        if number == BROADCAST:
+            self.counters.messages_sent += 1
+            yield Step(frame, BROADCAST_PAUSE)
+            return
+        for retry in range(1, self.settings.nak_retries + 2):
+            self.counters.messages_sent += 1
+            answer = yield from self._ask(frame, number, (Code.ACK, Code.NAK))
+            if answer == Control(Code.ACK):
+                self.stations.heard(number, self.machine.now)
+                return
+            cause = self._undelivered(answer, number)
+            if retry <= self.settings.nak_retries:
+                self.counters.nak_retries += 1
+                self.note(Message.NTC_NAK_RETRY, retry, cause.number, station=number)
+        self.counters.nak_limit_exceeded += 1
+        self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
+        self.fail_inactive(number)
+
+    def _undelivered(self, answer: Symbol | None, number: int) -> Message:
+        """Note why a command was not acknowledged; return the cause."""
+        if answer == Control(Code.NAK):
+            self.note(Message.NTC_RCVD_NAK_SYMBOL, station=number)
+            self.note(Message.ERR_RCVD_NAK_SYMBOL, station=number)
+            return Message.ERR_RCVD_NAK_SYMBOL
+        if isinstance(answer, Frame) and answer.fault is not None:
+            return self._note_fault(answer, number)
+        self.note(Message.NTC_ACK_EXPECTED, self._last_code, station=number)
+        return Message.NTC_ACK_EXPECTED
+
+    def revive(self, number: int) -> Talk:
+        """
+        Poll an inactive station once (S0, "Active Station List").
+
+        Any proper answer makes it active; StationInactive when there is none.
+        """
+        answer = yield from self.poll(number)
+        if not is_good(answer):
+            self.fail_inactive(number)
+        if isinstance(answer, Frame):
+            packet = yield from self.receive(number, answer)
+            if packet is not None:
+                self.take_unwanted(number, packet)
+
+    def poll_with_retries(self, number: int,
+                          pause: float) -> Generator[Step, Symbol | None, Control | Frame]:
+        """Poll until EOT or a good message; a station that gives neither becomes inactive."""
+        for retry in range(1, self.settings.enq_retries + 2):
+            answer = yield from self.poll(number, pause)
+            if is_good(answer):
+                return answer
+            pause = 0.0
+            cause = self._unanswered(answer, number)
+            if retry <= self.settings.enq_retries:
+                self.counters.enq_retries += 1
+                self.note(Message.NTC_ENQ_RETRY, retry, cause.number, station=number)
+        self.counters.enq_limit_exceeded += 1
+        self.note(Message.NTC_ENQ_LIMIT_EXCEEDED, self.settings.enq_retries, station=number)
+        self.fail_inactive(number)
+
+    def _unanswered(self, answer: Symbol | None, number: int) -> Message:
+        """Note why a poll has to be repeated; return the cause."""
+        if isinstance(answer, Frame):
+            return self._note_fault(answer, number)
+        self.note(Message.NTC_EOT_STX_EXPECTED, self._last_code, station=number)
+        return Message.NTC_EOT_STX_EXPECTED
+
+    def poll(self, number: int,
+              pause: float = 0.0) -> Generator[Step, Symbol | None, Symbol | None]:
+        """Poll once; return EOT, a frame good or bad, or None for silence."""
+        self.counters.polls_sent += 1
+        answer = yield from self._ask(frames.poll_frame(number), number, (Code.EOT,), pause)
+        if is_good(answer):
+            self.stations.heard(number, self.machine.now)
+        return answer
+
+    def _ask(self, frame: bytes, number: int, wanted: tuple[Code, ...],
+             delay: float = 0.0) -> Generator[Step, Symbol | None, Symbol | None]:
+        """
+        Send ``frame``; return a ``wanted`` control symbol, any slave's frame, or None.
+
+        Other symbols are counted and passed over while the time runs: noise, an answer that
+        comes late, or our own frame coming back from a two-wire adapter. Such an echo is
+        expected from then on, or that of our ACK would be taken for the next station's.
+        """
+        self._last_code = 0
+        step = Step(frame, self._timeout, delay)
+        while (symbol := (yield step)) is not None:
+            step = LISTEN_ON
+            if isinstance(symbol, Control):
+                self._count_control(symbol.code)
+                self._last_code = symbol.code
+                if symbol.code in wanted:
+                    return symbol
+            elif isinstance(symbol, Unknown):
+                self._last_code = symbol.byte
+                self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
+            elif isinstance(symbol, Frame) and symbol.station is None:
+                self._last_code = Code.STX
+                return symbol
+            elif self._is_echo(symbol, frame):
+                self.machine.expect_echo()
+        if self.machine.decoder.in_message:
+            return Frame(b'', fault=Fault.NO_ETX)
+        self._last_code = self._last_code or self.machine.decoder.last_byte
+        return None
+
+    def _is_echo(self, symbol: Frame | Poll, frame: bytes) -> bool:
+        """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
+        if isinstance(symbol, Poll):
+            return frames.poll_frame(symbol.station) == frame
+        assert symbol.station is not None  # a slave's frame is an answer
+        return frames.master_frame(
+            symbol.station, symbol.data, self.settings.checksum) == frame
+
+    def receive(self, number: int,
+                frame: Frame) -> Generator[Step, Symbol | None, Packet | None]:
+        """Acknowledge a good message; return it, or None when it is a repetition."""
+        self.counters.messages_received += 1
+        packet = Packet.decode(frame.data)
+        station = self.stations[number]
+        is_new = packet.duplicate_key != station.last_key
+        if is_new and self._is_to_forward(packet) and len(self._forwards) >= MAX_FORWARDS:
+            return None  # not acknowledged: the slave keeps it
+        self.counters.acks_sent += 1
+        yield Step(frames.ACK, 0)
+        if not station.accepts(packet):
+            self.counters.duplicate_messages += 1
+            self.note(Message.NTC_DUPLICATE_MSG_RCVD, number, station=number)
+            return None
+        if packet.is_reply:
+            self.counters.replies_received += 1
+            self.counters.error_messages_received += packet.sts != 0
+        else:
+            self.counters.commands_received += 1
+        station.last_tns = packet.tns
+        return packet
+
+    def check_reply(self, number: int, reply: Packet, command: Packet) -> None:
+        """Account for the reply to ``command``; WrongCommandCode when it is another's."""
+        expected = command.cmd | REPLY_BIT
+        if reply.cmd != expected:
+            self.counters.invalid_messages += 1
+            details = number, reply.cmd, expected
+            self.note(Message.ERR_BAD_FUNCTION_CODE, *details, station=number)
+            raise WrongCommandCode(*details)
+        self.stations[number].replies += 1
+        self.note(Message.NTC_REPLY_MSG_RCVD, number, station=number)
+
+    def take_unwanted(self, number: int, packet: Packet) -> None:
+        """
+        Take a message that answers nothing of ours (S0, DispatchAbDf1Message).
+
+        It is served, kept to be passed on, or dropped and accounted for.
+        """
+        if self._is_to_forward(packet):
+            self._forwards.append(packet)
+            return
+        is_ours = packet.dst == self.settings.station and packet.src == number
+        if is_ours and not packet.is_reply and self.settings.accept_slave_messages \
+                and self._serve is not None:
+            self._forwards.append(self._serve(packet))
+            return
+        if packet.is_reply and is_ours:
+            self.counters.stale_messages += 1
+        else:
+            self.counters.invalid_messages += not is_ours
+        self.note(Message.ERR_WRONG_MESSAGE, packet.src, packet.dst, packet.tns, station=number)
+
+    def forward(self) -> Generator[Step, Symbol | None, Packet | None]:
+        """
+        Deliver one message that waits to be passed on; return it when it was delivered.
+
+        The link data stay as they are (M 3-2, 3-8). The sender of a command that cannot be
+        delivered gets an error reply.
+        """
+        packet = self._forwards.popleft()
+        try:
+            if packet.dst != BROADCAST and not self.stations[packet.dst].active:
+                yield from self.revive(packet.dst)
+            yield from self.deliver(packet.dst, packet)
+        except StationInactive:
+            if not packet.is_reply and packet.src != self.settings.station:
+                self._forwards.append(packet.reply(sts=_NOT_DELIVERED))
+            return None
+        return packet
+
+    @property
+    def has_forwards(self) -> bool:
+        """Tell whether messages wait to be passed on."""
+        return bool(self._forwards)
+
+    def forget_forwards(self) -> None:
+        """Drop what waits to be passed on."""
+        self._forwards.clear()
+
+    def _is_to_forward(self, packet: Packet) -> bool:
+        return self.settings.accept_slave_messages and packet.dst != self.settings.station
+
+    def _count_sent(self, packet: Packet) -> None:
+        self.counters.commands_sent += not packet.is_reply
+        self.counters.replies_sent += packet.is_reply
+        self.counters.error_messages_sent += packet.is_reply and packet.sts != 0
+
+    def fail_inactive(self, number: int) -> NoReturn:
+        """Take a station out of the active ones, and say so."""
+        self.stations.lost(number, self.machine.now)
+        self.note(Message.ERR_INACTIVE_STATION, number, station=number)
+        raise StationInactive(number)
+
+    def _count_control(self, code: Code) -> None:
+        self.counters.acks_received += code is Code.ACK
+        self.counters.naks_received += code is Code.NAK
+        self.counters.eots_received += code is Code.EOT
+
+    def _note_fault(self, frame: Frame, number: int) -> Message:
+        """Count and report what is wrong with a frame; return the message that names it."""
+        event = count_fault(frame, self.settings.checksum, self.counters, number)
+        self._report(event)
+        return event.message
+
+    def note(self, message: Message, *args: int, station: int) -> None:
+        """Report a numbered error or notice at a station."""
+        self._report(Event(message, args, station))
+
+
+def is_good(answer: Symbol | None) -> TypeGuard[Control | Frame]:
+    """Tell whether a poll was answered properly: with EOT or a good message."""
+    return isinstance(answer, Control) or (isinstance(answer, Frame) and answer.fault is None)

@@ -1,0 +1,288 @@
+"""
+The master with standard polling: every station is polled all the time, commands in between.
+
+Theory of operation (1766-RM001, "Standard polling"; the scan of two lists as in the manuals of
+the PLC-5 and Logix masters). One scan is::
+
+    every active station of the priority list
+    one inactive station of the priority list
+    the next ``group_size`` active stations of the normal list (0: all of them)
+    one inactive station of the normal list, when all its active ones have had their turn
+
+A command leaves before the next station is polled ("between stations"), or when the master's
+own address comes up in the list ("in sequence"). It completes when its station is polled and
+has the reply ready, so the thinking times of several stations run side by side, and commands
+complete in the order of the poll list.
+
+A station that does not answer is polled again up to ENQ_Retries, then becomes inactive; any
+answer makes it active. A dead station costs a whole Timeout, so inactive ones are polled once a
+scan at most, and never for more than an eighth of the line's time: the living do not wait for
+the dead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from abdf1_ros.df1.frames import Control, Frame
+from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.master_line import is_good, MasterLine, MasterSettings, Talk
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import Task, TaskSource
+from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
+from abdf1_ros.messages import Event, Message
+
+# "At least four" may leave between two polls (1766-RM001).
+COMMANDS_BETWEEN_POLLS = 4
+
+_LIVING_SHARE = 7
+
+# A poll and the EOT that answers it.
+_POLL_CHARACTERS = 6
+
+# Between scans in which nobody could be polled (s).
+_PAUSE = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class PollingSettings:
+    """
+    How stations are polled.
+
+    ``priority`` and ``normal`` are the poll lists; ``group_size`` normal stations are polled
+    in a scan, 0 for all. With ``multiple`` a station is polled until it has nothing more. With
+    ``in_sequence`` commands wait for the master's own address to come up.
+    """
+
+    normal: tuple[int, ...]
+    priority: tuple[int, ...] = ()
+    group_size: int = 0
+    multiple: bool = False
+    in_sequence: bool = False
+
+
+@dataclass(slots=True)
+class ScanTimes:
+    """Seconds that the last and the longest scan of a poll list took, None before the first."""
+
+    last: float | None = None
+    longest: float | None = None
+
+    def add(self, seconds: float) -> None:
+        """Take the time of a scan."""
+        self.last = seconds
+        self.longest = max(self.longest or 0.0, seconds)
+
+
+@dataclass(slots=True)
+class _PollList:
+    """One poll list and where the master is in it."""
+
+    stations: tuple[int, ...]
+    times: ScanTimes = field(default_factory=ScanTimes)
+    started: float | None = None
+    position: int = 0
+    next_inactive: int = 0
+
+    def turn(self, now: float) -> None:
+        """Begin again at the top."""
+        if self.started is not None:
+            self.times.add(now - self.started)
+        self.started = now
+        self.position = 0
+
+    def inactive(self, stations: ActiveStationList) -> int | None:
+        """Return the inactive station whose turn it is, or None when all are active."""
+        for step in range(len(self.stations)):
+            at = (self.next_inactive + step) % len(self.stations)
+            if not stations[self.stations[at]].active:
+                self.next_inactive = at + 1
+                return self.stations[at]
+        return None
+
+
+@dataclass(slots=True)
+class _Outstanding:
+    """A delivered command; ``deadline`` (clock value in s) is when its reply is overdue."""
+
+    task: Task
+    deadline: float
+
+
+class StandardPollingMaster:
+    """
+    Poll all stations and carry out tasks on the line of ``machine``.
+
+    ``report`` and ``serve`` are those of ``MasterLine``.
+    """
+
+    def __init__(self, machine: Machine, settings: MasterSettings, polling: PollingSettings,
+                 stations: ActiveStationList,
+                 report: Callable[[Event], None] = lambda event: None,
+                 serve: Callable[[Packet], Packet] | None = None) -> None:
+        self._machine = machine
+        self._settings = settings
+        self._polling = polling
+        self._stations = stations
+        self._line = MasterLine(machine, settings, stations, report, serve)
+        self._priority = _PollList(polling.priority)
+        self._normal = _PollList(polling.normal)
+        self._outstanding: dict[int, _Outstanding] = {}
+        self._next_inactive_poll = 0.0
+
+    @property
+    def _is_listed(self) -> bool:
+        own = self._settings.station
+        return own in self._priority.stations or own in self._normal.stations
+
+    @property
+    def priority_scan(self) -> ScanTimes:
+        """Return the scan times of the priority list."""
+        return self._priority.times
+
+    @property
+    def normal_scan(self) -> ScanTimes:
+        """Return the scan times of the normal list."""
+        return self._normal.times
+
+    def run(self, source: TaskSource) -> Procedure:
+        """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
+        self._line.forget_forwards()
+        self._outstanding.clear()
+        while True:
+            begun = self._machine.now
+            yield from self._scan(source)
+            if self._machine.now == begun:  # nobody is there to be polled now
+                yield Step(None, _PAUSE)
+
+    def _scan(self, source: TaskSource) -> Talk:
+        self._priority.turn(self._machine.now)
+        for number in self._priority.stations:
+            if self._stations[number].active:
+                yield from self._visit(number, source)
+        yield from self._visit_inactive(self._priority, source)
+        yield from self._visit_group(source)
+        if self._polling.in_sequence and not self._is_listed:
+            yield from self._send_commands(source)
+
+    def _visit_group(self, source: TaskSource) -> Talk:
+        """Poll the next group of the normal list; at its end, one inactive station."""
+        normal = self._normal
+        if normal.position == 0:
+            normal.turn(self._machine.now)
+        group_size = self._polling.group_size or len(normal.stations)
+        visited = 0
+        while normal.position < len(normal.stations) and visited < group_size:
+            number = normal.stations[normal.position]
+            normal.position += 1
+            if self._stations[number].active:
+                visited += 1
+                yield from self._visit(number, source)
+        if normal.position >= len(normal.stations):
+            normal.position = 0
+            yield from self._visit_inactive(normal, source)
+
+    def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
+        """Poll one inactive station of a list, if the living can spare the time."""
+        if self._machine.now < self._next_inactive_poll:
+            return
+        number = polled.inactive(self._stations)
+        if number is None:
+            return
+        yield from self._between_polls(source)
+        begun = self._machine.now
+        answer = yield from self._line.poll(number)
+        if is_good(answer):
+            yield from self._answered(number, answer)
+        spent = self._machine.now - begun
+        if any(station.active for station in self._stations):
+            self._next_inactive_poll = self._machine.now + _LIVING_SHARE * spent
+
+    def _visit(self, number: int, source: TaskSource) -> Talk:
+        """Send what waits, then poll one active station; our own place is for commands."""
+        if number == self._settings.station:
+            yield from self._send_commands(source)
+            return
+        yield from self._between_polls(source)
+        begun = self._machine.now
+        while self._stations[number].active:
+            try:
+                answer = yield from self._line.poll_with_retries(number, 0.0)
+            except StationInactive as error:
+                self._end(number, error)
+                return
+            yield from self._answered(number, answer)
+            if isinstance(answer, Control) or not self._polling.multiple:
+                yield from self._pace(begun)
+                return
+
+    def _pace(self, begun: float) -> Talk:
+        """Poll a line without a speed of its own, such as TCP, no faster than the set one."""
+        rest = begun + _POLL_CHARACTERS * self._machine.char_time - self._machine.now
+        if rest > 0:
+            yield Step(None, rest)
+
+    def _answered(self, number: int, answer: Control | Frame) -> Talk:
+        """Take what a station has answered to a poll."""
+        packet = None
+        if isinstance(answer, Frame):
+            packet = yield from self._line.receive(number, answer)
+        entry = self._outstanding.get(number)
+        if packet is not None and entry is not None and packet.answers(entry.task.command):
+            del self._outstanding[number]
+            self._complete(number, packet, entry.task)
+            return
+        if packet is not None:
+            self._line.take_unwanted(number, packet)
+        if entry is not None and self._machine.now >= entry.deadline:
+            self._line.counters.command_timeouts += 1
+            self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
+            self._end(number, CommandTimeout())
+
+    def _complete(self, number: int, reply: Packet, task: Task) -> None:
+        try:
+            self._line.check_reply(number, reply, task.command)
+        except WrongCommandCode as error:
+            task.fail(error)
+        else:
+            task.reply(reply)
+
+    def _end(self, number: int, error: StationInactive | CommandTimeout) -> None:
+        """End the command that waits for a reply of a station, if there is one."""
+        entry = self._outstanding.pop(number, None)
+        if entry is not None:
+            entry.task.fail(error)
+
+    def _between_polls(self, source: TaskSource) -> Talk:
+        if not self._polling.in_sequence:
+            yield from self._send_commands(source)
+
+    def _send_commands(self, source: TaskSource) -> Talk:
+        """Send messages to be passed on, and commands to stations that owe us no reply."""
+        while self._line.has_forwards:
+            yield from self._line.forward()
+        for _ in range(COMMANDS_BETWEEN_POLLS):
+            task = source.next_task(self._machine.now, self._outstanding)
+            if task is None:
+                return
+            yield from self._send(task)
+
+    def _send(self, task: Task) -> Talk:
+        number = task.command.dst
+        if number == BROADCAST:
+            task.sent = True
+            yield from self._line.deliver(number, task.command)
+            task.reply(task.command.reply())
+            return
+        if not self._stations[number].active:
+            task.fail(StationInactive(number))  # it is polled in its turn
+            return
+        task.sent = True
+        self._outstanding[number] = _Outstanding(
+            task, self._machine.now + self._settings.cmd_timeout)
+        try:
+            yield from self._line.deliver(number, task.command)
+        except StationInactive as error:
+            self._end(number, error)

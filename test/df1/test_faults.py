@@ -1,0 +1,70 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What each fault of a frame is counted as and reported with."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.faults import count_fault
+from abdf1_ros.df1.frames import Duplex, Fault, Frame, FrameDecoder
+import pytest
+from support.vectors import vector
+
+
+def counted(counters: Counters) -> dict[str, int]:
+    """Return the counters that are not zero."""
+    return {name: count for name, count in asdict(counters).items() if count}
+
+
+@pytest.mark.parametrize(('fault', 'checksum', 'counter', 'event'), [
+    (Fault.BAD_CHECK, Checksum.CRC, 'crc_errors', (2506, 0x12, 0x34, 0xAB, 0xCD)),
+    (Fault.BAD_CHECK, Checksum.BCC, 'bcc_errors', (2507, 0x12, 0x34, 0xAB, 0xCD)),
+    (Fault.NO_ETX, Checksum.CRC, 'invalid_messages', (2518,)),
+    (Fault.TOO_SHORT, Checksum.BCC, 'invalid_messages', (2513, 6)),
+    (Fault.TOO_LONG, Checksum.CRC, 'invalid_messages', (2512, 261))])
+@pytest.mark.parametrize('station', [None, 7])
+def test_fault(fault: Fault, checksum: Checksum, counter: str, event: tuple[int, ...],
+               station: int | None) -> None:
+    counters = Counters()
+    said = count_fault(
+        Frame(b'', None, fault, 0x1234, 0xABCD), checksum, counters, station)
+    assert counted(counters) == {counter: 1}
+    assert (said.message.number, *said.args) == event
+    assert said.station == station
+    count_fault(Frame(b'', None, fault), checksum, counters)
+    assert counted(counters) == {counter: 2}
+
+
+def test_every_fault_is_known() -> None:
+    for fault in Fault:
+        assert count_fault(Frame(b'', None, fault), Checksum.CRC, Counters())
+
+
+@pytest.mark.parametrize(('name', 'text'), [
+    ('bad_crc', '2506 ERR_BAD_CRC: Response with wrong CRC'),
+    ('bad_bcc', '2507 ERR_BAD_BCC: Response with wrong BCC')])
+def test_texts_of_the_vectors(name: str, text: str) -> None:
+    entry = vector(name)
+    decoder = FrameDecoder(entry.checksum, Duplex.FULL)
+    decoder.feed(entry.frame)
+    frame = decoder.next_symbol()
+    assert isinstance(frame, Frame)
+    said = str(count_fault(frame, entry.checksum, Counters(), 3))
+    actual = int.from_bytes(entry.frame[-entry.checksum.size:], 'little')
+    assert said == (
+        f'{text} (actual=0x{actual:04x}, expected=0x{entry.expected:04x}) [station 3]')

@@ -1,0 +1,1067 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The full-duplex peer, rule by rule: transmitter (M 4-5), receiver (M 4-7), transactions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import itertools
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, ENQ, EOT, ETX, MAX_LINK_DATA, message_frame, NAK, STX
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import MAX_WAITING_REPLIES, PeerSettings
+from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.peers import PeerBench, single_bytes
+from support.properties import PROPERTY
+from support.vectors import CAPTURED, MESSAGES, Vector, vector
+
+TIMEOUT, CMD_TIMEOUT = 1.0, 2.5
+COMMAND = Packet(dst=1, src=5, cmd=0x0F, sts=0, tns=0x1034, data=b'\x68\x10\x02\x10')
+REPLY = COMMAND.reply(b'\x10\x03\x10')
+THEIRS = Packet(dst=5, src=1, cmd=0x06, sts=0, tns=0x7710, data=b'\x00\x10hello')
+OUR_REPLY = THEIRS.reply()
+UNKNOWN = b'\x10\x0F'
+
+
+def bench(checksum: Checksum = Checksum.CRC, *, nak_retries: int = 3, enq_retries: int = 3,
+          timeout: float = TIMEOUT, max_outstanding: int = 1, timing: LineTiming | None = None,
+          serve: Callable[[Packet], Packet] = Packet.reply) -> PeerBench:
+    """Return a peer on a scripted line."""
+    settings = PeerSettings(
+        checksum, nak_retries, enq_retries, timeout, CMD_TIMEOUT, max_outstanding)
+    return PeerBench(settings, timing, serve)
+
+
+def later(packet: Packet, number: int) -> Packet:
+    """Return the same packet of a later transaction."""
+    return replace(packet, tns=packet.tns + number & 0xFFFF)
+
+
+# Transmitter
+
+@pytest.mark.parametrize('checksum', Checksum)
+def test_normal(checksum: Checksum) -> None:
+    peer = bench(checksum)
+    errand = peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.hear(ACK) == b''
+    assert peer.wait(0.3) == []
+    assert errand.result is None
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+    assert peer.wait(60) == []
+    assert peer.numbers() == [(2523, 1)]
+    assert peer.counts() == {
+        'messages_sent': 1, 'commands_sent': 1, 'acks_received': 1, 'messages_received': 1,
+        'replies_received': 1, 'acks_sent': 1}
+    station = peer.stations[1]
+    assert (station.replies, station.last_tns, station.last_heard) == (1, REPLY.tns, 100.3)
+
+
+def test_next_command_follows_at_once() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.begin(later(COMMAND, 1))
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK + peer.frame(later(COMMAND, 1))
+
+
+@pytest.mark.parametrize('retries', [0, 1, 3])
+def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
+    peer = bench(nak_retries=retries)
+    errand = peer.begin(COMMAND)
+    message = peer.said()
+    for count in range(retries):
+        pause = 0.25 * count
+        answer = peer.hear(NAK)
+        assert answer == (b'' if pause else message)
+        assert peer.wait(pause) == ([(pause, message)] if pause else [])
+        assert peer.wait(0.01) == []
+    assert peer.hear(NAK) == b''
+    assert peer.wait(TIMEOUT) == []
+    assert isinstance(errand.result, StationInactive)
+    assert errand.sent
+    assert peer.numbers() == [
+        *(entry for count in range(1, retries + 1)
+          for entry in ((2517,), (2521, count, 2511))), (2517,), (2519, retries), (2509, 1)]
+    assert peer.counts() == {name: count for name, count in {
+        'messages_sent': 1 + retries, 'commands_sent': 1, 'naks_received': 1 + retries,
+        'nak_retries': retries, 'nak_limit_exceeded': 1}.items() if count}
+    assert peer.changes == [(1, False)]
+    assert peer.wait(60) == []
+
+
+@pytest.mark.parametrize('retries', [0, 1, 3])
+def test_silence_is_answered_by_enq_until_the_limit(retries: int) -> None:
+    peer = bench(enq_retries=retries)
+    errand = peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.wait(TIMEOUT * (retries + 1)) == [
+        (TIMEOUT * count, ENQ) for count in range(1, retries + 1)]
+    assert peer.wait(TIMEOUT) == []
+    assert isinstance(errand.result, StationInactive)
+    assert peer.numbers() == [
+        *(entry for count in range(1, retries + 1)
+          for entry in ((2515, 0), (2522, count, 2515))), (2515, 0), (2520, retries), (2509, 1)]
+    assert peer.counts() == {name: count for name, count in {
+        'messages_sent': 1, 'commands_sent': 1, 'enq_retries': retries,
+        'enq_limit_exceeded': 1}.items() if count}
+    assert peer.changes == [(1, False)]
+    assert peer.wait(60) == []
+
+
+def test_ack_for_the_last_enq_is_in_time() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    assert peer.wait(3 * TIMEOUT + 0.999) == [(1.0, ENQ), (2.0, ENQ), (3.0, ENQ)]
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+    assert peer.changes == []
+
+
+def test_nak_for_an_enq_brings_the_message_again() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    message = peer.said()
+    assert peer.wait(TIMEOUT) == [(1.0, ENQ)]
+    assert peer.hear(NAK) == message
+    assert peer.wait(0.999) == []
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+    assert peer.only(2521, 2522) == [(2522, 1, 2515), (2521, 1, 2511)]
+
+
+def test_limits_count_apart_and_for_each_message() -> None:
+    for _ in range(2):
+        peer = bench(nak_retries=2, enq_retries=2)
+        for number in range(2):
+            errand = peer.begin(later(COMMAND, number))
+            message = peer.said()
+            assert peer.wait(1.0) == [(1.0, ENQ)]
+            assert peer.hear(NAK) == message
+            assert peer.wait(1.0) == [(1.0, ENQ)]
+            assert peer.hear(NAK) == b''
+            assert peer.wait(0.25) == [(0.25, message)]
+            assert peer.hear(ACK) == b''
+            assert peer.hear_packet(later(REPLY, number)) == ACK
+            assert errand.result == later(REPLY, number)
+            peer.wait(TIMEOUT)
+
+
+def test_naks_are_paced_from_the_second_on() -> None:
+    peer = bench(nak_retries=5)
+    peer.begin(COMMAND)
+    message = peer.said()
+    assert peer.hear(NAK) == message
+    for pause in (0.25, 0.5, 0.75, 1.0):
+        assert peer.hear(NAK) == b''
+        assert peer.wait(2.0)[0] == (pause, message)
+
+
+@pytest.mark.parametrize('noise', [
+    b'\0', b'\xFFabc', EOT, UNKNOWN, b'\x10\x10', b'\x10\x01', ETX,
+    b'\x10\x02\x00\x10\x03\x55\x55'])
+def test_anything_else_is_passed_over_while_the_timer_runs(noise: bytes) -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    for _ in range(9):
+        assert peer.wait(0.1) == []
+        assert peer.hear(noise) in (b'', NAK)
+    assert peer.wait(0.2) == [(0.1, ENQ)]
+    peer.hear(ACK)
+    assert errand.result is None
+    assert peer.only(2515) == [(2515, noise[-1])]
+
+
+def test_timer_runs_on_while_messages_and_enqs_come_in() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.said()
+    for number in range(4):
+        assert peer.wait(0.2) == []
+        assert peer.hear_packet(later(THEIRS, number)) == ACK
+        assert peer.hear(ENQ) == ACK
+    assert peer.wait(0.3) == [(0.2, ENQ)]
+    assert len(peer.served) == 4
+
+
+def test_reply_that_overtakes_its_ack_is_taken_as_one() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    assert peer.wait(0.5) == []
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+    assert peer.hear(ACK) == b''
+    assert peer.wait(60) == []
+    assert peer.counts()['acks_received'] == 1
+    assert 'enq_retries' not in peer.counts()
+
+
+def test_reply_of_another_command_is_no_ack() -> None:
+    peer = bench(max_outstanding=2)
+    first = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    second = peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear_packet(REPLY) == ACK
+    assert first.result == REPLY
+    assert peer.wait(1.2) == [(1.0, ENQ)]
+    assert second.result is None
+
+
+def test_late_ack_of_an_overtaking_reply_does_not_acknowledge_the_next_message() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.begin(later(COMMAND, 1))
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.hear_packet(REPLY) == ACK
+    assert peer.wait(0.5) == []
+    assert peer.hear(ACK) == b''
+    said = peer.wait(3.0)
+    assert said[0][1] == peer.frame(later(COMMAND, 1))
+    assert said[1][1] == ENQ
+
+
+@pytest.mark.parametrize('disturbance', ['silence', 'nak'])
+def test_late_responses_after_a_retry_do_not_acknowledge_the_next_message(
+        disturbance: str) -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    message = peer.said()
+    if disturbance == 'nak':
+        assert peer.hear(NAK) == message
+    else:
+        assert peer.wait(1.0) == [(1.0, ENQ)]
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    peer.begin(later(COMMAND, 1))
+    assert peer.said() == b''
+    assert peer.wait(0.9) == []
+    assert peer.hear(ACK, NAK) == b''  # the first response, late
+    assert peer.wait(0.2) == [(0.1, peer.frame(later(COMMAND, 1)))]
+    assert peer.wait(1.0) == [(0.9, ENQ)]
+    assert peer.counts()['acks_received'] == 2
+
+
+def test_late_responses_after_a_failure_do_not_acknowledge_the_next_message() -> None:
+    peer = bench(enq_retries=0)
+    peer.begin(COMMAND)
+    other = peer.begin(replace(COMMAND, dst=2))
+    peer.said()
+    assert peer.wait(1.5) == []
+    assert peer.hear(ACK) == b''
+    assert peer.wait(1.0) == [(0.5, peer.frame(replace(COMMAND, dst=2)))]
+    assert peer.wait(1.6) == []
+    assert isinstance(other.result, StationInactive)
+
+
+def test_reply_that_comes_after_the_failure_of_its_transfer_still_counts() -> None:
+    peer = bench(enq_retries=0)
+    errand = peer.begin(COMMAND)
+    peer.said()
+    assert peer.wait(1.5) == []
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+    assert peer.wait(60) == []
+    assert peer.changes == []
+
+
+@pytest.mark.parametrize('checksum', Checksum)
+@pytest.mark.parametrize('at', [0, 1, 2, 3, 4, 6, 7])
+def test_embedded_ack_ends_the_transfer(checksum: Checksum, at: int) -> None:
+    peer = bench(checksum)
+    errand = peer.begin(COMMAND)
+    peer.said()
+    plain = message_frame(THEIRS.encode(), checksum)
+    assert peer.hear(plain[:2 + at] + ACK) == b''
+    assert peer.counts()['acks_received'] == 1
+    assert peer.hear(plain[2 + at:]) == ACK + peer.frame(OUR_REPLY)
+    assert peer.served == [THEIRS]
+    assert peer.hear(ACK) == b''
+    assert peer.wait(2.0) == []
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+
+
+def test_embedded_nak_brings_the_message_again() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    message = peer.said()
+    plain = peer.frame(THEIRS)
+    assert peer.hear(plain[:5] + NAK) == message
+    assert peer.hear(plain[5:]) == ACK
+    assert peer.served == [THEIRS]
+
+
+@pytest.mark.parametrize('name', ['embedded_ack', 'embedded_nak'])
+def test_embedded_response_of_the_vectors(name: str) -> None:
+    entry = vector(name)
+    peer = bench(entry.checksum)
+    peer.begin(COMMAND)
+    message = peer.said()
+    again = message if name == 'embedded_nak' else b''
+    assert peer.hear(entry.frame).startswith(again + ACK)
+    assert [packet.encode() for packet in peer.served] + [
+        entry.link_data] * entry.packet.is_reply == [entry.link_data]
+
+
+def test_both_directions_at_once() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.hear_packet(THEIRS) == ACK
+    assert peer.hear(ACK) == peer.frame(OUR_REPLY)
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+    assert peer.hear(ACK) == b''
+    assert peer.wait(60) == []
+
+
+def test_ack_of_ours_and_reply_of_theirs_in_one_burst() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    burst = ACK + peer.frame(REPLY) + peer.frame(THEIRS)
+    assert peer.hear(burst) == ACK + ACK + peer.frame(OUR_REPLY)
+    assert errand.result == REPLY
+    assert peer.served == [THEIRS]
+
+
+def test_reply_goes_out_before_the_next_command() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear_packet(THEIRS) == ACK
+    assert peer.hear_packet(REPLY) == ACK
+    assert peer.wait(2.0)[0] == (1.0, peer.frame(OUR_REPLY))
+
+
+def test_timers_run_from_the_last_byte() -> None:
+    peer = bench(timing=LineTiming(char_time=0.01))
+    peer.begin(COMMAND)
+    size = len(peer.said())
+    left = round(0.01 * size, 6)
+    said = peer.wait(left + 2.5)
+    assert said == [(round(left + 1.0, 6), ENQ), (round(left + 2.02, 6), ENQ)]
+
+
+def test_response_that_was_sent_meanwhile_delays_our_message() -> None:
+    peer = bench(timing=LineTiming(char_time=0.01))
+    peer.hear(peer.frame(THEIRS))
+    size = len(peer.frame(OUR_REPLY)) + len(ACK)
+    assert peer.wait(2.0) == [(round(0.01 * size + 1.0, 6), ENQ)]
+
+
+def test_tx_delay_comes_before_every_transmission() -> None:
+    peer = bench(timing=LineTiming(tx_delay=0.2))
+    peer.begin(COMMAND)
+    assert peer.wait(0.5) == [(0.2, peer.frame(COMMAND))]
+    assert peer.wait(0.3) == []
+    assert peer.hear(NAK) == b''
+    assert peer.wait(0.5) == [(0.2, peer.frame(COMMAND))]
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == b''
+    assert peer.wait(0.5) == [(0.2, ACK)]
+    assert peer.wait(0.5) == []
+    assert peer.hear_packet(THEIRS) == b''
+    assert peer.wait(0.5) == [(0.2, ACK), (0.4, peer.frame(OUR_REPLY))]
+
+
+def test_nothing_heard_during_tx_delay_is_lost() -> None:
+    peer = bench(timing=LineTiming(tx_delay=0.5), timeout=5.0)
+    errand = peer.begin(COMMAND)
+    assert peer.wait(0.6) == [(0.5, peer.frame(COMMAND))]
+    assert peer.hear_packet(THEIRS) == b''
+    assert peer.wait(0.1) == []
+    assert peer.hear(ACK) == b''
+    assert peer.wait(0.3) == []
+    assert peer.hear_packet(REPLY) == b''
+    assert peer.wait(1.0)[0] == (0.1, ACK)
+    assert errand.result == REPLY
+    assert peer.counts()['acks_received'] == 1
+
+
+def test_enq_waits_for_tx_delay_too() -> None:
+    peer = bench(timing=LineTiming(tx_delay=0.2))
+    peer.begin(COMMAND)
+    assert peer.wait(3.0) == [(0.2, peer.frame(COMMAND)), (1.4, ENQ), (2.6, ENQ)]
+
+
+def test_least_time_for_a_response() -> None:
+    peer = bench(timeout=0.0)
+    peer.begin(COMMAND)
+    peer.said()
+    assert peer.wait(0.021) == [(0.02, ENQ)]
+
+
+def test_message_that_has_begun_when_the_time_is_up_is_heard_out() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    reply = peer.frame(REPLY)
+    peer.wait(0.95)
+    peer.hear(reply[:4])
+    assert peer.wait(0.09) == []
+    assert peer.hear(reply[4:]) == ACK
+    assert errand.result == REPLY
+
+
+# Receiver
+
+def test_last_response_begins_as_nak() -> None:
+    assert bench().hear(ENQ, ENQ) == NAK + NAK
+
+
+@pytest.mark.parametrize('between', [b'', ACK, NAK])
+def test_enq_gets_the_last_response(between: bytes) -> None:
+    peer = bench(serve=lambda command: command.reply())
+    assert peer.hear_packet(REPLY) == ACK  # stale, but a good message
+    assert peer.hear(between, ENQ) == ACK
+    assert peer.hear(between, ENQ) == ACK
+    assert peer.counts()['acks_sent'] == 3
+
+
+def test_message_lost_behind_its_stx_is_no_old_ack() -> None:
+    peer = bench()
+    assert peer.hear_packet(REPLY) == ACK
+    assert peer.hear(peer.frame(THEIRS)[:9]) == b''
+    assert peer.wait(1.0) == []
+    assert peer.hear(ENQ) == NAK
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+
+
+@pytest.mark.parametrize('begun', [1, 2, 3, 9, -2, -1])
+@pytest.mark.parametrize('pause', [0.05, 5.0])
+@pytest.mark.parametrize('is_working', [False, True])
+def test_part_of_a_message_is_no_old_ack(begun: int, pause: float, is_working: bool) -> None:
+    peer = bench()
+    assert peer.hear_packet(REPLY) == ACK
+    if is_working:
+        peer.begin(COMMAND)
+        peer.said()
+        peer.hear(ACK)
+    assert peer.hear(peer.frame(THEIRS)[:begun]) == b''
+    assert peer.wait(pause) == []
+    # Bytes that are missing at the end may be taken from the first ENQ.
+    assert ACK not in peer.hear(ENQ)
+    assert peer.hear(ENQ) == NAK
+    assert peer.served == []
+    assert peer.hear_packet(THEIRS).startswith(ACK)
+
+
+@pytest.mark.parametrize('damage', [
+    b'\x10\x00', b'\x10\x03', b'\x02', b'\x90\x02', b'\x10\x42', b'\x10\x10', b''])
+def test_damaged_stx_is_no_old_ack(damage: bytes) -> None:
+    peer = bench()
+    assert peer.hear_packet(REPLY) == ACK
+    assert peer.hear(damage + peer.frame(THEIRS)[2:]) == b''
+    assert peer.hear(ENQ) == NAK
+    assert peer.served == []
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+
+
+@given(begin=st.binary(min_size=1, max_size=12))
+@PROPERTY
+def test_bytes_that_are_no_message_are_no_old_ack(begin: bytes) -> None:
+    peer = bench()
+    assert peer.hear_packet(REPLY) == ACK
+    has_response = ACK in begin or NAK in begin or ENQ in begin
+    before = peer.hear(begin)
+    answer = peer.hear(ENQ)
+    if not has_response and begin[-1] != 0x10:
+        assert ACK not in before + answer
+
+
+def test_response_between_message_and_enq_changes_nothing() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.said()
+    assert peer.hear_packet(THEIRS) == ACK
+    assert peer.hear(ACK) == peer.frame(OUR_REPLY)
+    assert peer.hear(ENQ) == ACK
+
+
+@pytest.mark.parametrize(('checksum', 'counter', 'event'), [
+    (Checksum.CRC, 'crc_errors', 2506), (Checksum.BCC, 'bcc_errors', 2507)])
+def test_wrong_check(checksum: Checksum, counter: str, event: int) -> None:
+    peer = bench(checksum)
+    frame = peer.frame(THEIRS)
+    damaged = frame[:-1] + bytes((frame[-1] ^ 0x20,))
+    assert peer.hear(damaged) == NAK
+    assert peer.hear(ENQ) == NAK
+    assert peer.counts() == {'naks_sent': 2, counter: 1}
+    if checksum is Checksum.CRC:
+        values = frame[-1] ^ 0x20, frame[-2], frame[-1], frame[-2]
+    else:
+        values = 0, frame[-1] ^ 0x20, 0, frame[-1]
+    assert peer.numbers() == [(event, *values)]
+    assert peer.hear(frame) == ACK + peer.frame(OUR_REPLY)
+
+
+@pytest.mark.parametrize('name', ['bad_crc', 'bad_bcc', 'racom_bcc_short'])
+def test_bad_frames_of_the_vectors(name: str) -> None:
+    entry = vector(name)
+    assert bench(entry.checksum).hear(entry.frame) == NAK
+
+
+@pytest.mark.parametrize('checksum', Checksum)
+@pytest.mark.parametrize('size', range(6))
+def test_message_shorter_than_a_header(checksum: Checksum, size: int) -> None:
+    peer = bench(checksum)
+    assert peer.hear(message_frame(THEIRS.encode()[:size], checksum)) == NAK
+    assert peer.numbers() == [(2513, 6)]
+    assert peer.counts() == {'naks_sent': 1, 'invalid_messages': 1}
+
+
+def test_header_alone_is_a_message() -> None:
+    peer = bench()
+    command = replace(THEIRS, data=b'')
+    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+
+
+def test_longest_message() -> None:
+    peer = bench()
+    command = replace(THEIRS, data=b'\x10' * (MAX_LINK_DATA - 6))
+    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+
+
+@pytest.mark.parametrize('byte', [0x00, 0x10, 0x55])
+@pytest.mark.parametrize('more', [1, 2, 3, 50, 700])
+def test_message_too_long(byte: int, more: int) -> None:
+    peer = bench()
+    command = replace(THEIRS, data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more))
+    assert peer.hear_packet(command) == NAK
+    assert (2512, MAX_LINK_DATA) in peer.numbers()
+    assert peer.counts()['invalid_messages'] == 1
+    assert peer.hear(ENQ) == NAK
+    assert peer.served == []
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+
+
+def test_duplicate_is_acknowledged_and_not_executed() -> None:
+    peer = bench()
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(replace(THEIRS, dst=9, sts=1, data=b'other')) == ACK
+    assert peer.wait(60) == []
+    assert peer.served == [THEIRS]
+    assert peer.numbers() == [(2524, 1)]
+    assert peer.counts() == {
+        'messages_received': 2, 'commands_received': 1, 'duplicate_messages': 1, 'acks_sent': 2,
+        'messages_sent': 1, 'replies_sent': 1, 'acks_received': 1}
+
+
+@pytest.mark.parametrize('other', [
+    replace(THEIRS, src=2), replace(THEIRS, cmd=0x0F), replace(THEIRS, tns=0x7711),
+    replace(THEIRS, tns=0x7610)])
+def test_another_src_cmd_or_tns_is_no_duplicate(other: Packet) -> None:
+    peer = bench()
+    peer.hear_packet(THEIRS)
+    peer.hear(ACK)
+    assert peer.hear_packet(other) == ACK + peer.frame(other.reply())
+    assert peer.served == [THEIRS, other]
+
+
+def test_only_the_last_message_is_remembered() -> None:
+    peer = bench()
+    for packet in (THEIRS, later(THEIRS, 1), THEIRS):
+        peer.hear_packet(packet)
+        peer.hear(ACK)
+    assert peer.served == [THEIRS, later(THEIRS, 1), THEIRS]
+
+
+def test_duplicate_reply_is_acknowledged_and_passed_over() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.hear(ACK)
+    assert peer.hear_packet(REPLY) + peer.hear_packet(REPLY) == peer.frame(COMMAND) + ACK + ACK \
+        or errand.result == REPLY
+    assert peer.counts()['duplicate_messages'] == 1
+    assert 'stale_messages' not in peer.counts()
+
+
+def test_duplicate_of_a_damaged_message_is_executed() -> None:
+    peer = bench()
+    frame = peer.frame(THEIRS)
+    assert peer.hear(frame[:-2] + b'\0\0') == NAK
+    assert peer.hear(frame) == ACK + peer.frame(OUR_REPLY)
+
+
+def test_duplicates_are_forgotten_with_the_port() -> None:
+    peer = bench()
+    peer.hear_packet(THEIRS)
+    peer.machine.start(peer.now)
+    assert peer.hear(ENQ) == NAK
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+    assert len(peer.served) == 2
+
+
+def test_sink_full() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.said()
+    packets = [later(THEIRS, number) for number in range(MAX_WAITING_REPLIES + 1)]
+    for packet in packets[:-1]:
+        assert peer.hear_packet(packet) == ACK
+    for _ in range(2):
+        assert peer.hear_packet(packets[-1]) == NAK
+        assert peer.hear(ENQ) == NAK
+    assert peer.hear_packet(packets[-2]) == ACK  # its ACK was lost: still a duplicate
+    assert peer.served == packets[:-1]
+    for packet in packets[:-1]:
+        assert peer.hear(ACK) == peer.frame(packet.reply())
+    assert peer.hear_packet(packets[-1]) == ACK
+    assert peer.hear(ACK) == peer.frame(packets[-1].reply())
+    assert peer.served == packets
+    assert peer.counts()['commands_received'] == MAX_WAITING_REPLIES + 1
+    assert peer.counts()['duplicate_messages'] == 1
+
+
+def test_reply_is_taken_with_the_sink_full() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    for number in range(MAX_WAITING_REPLIES):
+        peer.hear_packet(later(THEIRS, number))
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+
+
+def test_stx_inside_a_message_begins_it_anew() -> None:
+    peer = bench()
+    frame = peer.frame(THEIRS)
+    assert peer.hear(frame[:5]) == b''
+    assert peer.hear(frame) == ACK + peer.frame(OUR_REPLY)
+    assert peer.numbers() == [(2518,)]
+    assert peer.counts()['invalid_messages'] == 1
+    assert 'naks_sent' not in peer.counts()
+
+
+def test_enq_inside_a_message_gets_one_nak() -> None:
+    peer = bench()
+    assert peer.hear_packet(REPLY) == ACK
+    frame = peer.frame(THEIRS)
+    assert peer.hear(frame[:5] + ENQ) == NAK
+    assert peer.hear(frame) == ACK + peer.frame(OUR_REPLY)
+
+
+@pytest.mark.parametrize('control', [UNKNOWN, EOT, b'\x10\x01', b'\x10\x42'])
+def test_other_control_inside_a_message_gets_one_nak(control: bytes) -> None:
+    peer = bench()
+    frame = peer.frame(THEIRS)
+    assert peer.hear(frame[:5] + control) == NAK
+    assert peer.hear(frame[5:]) == b''
+    assert peer.hear(ENQ) == NAK
+    assert peer.hear(frame) == ACK + peer.frame(OUR_REPLY)
+
+
+@pytest.mark.parametrize('control', [UNKNOWN, EOT, b'\x10\x01', b'\x10\x42', ETX])
+def test_other_control_between_messages_is_passed_over(control: bytes) -> None:
+    peer = bench()
+    assert peer.hear_packet(REPLY) == ACK
+    assert peer.hear(control) == b''
+    assert peer.hear(ENQ) == NAK
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+
+
+def test_unknown_control_is_reported() -> None:
+    peer = bench()
+    peer.hear(UNKNOWN)
+    assert peer.numbers() == [(2514, 0x0F)]
+
+
+@pytest.mark.parametrize(('dst', 'src'), [
+    (0, 0), (5, 5), (255, 254), (16, 16), (7, 200), (254, 255)])
+@pytest.mark.parametrize('checksum', Checksum)
+def test_any_address_is_served_and_swapped(dst: int, src: int, checksum: Checksum) -> None:
+    peer = bench(checksum)
+    command = replace(THEIRS, dst=dst, src=src)
+    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+    assert (command.reply().dst, command.reply().src) == (src, dst)
+
+
+def test_error_replies_are_counted() -> None:
+    peer = bench(serve=lambda command: command.reply(b'\x06', 0xF0))
+    peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(THEIRS.reply(b'\x06', 0xF0))
+    peer.hear(ACK)
+    assert peer.hear_packet(COMMAND.reply(sts=0x10)) == ACK
+    assert peer.counts()['error_messages_sent'] == 1
+    assert peer.counts()['error_messages_received'] == 1
+
+
+def test_reply_is_sent_again_like_a_command_and_given_up_without_a_failure() -> None:
+    peer = bench()
+    reply = peer.frame(OUR_REPLY)
+    assert peer.hear_packet(THEIRS) == ACK + reply
+    assert peer.hear(NAK) == reply
+    assert peer.wait(4.0) == [(1.0, ENQ), (2.0, ENQ), (3.0, ENQ)]
+    assert peer.wait(60) == []
+    assert peer.counts()['replies_sent'] == 1
+    assert peer.counts()['messages_sent'] == 2
+    assert peer.counts()['enq_limit_exceeded'] == 1
+    assert peer.changes == []
+    assert peer.hear_packet(later(THEIRS, 1)) == ACK + peer.frame(later(OUR_REPLY, 1))
+
+
+@pytest.mark.parametrize('entry', [
+    entry for entry in MESSAGES
+    if entry.mode == 'full_duplex' and not entry.has_embedded_response],
+    ids=lambda entry: entry.name)
+@pytest.mark.parametrize('chunk', [1, 3, 1000])
+def test_messages_of_the_vectors(entry: Vector, chunk: int) -> None:
+    peer = bench(entry.checksum)
+    parts = [entry.frame[at:at + chunk] for at in range(0, len(entry.frame), chunk)]
+    answer = peer.hear(*parts)
+    if not entry.valid or len(entry.link_data) < 6:
+        assert (answer, peer.served) == (NAK, [])
+    elif entry.packet.is_reply:
+        assert (answer, peer.served) == (ACK, [])
+        assert peer.counts()['stale_messages'] == 1
+    else:
+        assert peer.served == [entry.packet]
+        assert answer == ACK + peer.frame(entry.packet.reply())
+
+
+@pytest.mark.parametrize('is_slow', [False, True])
+def test_captured_conversation(is_slow: bool) -> None:
+    """Play the modem's part: its client asks, and we refuse what only the real one can do."""
+    peer = bench(serve=lambda command: command.reply(sts=0x10))
+    heard = 0
+    for entry in CAPTURED:
+        if entry.checksum is not Checksum.CRC or entry.direction != 'rx':
+            continue
+        if entry.frame == ACK:
+            assert peer.hear(ACK) == b''
+            continue
+        heard += 1
+        parts = single_bytes(entry.frame) if is_slow else [entry.frame]
+        answer = peer.hear(*parts)
+        command = peer.served[-1]
+        assert answer == ACK + peer.frame(command.reply(sts=0x10))
+    assert heard == 3
+    assert [(command.cmd, command.tns) for command in peer.served] == [
+        (0x0B, 0x7E), (0x0A, 0x7F), (0x0B, 0x8F)]
+    assert peer.wait(60) == []
+    assert peer.counts()['error_messages_sent'] == 3
+
+
+def test_captured_replies_answer_commands_of_the_same_numbers() -> None:
+    peer = bench()
+    replies = [Packet.decode(entry.link_data) for entry in MESSAGES
+               if entry.name in ('racom2_rep4B', 'racom4_rep4A', 'racom6_rep4B')]
+    frames = [entry.frame for entry in CAPTURED if entry.direction == 'tx'
+              and entry.checksum is Checksum.CRC and len(entry.frame) > 2]
+    assert len(replies) == len(frames) == 3
+    for reply, frame in zip(replies, frames):
+        errand = peer.begin(Packet(reply.src, reply.dst, reply.cmd & ~0x40, 0, reply.tns))
+        peer.said()
+        assert peer.hear(ACK) == b''
+        assert peer.hear(*single_bytes(frame)) == ACK
+        assert errand.result == reply
+
+
+def test_everything_byte_by_byte() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+    line = ACK + peer.frame(THEIRS) + peer.frame(REPLY) + ACK + ENQ
+    assert peer.hear(*single_bytes(line)) == ACK + peer.frame(OUR_REPLY) + ACK + ACK
+    assert errand.result == REPLY
+
+
+# Transactions
+
+def test_ack_is_no_reply() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.wait(0.4)
+    peer.hear(ACK)
+    assert peer.wait(CMD_TIMEOUT - 1e-6) == []
+    assert errand.result is None
+    assert peer.wait(2e-6) == []
+    assert isinstance(errand.result, CommandTimeout)
+    assert errand.sent
+    assert peer.numbers() == [(2508,)]
+    assert peer.counts()['command_timeouts'] == 1
+    assert peer.changes == []
+
+
+def test_reply_is_awaited_from_the_ack_also_after_a_retry() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    assert peer.wait(1.2) == [(1.0, ENQ)]
+    peer.hear(ACK)
+    acknowledged = peer.now
+    peer.wait(60)
+    assert isinstance(errand.result, CommandTimeout)
+    assert errand.ended == pytest.approx(acknowledged + CMD_TIMEOUT)
+
+
+def test_late_reply_is_stale() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    peer.wait(CMD_TIMEOUT)
+    assert isinstance(errand.result, CommandTimeout)
+    assert peer.hear_packet(REPLY) == ACK
+    assert isinstance(errand.result, CommandTimeout)
+    assert peer.counts()['stale_messages'] == 1
+    assert peer.counts()['replies_received'] == 1
+    assert peer.numbers() == [(2508,), (2510, 1, 5, COMMAND.tns)]
+    assert peer.stations[1].replies == 0
+
+
+def test_reply_of_the_last_moment() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    peer.wait(CMD_TIMEOUT - 0.001)
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+
+
+@pytest.mark.parametrize('other', [
+    replace(REPLY, tns=REPLY.tns ^ 0x0100), replace(REPLY, src=2),
+    replace(REPLY, tns=REPLY.tns ^ 1, cmd=0x46)])
+def test_reply_of_another_transaction_or_station_is_stale(other: Packet) -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    assert peer.hear_packet(other) == ACK
+    assert errand.result is None
+    assert peer.counts()['stale_messages'] == 1
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+
+
+def test_reply_to_any_dst_counts() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    assert peer.hear_packet(replace(REPLY, dst=0)) == ACK
+    assert errand.result == replace(REPLY, dst=0)
+
+
+def test_reply_with_another_command_code() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    assert peer.hear_packet(replace(REPLY, cmd=0x46)) == ACK
+    assert isinstance(errand.result, WrongCommandCode)
+    assert errand.result.args == (1, 0x46, 0x4F)
+    assert peer.numbers() == [(2505, 1, 0x46, 0x4F)]
+    assert peer.counts()['invalid_messages'] == 1
+    assert peer.stations[1].replies == 0
+    assert peer.hear_packet(REPLY) == ACK  # too late: stale
+    assert peer.counts()['stale_messages'] == 1
+
+
+def test_command_with_our_tns_is_no_reply() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    theirs = Packet(5, 1, 0x0F, 0, COMMAND.tns, b'\x68')
+    assert peer.hear_packet(theirs) == ACK + peer.frame(theirs.reply())
+    assert errand.result is None
+
+
+@pytest.mark.parametrize('allowed', [1, 2, 3])
+def test_commands_outstanding(allowed: int) -> None:
+    peer = bench(max_outstanding=allowed)
+    commands = [later(COMMAND, number) for number in range(6)]
+    errands = [peer.begin(command) for command in commands]
+    said = peer.said()
+    for command in commands[1:allowed]:
+        assert said
+        said = peer.hear(ACK)
+        assert said == peer.frame(command)
+    assert peer.hear(ACK) == b''
+    assert peer.most_outstanding == allowed
+    for at, command in enumerate(commands[allowed:], allowed):
+        assert peer.hear_packet(commands[at - allowed].reply()) == ACK + peer.frame(command)
+        assert peer.hear(ACK) == b''
+    for command in commands[-allowed:]:
+        peer.hear_packet(command.reply())
+    assert [errand.result for errand in errands] == [command.reply() for command in commands]
+    assert peer.most_outstanding == allowed
+
+
+@pytest.mark.parametrize('order', list(itertools.permutations(range(3))))
+def test_replies_in_any_order_find_their_command(order: tuple[int, ...]) -> None:
+    peer = bench(max_outstanding=3)
+    commands = [replace(later(COMMAND, number), dst=1 + number) for number in range(3)]
+    errands = [peer.begin(command) for command in commands]
+    assert peer.said() + peer.hear(ACK) + peer.hear(ACK) + peer.hear(ACK) == b''.join(
+        map(peer.frame, commands))
+    for number in order:
+        reply = commands[number].reply(bytes((number,)))
+        assert errands[number].result is None
+        assert peer.hear_packet(reply) == ACK
+        assert errands[number].result == reply
+
+
+def test_same_tns_at_two_stations() -> None:
+    peer = bench(max_outstanding=2)
+    errands = [peer.begin(replace(COMMAND, dst=number)) for number in (1, 2)]
+    peer.said()
+    peer.hear(ACK, ACK)
+    peer.hear_packet(replace(REPLY, src=2, data=b'two'))
+    peer.hear_packet(replace(REPLY, src=1, data=b'one'))
+    assert [errand.result for errand in errands] == [
+        replace(REPLY, src=1, data=b'one'), replace(REPLY, src=2, data=b'two')]
+
+
+def test_each_outstanding_command_has_its_own_time() -> None:
+    peer = bench(max_outstanding=2)
+    first, second = peer.begin(COMMAND), peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear(ACK) == peer.frame(later(COMMAND, 1))
+    peer.wait(0.5)
+    assert peer.hear(ACK) == b''
+    peer.wait(60)
+    assert isinstance(first.result, CommandTimeout)
+    assert isinstance(second.result, CommandTimeout)
+    assert first.ended == pytest.approx(100.0 + CMD_TIMEOUT)
+    assert second.ended == pytest.approx(100.5 + CMD_TIMEOUT)
+
+
+def test_outstanding_replies_while_another_transfer_fails() -> None:
+    peer = bench(max_outstanding=2)
+    first, second = peer.begin(COMMAND), peer.begin(replace(COMMAND, dst=2))
+    peer.said()
+    assert peer.hear(ACK) == peer.frame(replace(COMMAND, dst=2))
+    peer.wait(1.5)
+    assert peer.hear_packet(REPLY) == ACK
+    assert first.result == REPLY
+    peer.wait(4.0)
+    assert isinstance(second.result, StationInactive)
+    assert peer.changes == [(2, False)]
+
+
+def lose(peer: PeerBench) -> None:
+    """Let a command fail."""
+    peer.begin(COMMAND)
+    peer.said()
+    peer.wait(60)
+    assert peer.changes == [(1, False)]
+
+
+def test_silent_station_is_probed_with_one_try() -> None:
+    peer = bench()
+    lose(peer)
+    for number in range(1, 4):
+        errand = peer.begin(later(COMMAND, number))
+        assert peer.said() == peer.frame(later(COMMAND, number))
+        assert peer.wait(2 * TIMEOUT) == []
+        assert isinstance(errand.result, StationInactive)
+        assert errand.seconds <= 2 * TIMEOUT
+    assert peer.changes == [(1, False)]
+
+
+def test_refusing_station_is_probed_with_one_try() -> None:
+    peer = bench()
+    lose(peer)
+    errand = peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear(NAK) == b''
+    assert peer.wait(TIMEOUT) == []
+    assert isinstance(errand.result, StationInactive)
+
+
+def test_station_comes_back_with_its_reply() -> None:
+    peer = bench()
+    lose(peer)
+    errand = peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear(ACK) == b''
+    assert peer.changes == [(1, False)]  # an ACK names nobody
+    assert peer.hear_packet(later(REPLY, 1)) == ACK
+    assert errand.result == later(REPLY, 1)
+    assert peer.changes == [(1, False), (1, True)]
+    errand = peer.begin(later(COMMAND, 2))
+    peer.said()
+    assert len(peer.wait(60)) == 3  # a whole cycle of ENQs again
+    assert isinstance(errand.result, StationInactive)
+
+
+def test_command_without_a_reply_leaves_its_station_active() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    peer.wait(60)
+    assert peer.stations[1].active
+
+
+def test_rest_hears_the_line_and_wakes() -> None:
+    peer = bench()
+    assert peer.wait(1000) == []
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+    peer.hear(ACK)
+    assert peer.wait(1000) == []
+    peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+
+
+def test_commands_go_on_being_served_while_all_are_outstanding() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.begin(later(COMMAND, 1))
+    peer.said()
+    peer.hear(ACK)
+    for number in range(20):
+        packet = later(THEIRS, number)
+        assert peer.hear_packet(packet) == ACK + peer.frame(packet.reply())
+        assert peer.hear(ACK) == b''
+    assert len(peer.served) == 20
+
+
+@given(data=st.binary(max_size=80), chunk=st.integers(1, 9))
+@PROPERTY
+def test_any_bytes_are_survived(data: bytes, chunk: int) -> None:
+    peer = bench()
+    for at in range(0, len(data), chunk):
+        peer.hear(data[at:at + chunk])
+    peer.wait(30)
+    peer.hear(STX)
+    peer.hear_packet(THEIRS)
+    if THEIRS not in peer.served:
+        peer.hear_packet(THEIRS)
+    assert THEIRS in peer.served

@@ -1,0 +1,424 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The words of Serve rows: what the other end reads and writes, and who hears of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import tracemalloc
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.served import Served, served_problems
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.file_types import PlcType
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.mappings import load_rows, make_mapping
+from support.properties import PROPERTY
+from support.vectors import commands
+
+STATION = 5
+FAMILIES = ('PLC5', 'SLC')
+# What each family says of words that are not there, of a file that is not, and of nonsense.
+BAD_WORDS = {'PLC5': (0xF0, b'\x07'), 'SLC': (0x50, b'')}
+BAD_FILE = {'PLC5': (0xF0, b'\x06'), 'SLC': (0x10, b'')}
+ILLEGAL = (0x10, b'')
+
+
+def row(text: str, plc: str = 'PLC5', length: int = 1, kind: str | None = None) -> Mapping:
+    """Return a Serve row."""
+    return make_mapping(text, 'Serve', station=STATION, plc=plc, length=length, kind=kind)
+
+
+class Bench:
+    """Served rows, what the other end does to them, and what is published of it."""
+
+    def __init__(self, plc: str, *mappings: Mapping) -> None:
+        self.plc = PlcType(plc)
+        self.published: list[tuple[Mapping, bytes]] = []
+        self.served = Served(
+            self.plc, mappings, lambda mapping, words: self.published.append((mapping, words)))
+        self._dialect = DIALECTS.get(self.plc, DIALECTS[PlcType.PLC5])
+        self._tns = 0
+
+    def _place(self, text: str) -> Address:
+        return Address.parse(text, self.plc)
+
+    def ask(self, data: bytes, cmd: int = 0x0F) -> tuple[int, bytes]:
+        """Return STS and data of the reply to any command."""
+        self._tns += 1
+        reply = self.served.serve(Packet(STATION, 1, cmd, 0, self._tns, data))
+        assert (reply.dst, reply.src, reply.cmd, reply.tns) == (1, STATION, cmd | 0x40, self._tns)
+        return reply.sts, reply.data
+
+    def read(self, text: str, words: int = 1) -> bytes:
+        """Return words that the other end reads."""
+        place = self._place(text)
+        sts, data = self.ask(self._dialect.read(place, words))
+        assert sts == 0, (sts, data)
+        return self._dialect.read_data(place, words, data)
+
+    def refused_read(self, text: str, words: int = 1) -> tuple[int, bytes]:
+        """Return what the other end is told that reads what it must not."""
+        return self.ask(self._dialect.read(self._place(text), words))
+
+    def write(self, text: str, *words: int) -> tuple[int, bytes]:
+        """Let the other end write words; return STS and data."""
+        data = b''.join(word.to_bytes(2, 'little') for word in words)
+        return self.ask(self._dialect.write(self._place(text), data))
+
+    def write_bits(self, text: str, mask: int, bits: int) -> tuple[int, bytes]:
+        """Let the other end write bits of a word; return STS and data."""
+        return self.ask(self._dialect.write_bits(self._place(text), mask, bits))
+
+    def heard(self) -> list[tuple[str, list[int]]]:
+        """Return, once, name and values of all that was published."""
+        said = [(mapping.name, list(mapping.codec.decode(words)))
+                for mapping, words in self.published]
+        self.published.clear()
+        return said
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_what_the_other_end_writes_is_published(plc: str) -> None:
+    mapping = row('N7:50', plc, 4)
+    bench = Bench(plc, mapping)
+    assert bench.read('N7:50', 4) == bytes(8)
+    assert bench.write('N7:50', 11, 22, 33, 44) == (0, b'')
+    assert bench.published == [(mapping, b'\x0b\0\x16\0\x21\0\x2c\0')]
+    assert bench.read('N7:50', 4) == b'\x0b\0\x16\0\x21\0\x2c\0'
+    assert len(bench.published) == 1
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_part_of_a_mapping_publishes_all_of_it(plc: str) -> None:
+    bench = Bench(plc, row('N7:50', plc, 4))
+    bench.write('N7:51', 1, 2)
+    assert bench.heard() == [('N7:50_5_Serve_4', [0, 1, 2, 0])]
+    assert bench.read('N7:52') == b'\x02\0'
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_unchanged_values_are_published_too(plc: str) -> None:
+    bench = Bench(plc, row('N7:50', plc))
+    bench.write('N7:50', 0)
+    bench.write('N7:50', 0)
+    assert len(bench.heard()) == 2
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+@pytest.mark.parametrize(('start', 'words', 'names'), [
+    (10, 1, ['a']), (10, 4, ['a', 'b']), (12, 2, ['b']), (13, 3, ['b', 'c']), (14, 2, ['c']),
+    (14, 1, []), (10, 6, ['a', 'b', 'c']), (16, 1, [])])
+def test_exactly_the_mappings_that_overlap_are_published(plc: str, start: int, words: int,
+                                                         names: list[str]) -> None:
+    rows = [
+        make_mapping(text, command, station=STATION, plc=plc, length=length, tag=tag)
+        for text, command, length, tag in (
+            ('N7:10', 'Serve', 2, 'a'), ('N7:12', 'Serve', 2, 'b'), ('N7:15', 'Serve', 1, 'c'),
+            ('N7:14', 'Serve', 1, 'gap'), ('N7:16', 'Serve', 1, 'd'), ('N9:10', 'Serve', 9, 'x'),
+            ('N7:10', 'Read', 9, 'read'), ('B3:10', 'Serve', 9, 'y'))]
+    bench = Bench(plc, *rows)
+    bench.write(f'N7:{start}', *[1] * words)
+    said = [name for name, _ in bench.heard()]
+    assert said == [name for name in ('a', 'b', 'c', 'gap', 'd') if name in {
+        'gap': names + ['gap'] if start <= 14 < start + words else names,
+        'd': names + ['d'] if start == 16 else names}.get(name, names)]
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_words_between_and_beside_the_mappings_are_not_there(plc: str) -> None:
+    bench = Bench(plc, row('N7:2', plc, 2), row('N7:6', plc, 2))
+    for text, words in (('N7:0', 1), ('N7:1', 2), ('N7:3', 2), ('N7:4', 1), ('N7:5', 2),
+                        ('N7:2', 6), ('N7:7', 2), ('N7:8', 1), ('N7:200', 1)):
+        assert bench.refused_read(text, words) == BAD_WORDS[plc]
+        assert bench.write(text, *[7] * words) == BAD_WORDS[plc]
+    assert bench.published == []
+    assert bench.read('N7:2', 2) + bench.read('N7:6', 2) == bytes(8)
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_neighbouring_mappings_are_read_and_written_together(plc: str) -> None:
+    bench = Bench(plc, row('N7:4', plc, 2), row('N7:2', plc, 2))
+    assert bench.write('N7:2', 1, 2, 3, 4) == (0, b'')
+    assert bench.heard() == [('N7:4_5_Serve_2', [3, 4]), ('N7:2_5_Serve_2', [1, 2])]
+    assert bench.read('N7:2', 4) == b'\1\0\2\0\3\0\4\0'
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+@pytest.mark.parametrize('text', ['N9:0', 'B3:0', 'T4:0', 'F8:0', 'S:0'])
+def test_files_without_a_mapping_are_not_there(plc: str, text: str) -> None:
+    bench = Bench(plc, row('N7:0', plc, 2))
+    words = 2 if text == 'F8:0' else 3 if text == 'T4:0' else 1
+    assert bench.refused_read(text, words) == BAD_FILE[plc]
+    assert bench.write_bits(text, 1, 1)[0] != 0
+    assert bench.published == []
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_without_rows_only_diagnostics_are_served(plc: str) -> None:
+    bench = Bench(plc)
+    assert bench.refused_read('N7:0') == BAD_FILE[plc]
+    assert bench.ask(b'\0hello', 0x06) == (0, b'hello')
+    assert bench.ask(b'\3', 0x06) == (0, diagnostics.identity(PlcType(plc)))
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+@pytest.mark.parametrize(('cmd', 'data'), [
+    (0x0F, b''), (0x0F, b'\x80\x06'), (0x0F, b'\x3A\x06'), (0x0F, b'\x01'), (0x07, b'\0\1'),
+    (0x01, b'\x11\0\2'), (0x08, b'\0\0\0\0'), (0x06, b'\x07'), (0x06, b''), (0x2F, b'\xA2'),
+    (0x0A, b'racom'), (0x0B, b'racom'), (0x3F, bytes(200))])
+def test_other_commands_are_illegal(plc: str, cmd: int, data: bytes) -> None:
+    bench = Bench(plc, row('N7:0', plc, 2))
+    assert bench.ask(data, cmd) == ILLEGAL
+    assert bench.published == []
+
+
+def test_each_family_refuses_the_commands_of_the_other() -> None:
+    for ours, theirs in (FAMILIES, reversed(FAMILIES)):
+        place = Address.parse('N7:0', PlcType(theirs))
+        bench = Bench(ours, row('N7:0', ours, 2))
+        dialect = DIALECTS[PlcType(theirs)]
+        assert bench.ask(dialect.read(place, 1)) == ILLEGAL
+        assert bench.ask(dialect.write(place, b'\1\0')) == ILLEGAL
+        assert bench.ask(dialect.write_bits(place, 1, 1)) == ILLEGAL
+        assert bench.published == []
+
+
+@pytest.mark.parametrize('plc', ['PLC2', 'PLC3'])
+def test_family_that_is_not_emulated_answers_that_it_cannot(plc: str) -> None:
+    bench = Bench(plc)
+    assert bench.ask(b'\x68\0\0\1\0\7\0\7\0\1\0') == ILLEGAL
+    assert bench.ask(b'\x01\0', 0x01) == ILLEGAL
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_what_ros_stores_is_read(plc: str) -> None:
+    integers, floats = row('N7:50', plc, 3), row('F8:0', plc, 2)
+    bench = Bench(plc, integers, floats)
+    bench.served.store(integers, [-1, 0x1002, 3])
+    bench.served.store(floats, [1.5, -2.0])
+    assert bench.read('N7:50', 3) == b'\xff\xff\x02\x10\3\0'
+    assert bench.read('F8:0', 4) == b'\0\0\xc0\x3f\0\0\0\xc0'
+    assert bench.served.words_of(integers) == b'\xff\xff\x02\x10\3\0'
+    assert bench.published == []  # what we have said ourselves is no news
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_own_values_are_not_published_with_the_next_command(plc: str) -> None:
+    ours, theirs = row('N7:0', plc), row('N7:9', plc)
+    bench = Bench(plc, ours, theirs)
+    bench.served.store(ours, [7])
+    bench.write('N7:9', 1)
+    assert bench.heard() == [('N7:9_5_Serve_1', [1])]
+
+
+def test_storing_for_a_long_time_takes_no_memory() -> None:
+    mapping, bits = row('N7:0', length=10), row('B3:0/3', length=8)
+    bench = Bench('PLC5', mapping, bits)
+
+    def store(times: int) -> int:
+        for number in range(times):
+            bench.served.store(mapping, [number % 100] * 10)
+            bench.served.store(bits, [number % 2] * 8)
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before = store(100)
+        assert store(2000) - before < 20_000
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_string(plc: str) -> None:
+    mapping = row('ST9:1', plc)
+    bench = Bench(plc, mapping)
+    bench.served.store(mapping, 'Tank 4')
+    words = bench.read('ST9:1', 42)
+    assert mapping.codec.decode(words) == 'Tank 4'
+    assert bench.refused_read('ST9:0', 42) == BAD_WORDS[plc]
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_member_of_a_structure(plc: str) -> None:
+    mapping = row('T4:1.ACC', plc)
+    bench = Bench(plc, mapping)
+    bench.served.store(mapping, [77])
+    assert bench.read('T4:1.ACC') == b'\x4d\0'
+    assert bench.write('T4:1.ACC', 78) == (0, b'')
+    assert bench.heard() == [('T4:1.ACC_5_Serve_1', [78])]
+    assert bench.refused_read('T4:1.PRE') == BAD_WORDS[plc]
+    assert bench.refused_read('T4:1', 3) == BAD_WORDS[plc]
+    assert bench.refused_read('T4:0.ACC') == BAD_WORDS[plc]
+
+
+@pytest.mark.parametrize(('plc', 'text', 'other'), [
+    ('SLC', 'O:2.1', 'O:3.1'), ('SLC', 'I:1.0', 'I:1.1'), ('PLC5', 'O:017', 'O:016')])
+def test_io(plc: str, text: str, other: str) -> None:
+    mapping = row(text, plc)
+    bench = Bench(plc, mapping)
+    assert bench.write(text, 0xF00F) == (0, b'')
+    assert bench.heard() == [(mapping.name, [0xF00F])]
+    assert bench.refused_read(other)[0] != 0
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_bits_leave_the_others_of_their_word(plc: str) -> None:
+    low, high = row('B3:5/2', plc, 3), row('B3:5/8', plc, 10)
+    bench = Bench(plc, low, high)
+    bench.served.store(low, [1, 0, 1])
+    bench.served.store(high, [1, 1, 0, 0, 0, 0, 0, 1, 0, 1])
+    assert bench.read('B3:5', 2) == bytes((0b00010100, 0b10000011, 0b10, 0))
+    bench.served.store(low, [0, 1, 0])
+    assert bench.read('B3:5', 2) == bytes((0b00001000, 0b10000011, 0b10, 0))
+    assert bench.published == []
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_bits_that_the_other_end_writes(plc: str) -> None:
+    low, high, next_word = row('B3:5/2', plc, 3), row('B3:5/8', plc, 10), row('B3:7', plc)
+    bench = Bench(plc, low, high, next_word)
+    assert bench.write_bits('B3:5', 0x0004, 0x0004) == (0, b'')
+    # Both rows have bits in that word.
+    assert bench.heard() == [('B3:5/2_5_Serve_3', [1, 0, 0]),
+                             ('B3:5/8_5_Serve_10', [0] * 10)]
+    assert bench.write_bits('B3:6', 0x0003, 0x0003) == (0, b'')
+    assert bench.heard() == [('B3:5/8_5_Serve_10', [0] * 8 + [1, 1])]
+    assert bench.write_bits('B3:8', 1, 1) == BAD_WORDS[plc]
+    assert bench.write_bits('B3:4', 1, 1) == BAD_WORDS[plc]
+    assert bench.heard() == []
+
+
+def test_command_for_several_words_is_published_once_and_all_or_nothing() -> None:
+    slc = Bench('SLC', row('B3:0', 'SLC', 2))
+    masked = bytes.fromhex('AB 04 03 85 00 00 0F 00 FF 00 FF 00')
+    assert slc.ask(masked) == (0, b'')
+    assert slc.heard() == [('B3:0_5_Serve_2', [0x0F, 0x0F])]
+    assert slc.ask(bytes.fromhex('AB 04 03 85 01 00 0F 00 00 00 00 00')) == BAD_WORDS['SLC']
+    assert slc.heard() == []
+    plc5 = Bench('PLC5', row('B3:0', length=2))
+    sets = '07 00 03 {:02X} FF FF 01 00'
+    both = bytes.fromhex('26' + sets.format(0) + sets.format(1))
+    assert plc5.ask(both) == (0, b'')
+    assert plc5.heard() == [('B3:0_5_Serve_2', [1, 1])]
+    assert plc5.ask(bytes.fromhex('26' + sets.format(1) + sets.format(2))) == BAD_WORDS['PLC5']
+    assert plc5.heard() == []
+
+
+def test_rows_of_the_same_words_are_all_published() -> None:
+    word, bits = row('N7:0'), row('N7:0/4', length=2)
+    bench = Bench('PLC5', word, bits)
+    bench.write('N7:0', 0x10)
+    assert bench.heard() == [(word.name, [0x10]), (bits.name, [1, 0])]
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_any_command_is_answered(plc: str) -> None:
+    bench = Bench(plc, row('N7:0', plc, 20), row('F8:0', plc, 4))
+    for entry in commands(0x00, 0x01, 0x26, 0x67, 0x68, 0xA1, 0xA2, 0xA9, 0xAA, 0xAB):
+        reply = bench.served.serve(entry.packet)
+        assert (reply.dst, reply.src) == (entry.packet.src, entry.packet.dst)
+
+
+@given(cmd=st.sampled_from((0x0F, 0x06, 0x2F, 0x01)), data=st.binary(max_size=60),
+       plc=st.sampled_from(FAMILIES))
+@PROPERTY
+def test_any_bytes_are_answered(cmd: int, data: bytes, plc: str) -> None:
+    bench = Bench(plc, row('N7:0', plc, 20))
+    sts, _ = bench.ask(data, cmd)
+    assert sts in (0, 0x10, 0x50, 0xF0)
+
+
+# Rows that do not fit
+
+PEER = Network(mode='Peer')
+
+
+def texts(*mappings: Mapping, network: Network = PEER) -> list[str]:
+    """Return the text of every problem."""
+    return [str(problem) for _, problem in served_problems(mappings, network, 'map.csv')]
+
+
+def test_rows_that_fit() -> None:
+    assert texts(row('N7:50', length=4), row('N7:52', length=9), row('B3:5/0', length=8),
+                 make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', plc='SLC')) == []
+
+
+def test_other_commands_need_nothing_of_that() -> None:
+    assert texts(make_mapping('N7:0', plc='SLC', station=9), network=Network()) == []
+
+
+def test_serve_needs_our_plc_type() -> None:
+    assert texts(row('N7:50', 'SLC')) == [
+        'map.csv:2: Item: 1, a Serve row has the PLC_Type we emulate, which is PLC5 in the net '
+        'file']
+    assert texts(row('N7:50', 'SLC'), network=Network(mode='Peer', plc_type='SLC')) == []
+
+
+def test_serve_needs_our_station() -> None:
+    assert texts(make_mapping('N7:50', 'Serve', station=1, item=7)) == [
+        'map.csv:8: Item: 7, a Serve row has our own Station, which is 5 in the net file']
+
+
+def test_serve_rows_of_one_file_have_one_type() -> None:
+    assert texts(row('N9:0'), row('B9:0'), row('N9:1')) == [
+        'map.csv:2: Item: 1, B9:0 does not fit an earlier Serve row: file 9 is of type N already']
+
+
+@pytest.mark.parametrize('plc', ['PLC2', 'PLC3'])
+def test_plc_types_that_cannot_be_emulated(plc: str) -> None:
+    network = Network(mode='Peer', plc_type=plc)
+    assert texts(make_mapping('N7:0'), network=network) == []
+    assert len(texts(row('N7:0'), network=network)) == 1
+
+
+def test_problems_go_with_their_rows() -> None:
+    good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
+    assert [mapping for mapping, _ in served_problems([good, bad], PEER, 'm')] == [bad]
+
+
+def loaded(*rows: str) -> tuple[Sequence[Mapping], list[str]]:
+    """Return the mappings of a file, and the texts of its problems."""
+    mappings, problems = load_rows(*rows)
+    return mappings, [problem.text for problem in problems]
+
+
+def test_serve_row_of_a_file() -> None:
+    (mapping,), problems = loaded('pushed,Serve,N7:50,5,PLC5,4,,,,,,')
+    assert problems == []
+    assert (mapping.serves, mapping.polls, mapping.reads, mapping.writes) == (
+        True, False, True, True)
+    assert (mapping.topic, mapping.period, mapping.cell('Command')) == ('pushed', None, 'Serve')
+
+
+def test_serve_row_takes_read_and_write_topics() -> None:
+    _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Read,N7:0,1,PLC5,4,,x,,,,')
+    assert len(problems) == 1
+    _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,3,,x,,,,')
+    assert len(problems) == 1
+    _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,4,,x,,,,')
+    assert problems == []
+
+
+def test_serve_row_is_checked_like_a_write() -> None:
+    _, problems = loaded('a,Serve,T4:0,5,PLC5,,,,,,,', 'b,Serve,N7:0,5,PLC5,,,,,,5,1')
+    assert len(problems) == 2

@@ -1,0 +1,152 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The files of a bridge, and the simulator that goes with them as a process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from std_msgs.msg import (
+    Float32MultiArray,
+    Int16MultiArray,
+    Int32MultiArray,
+    String,
+    UInt8MultiArray,
+    UInt16MultiArray,
+    UInt32MultiArray,
+)
+from support.ros import Process, ros_args, write_csv
+
+NET_HEADER = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout'
+NET_ROW = '2,2,500,115200,200'
+
+MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Type,Period,Publish,Min,Max'
+MAP_ROWS = (
+    'bits,Read,B3:0/2,1,PLC5,6,,,,,',
+    'door,Read,I:017/12,1,PLC5,,,,,,',
+    'rack,Read,I:017,1,PLC5,,,,,,',
+    'speeds,Read,N7:0,1,PLC5,2,,,,,',
+    'levels,ReadWrite,F8:0,1,PLC5,3,,,,-50,150',
+    'timer,Read,T4:1,1,PLC5,3,,,,,',
+    'timer/done,Read,T4:1/DN,1,PLC5,,,,,,',
+    'counts,Read,C5:0,1,PLC5,6,,,,,',
+    'flags,ReadWrite,B3:4/1,1,PLC5,3,,,,,',
+    'flag_word,Read,B3:4,1,PLC5,,,,,,',
+    'parts,Read,C5:2.ACC,2,SLC,,,,,,',
+    'preset,ReadWrite,C5:2.PRE,2,SLC,,,,,,',
+    'gripper,Read,I:1.0,2,SLC,2,,,,,',
+    'lamp,ReadWrite,O:2.0/3,2,SLC,,,,,,',
+    'lamps,Read,O:2.0,2,SLC,,,,,,',
+    'total,ReadWrite,L10:0,2,SLC,2,,,,,',
+    'unsigned,Read,N7:40,2,SLC,,uint32,,,,',
+    'name,ReadWrite,ST9:1,2,SLC,,,,,,',
+    'digits,ReadWrite,N7:30,2,SLC,2,bcd16,,,,',
+    'setpoint,ReadWrite,F8:4,2,SLC,,,,,-50,150',
+    'recipe,ReadWrite,N7:10,2,SLC,4,,,Change,0,999',
+    'heartbeat,Read,N7:60,2,SLC,,,1000,,,',
+    'reset,Write,B3:1/5,2,SLC,,,,,,',
+)
+
+SIMULATOR_HEADER = 'Station,PLC_Type,Address,Length,Values,Motion,Period'
+SIMULATOR_ROWS = (
+    '1,PLC5,I:000,16,,,',
+    '1,PLC5,I:017/12,1,1,,',
+    '1,PLC5,B3:0,8,,,',
+    '1,PLC5,B3:0/2,6,1 0 0 1 1 0,,',
+    '1,PLC5,B3:4,1,65521,,',
+    '1,PLC5,N7:0,16,1200 -800,,',
+    '1,PLC5,F8:0,8,12.5 40.25 -3.5,,',
+    '1,PLC5,T4:0,9,,,',
+    '1,PLC5,T4:1.PRE,2,500 120,,',
+    '1,PLC5,T4:1/DN,1,1,,',
+    '1,PLC5,C5:0,6,,,',
+    '1,PLC5,C5:1.PRE,2,9 8,,',
+    '2,SLC,I:1.0,2,5 40960,,',
+    '2,SLC,O:2.0,1,240,,',
+    '2,SLC,B3:0,4,,,',
+    '2,SLC,C5:0,9,,,',
+    '2,SLC,C5:2.ACC,1,-17,,',
+    '2,SLC,N7:0,64,,,',
+    '2,SLC,N7:10,4,101 102 103 104,,',
+    '2,SLC,N7:30,2,4660 153,,',
+    '2,SLC,N7:40,2,-1 1,,',
+    '2,SLC,N7:60,1,7,,',
+    '2,SLC,F8:0,8,,,',
+    '2,SLC,F8:4,1,21.5,,',
+    '2,SLC,L10:0,2,-70000 2000000000,,',
+    '2,SLC,ST9:0,1,,,',
+    '2,SLC,ST9:1,1,Tank 4,,',
+)
+
+# Topic: type, label, values.
+READS: dict[str, tuple[Any, str, list[float] | str]] = {
+    'bits': (UInt8MultiArray, 'B3:0/2', [1, 0, 0, 1, 1, 0]),
+    'door': (UInt8MultiArray, 'I:017/12', [1]),
+    'rack': (UInt16MultiArray, 'I:017', [1 << 0o12]),
+    'speeds': (Int16MultiArray, 'N7:0', [1200, -800]),
+    'levels': (Float32MultiArray, 'F8:0', [12.5, 40.25, -3.5]),
+    'timer': (Int16MultiArray, 'T4:1', [1 << 13, 500, 120]),
+    'timer/done': (UInt8MultiArray, 'T4:1/DN', [1]),
+    'counts': (Int16MultiArray, 'C5:0', [0, 0, 0, 0, 9, 8]),
+    'flags': (UInt8MultiArray, 'B3:4/1', [0, 0, 0]),
+    'flag_word': (UInt16MultiArray, 'B3:4', [0xFFF1]),
+    'parts': (Int16MultiArray, 'C5:2.ACC', [-17]),
+    'preset': (Int16MultiArray, 'C5:2.PRE', [0]),
+    'gripper': (UInt16MultiArray, 'I:1.0', [5, 40960]),
+    'lamp': (UInt8MultiArray, 'O:2.0/3', [0]),
+    'lamps': (UInt16MultiArray, 'O:2.0', [0x00F0]),
+    'total': (Int32MultiArray, 'L10:0', [-70000, 2000000000]),
+    'unsigned': (UInt32MultiArray, 'N7:40', [0x1FFFF]),
+    'name': (String, '', 'Tank 4'),
+    'digits': (UInt16MultiArray, 'N7:30', [1234, 99]),
+    'setpoint': (Float32MultiArray, 'F8:4', [21.5]),
+    'recipe': (Int16MultiArray, 'N7:10', [101, 102, 103, 104]),
+    'heartbeat': (Int16MultiArray, 'N7:60', [7]),
+}
+WRITES = {'levels', 'flags', 'preset', 'lamp', 'total', 'name', 'digits', 'setpoint', 'recipe',
+          'reset'}
+
+STATUSES = ['link', 'counters', 'station 1', 'station 2', 'mappings', 'writes']
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """The files of a bridge; ``args`` are the node's arguments for them."""
+
+    folder: Path
+    net: Path
+    map: Path
+    simulator: Path
+    port: Path
+
+    def args(self, *assignments: str) -> list[str]:
+        return ros_args(f'net_file:={self.net}', f'map_file:={self.map}',
+                        f'port:={self.port}', *assignments)
+
+    def start_simulator(self) -> Process:
+        simulator = Process('simulator', '--pty', str(self.port), '--data', str(self.simulator))
+        simulator.wait_for('stations 1 (PLC5), 2 (SLC) on')
+        return simulator
+
+
+def make_files(folder: Path) -> Files:
+    return Files(
+        folder,
+        write_csv(folder / 'net.csv', NET_HEADER, [NET_ROW]),
+        write_csv(folder / 'map.csv', MAP_HEADER, MAP_ROWS),
+        write_csv(folder / 'simulator.csv', SIMULATOR_HEADER, SIMULATOR_ROWS),
+        folder / 'plc')

@@ -1,0 +1,374 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bridge node in this process, against simulated PLCs on a pseudo-terminal."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+import signal
+import threading
+from typing import Any
+
+from abdf1_ros.node import BridgeNode, main
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.port import PortState
+from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
+from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt8MultiArray
+from support.ros import (
+    details,
+    ERROR,
+    Inbox,
+    Observer,
+    OK,
+    Plcs,
+    ros_args,
+    until_status,
+    WARN,
+    write_csv,
+)
+
+NET = ('NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout', ['1,1,500,115200,100'])
+MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Topic'
+SIMULATOR = ('Station,PLC_Type,Address,Length,Values,Motion,Period', [
+    '1,PLC5,N7:0,16,,,', '1,PLC5,B3:0,4,,,', '1,PLC5,F8:0,4,,,', '2,SLC,B3:0,4,,,',
+    '2,SLC,N7:0,16,,,'])
+
+SPEED = 'speed,Read,N7:0,1,PLC5,2,'
+LAMPS = ('lamp_a,Write,B3:0/1,1,PLC5,2,lamps', 'lamp_b,Write,B3:2/8,2,SLC,2,lamps')
+PULSES = 'pulses,Write,B3:1/0,1,PLC5,8,'
+RECIPE = 'recipe,Write,N7:4,1,PLC5,2,'
+LEVEL = 'level,Write,F8:0,1,PLC5,1,'
+
+
+class Bench:
+    """A bridge, the PLCs it talks to, and who looks at both; all in one executor."""
+
+    def __init__(self, folder: Path, observer: Observer, plcs: Plcs, rows: tuple[str, ...],
+                 *assignments: str) -> None:
+        self.observer = observer
+        self.plcs = plcs
+        self.results = observer.results()
+        self.diagnostics = observer.diagnostics(plcs.port)
+        net = write_csv(folder / 'net.csv', *NET)
+        map_file = write_csv(folder / 'map.csv', MAP_HEADER, rows)
+        self.node = BridgeNode(context=observer.context, use_global_arguments=False,
+                               cli_args=ros_args(
+            f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}', *assignments))
+        observer.executor.add_node(self.node)
+        self.node.start()
+        observer.until(lambda: self.node.driver.is_online, 'the port')
+
+    def publisher(self, kind: Any, topic: str) -> Callable[..., None]:
+        """Return what publishes values, once they cannot get lost any more."""
+        publisher = self.observer.publisher(kind, f'/abdf1/write/{topic}')
+        return lambda *values: publisher.publish(kind(data=values))
+
+    def until_results(self, count: int) -> Inbox:
+        """Wait for so many results; there must not be more."""
+        self.observer.until(
+            lambda: len(self.results) >= count,
+            lambda: f'{count} results; got {len(self.results)}: {messages(self.results)}')
+        assert len(self.results) == count
+        return self.results
+
+    def words(self, address: str, count: int = 1, station: int = 1) -> list[int]:
+        """Return words of a PLC."""
+        table = self.plcs[station].table
+        data = table.read(Address.parse(address, table.plc_type), count)
+        return [int.from_bytes(data[at:at + 2], 'little') for at in range(0, 2 * count, 2)]
+
+    def stop(self) -> None:
+        """End the bridge, unless it has ended."""
+        if self.node in self.observer.executor.get_nodes():
+            self.observer.executor.remove_node(self.node)
+            self.node.stop()
+            self.node.destroy_node()
+
+
+def messages(results: list[DiagnosticStatus]) -> Counter[str]:
+    return Counter(result.message for result in results)
+
+
+def link_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == 'df1 link']
+
+
+def times_open(path: str) -> int:
+    """Return how often this process has a file open."""
+    return [os.path.realpath(entry) for entry in Path('/proc/self/fd').iterdir()].count(path)
+
+
+@pytest.fixture
+def observer() -> Iterator[Observer]:
+    with Observer() as observer:
+        yield observer
+
+
+@pytest.fixture
+def plcs(tmp_path: Path) -> Iterator[Plcs]:
+    with Plcs(write_csv(tmp_path / 'simulator.csv', *SIMULATOR)) as plcs:
+        yield plcs
+
+
+@pytest.fixture
+def make_bench(tmp_path: Path, observer: Observer, plcs: Plcs) -> Iterator[Callable[..., Bench]]:
+    benches = []
+
+    def make(*rows: str, parameters: tuple[str, ...] = ()) -> Bench:
+        benches.append(Bench(tmp_path, observer, plcs, rows, *parameters))
+        return benches[-1]
+
+    yield make
+    for bench in benches:
+        bench.stop()
+    assert not any(bench.node.link.is_alive() for bench in benches)
+
+
+Benches = Callable[..., Bench]
+
+
+# One message, several results
+
+
+def test_one_topic_writes_to_every_mapping_of_it(make_bench: Benches) -> None:
+    bench = make_bench(*LAMPS)
+    bench.publisher(UInt8MultiArray, 'lamps')(1, 1)
+    results = {result.name: result for result in bench.until_results(2)}
+    assert {tag: result.message for tag, result in results.items()} == {
+        'lamp_a': 'written', 'lamp_b': 'written'}
+    assert details(results['lamp_a'])['address'] == 'B3:0/1'
+    assert details(results['lamp_b'])['station'] == '2'
+    assert bench.words('B3:0') == [0b110]
+    assert bench.words('B3:2', station=2) == [0x300]
+
+
+def test_each_mapping_of_a_topic_has_a_result_of_its_own(make_bench: Benches) -> None:
+    bench = make_bench(*LAMPS)
+    bench.plcs.say('error 2 60')
+    bench.publisher(UInt8MultiArray, 'lamps')(1, 0)
+    results = {result.name: result for result in bench.until_results(2)}
+    assert (results['lamp_a'].level, results['lamp_a'].message) == (OK, 'written')
+    assert results['lamp_b'].level == ERROR
+    assert results['lamp_b'].message.startswith('not written: the PLC refused it: STS 60: ')
+    assert bench.words('B3:0') == [0b010]
+    assert bench.words('B3:2', station=2) == [0]
+
+
+def test_unfit_message_is_refused_for_every_mapping(make_bench: Benches) -> None:
+    bench = make_bench(*LAMPS)
+    bench.publisher(UInt8MultiArray, 'lamps')(1, 0, 1)
+    results = bench.until_results(2)
+    assert sorted(result.name for result in results) == ['lamp_a', 'lamp_b']
+    assert messages(results) == {'not written: refused: 3 values, the mapping has 2': 2}
+
+
+# Bursts
+
+
+def test_every_pulse_of_a_burst_is_sent_in_order(make_bench: Benches) -> None:
+    bench = make_bench(PULSES, SPEED, parameters=('write_timeout:=30.0',))
+    speed = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed')
+    publish = bench.publisher(UInt8MultiArray, 'pulses')
+    speed.first()
+    patterns = [tuple(number >> bit & 1 for bit in range(8)) for number in range(200)]
+    speed.clear()
+    for pattern in patterns:
+        publish(*pattern)
+    results = bench.until_results(200)
+    assert messages(results) == {'written': 200}
+    assert [details(result)['value'] for result in results] == [
+        str(list(pattern)) for pattern in patterns]
+    assert bench.words('B3:1') == [199]
+    assert speed, 'no read went between 200 writes'
+    status = until_status(bench.diagnostics, 'writes', OK,
+                          lambda status: details(status)['confirmed'] == '200')
+    assert status.message == 'OK: 200 of 200 writes confirmed'
+    assert details(status)['accepted'] == '200'
+
+
+def test_waiting_words_are_superseded_by_newer_ones(make_bench: Benches) -> None:
+    bench = make_bench(RECIPE, PULSES)
+    bench.plcs.say('slow 1 10')
+    publish = bench.publisher(Int16MultiArray, 'recipe')
+    for number in range(100):
+        publish(number, -number)
+    results = bench.until_results(100)
+    superseded = 'not written: superseded by a newer value'
+    found = messages(results)
+    assert found['written'] + found[superseded] == 100
+    assert 1 <= found['written'] <= 50
+    assert {result.level for result in results if result.message == superseded} == {WARN}
+    last = [result for result in results if details(result)['value'] == '[99, -99]']
+    assert [result.message for result in last] == ['written']
+    assert bench.words('N7:4', 2) == [99, 0x10000 - 99]
+
+
+def test_floats_of_several_topics_do_not_supersede_each_other(make_bench: Benches) -> None:
+    bench = make_bench(RECIPE, LEVEL)
+    bench.plcs.say('slow 1 10')
+    recipe = bench.publisher(Int16MultiArray, 'recipe')
+    level = bench.publisher(Float32MultiArray, 'level')
+    for number in range(10):
+        recipe(number, number)
+        level(number / 4)
+    results = bench.until_results(20)
+    assert Counter(result.name for result in results) == {'recipe': 10, 'level': 10}
+    last = {result.name: details(result)['value'] for result in results
+            if result.message == 'written'}
+    assert last == {'recipe': '[9, 9]', 'level': '[2.25]'}
+
+
+# Writes that do not go well
+
+
+def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
+    bench = make_bench(PULSES)  # nothing is read, so nothing but the write can notice it
+    publish = bench.publisher(UInt8MultiArray, 'pulses')
+    bench.plcs.say('silent 1')
+    inactive = '2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive'
+    for expected in (f'unknown whether written: {inactive}',
+                     f'not written: not sent: {inactive}'):
+        publish(*8 * [1])
+        (result,) = bench.until_results(1)
+        assert (result.level, result.message) == (ERROR, expected)
+        bench.results.clear()
+    assert bench.words('B3:1') == [0]
+    bench.plcs.say('normal 1')
+    publish(*8 * [1])
+    assert bench.until_results(1)[0].message == 'written'
+    assert bench.words('B3:1') == [255]
+
+
+def test_write_that_waits_too_long_for_the_line_is_not_sent(make_bench: Benches) -> None:
+    bench = make_bench(PULSES, parameters=('write_timeout:=0.2',))
+    publish = bench.publisher(UInt8MultiArray, 'pulses')
+    bench.plcs.say('slow 1 100000')  # the first one takes all of Cmd_Timeout
+    for bit in range(3):
+        publish(*(int(n == bit) for n in range(8)))
+    first, *others = bench.until_results(3)
+    assert first.message == 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+    assert messages(others) == {'not written: not sent: waited longer than 0.2 s for the line': 2}
+    assert float(details(others[0])['latency_ms']) > 200
+    assert bench.words('B3:1') == [1]
+
+
+def test_loss_of_the_port_leaves_no_write_without_a_result(make_bench: Benches) -> None:
+    bench = make_bench(PULSES)
+    publish = bench.publisher(UInt8MultiArray, 'pulses')
+    bench.plcs.say('slow 1 100000')
+    for _ in range(3):
+        publish(*8 * [1])
+    bench.observer.until(lambda: bench.words('B3:1') == [255], 'the first write')
+    bench.plcs.lose()
+    first, *others = bench.until_results(3)
+    assert first.message.startswith('unknown whether written: port lost: ')
+    assert len(others) == 2
+    assert all(result.message.startswith('not written: ') for result in others)
+    until_status(bench.diagnostics, 'link', ERROR)
+    publish(*8 * [0])
+    assert bench.until_results(4)[-1].message == 'not written: refused: the port is not open'
+
+
+# Ends
+
+
+def test_stop_ends_all_threads_and_gives_the_port_back(
+        make_bench: Benches, observer: Observer, plcs: Plcs) -> None:
+    bench = make_bench(SPEED)
+    link = bench.node.link
+    speed = observer.listen(Int16MultiArray, '/abdf1/read/speed')
+    speed.first()
+    assert (len(link_threads()), times_open(plcs.port)) == (2, 2)
+    bench.stop()
+    assert not link.is_alive()
+    assert (len(link_threads()), times_open(plcs.port)) == (1, 1)  # those of the PLCs
+    assert link.state == PortState(False, 'closed')
+    status = until_status(bench.diagnostics, 'link', ERROR)
+    assert status.message == 'ERROR: closed'
+    make_bench(SPEED)  # the port is free for another one
+    speed.next()
+
+
+def test_internal_errors_are_told_and_the_third_is_the_end(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(SPEED)
+
+    def broken(*arguments: object) -> None:
+        raise ZeroDivisionError('a bug')
+
+    bench.node.read = broken
+    bench.observer.until(lambda: bench.node.link.has_failed, 'the third fault')
+    bench.node.link.join()
+    status = until_status(bench.diagnostics, 'link', ERROR)
+    assert status.message == "ERROR: internal error: ZeroDivisionError('a bug')"
+    said = ''.join(capfd.readouterr())
+    assert said.count("internal error: ZeroDivisionError('a bug'); please report it") == 3
+
+
+# Starts that are refused
+
+
+@pytest.fixture
+def refusal(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., list[str]]]:
+    """Return the lines that a node says which refuses to start."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def start(*arguments: str) -> list[str]:
+        capfd.readouterr()
+        assert main(['node', *arguments]) == 2
+        return ''.join(capfd.readouterr()).splitlines()
+
+    yield start
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize(('assignment', 'expected'), [
+    ('net_file:=/nowhere/net.csv', '/nowhere/net.csv: cannot be read: No such file or directory'),
+    ('net.station:=300',
+     'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (300) must be less '
+     'than 255; Station = "300" should be a whole number from 0 to 254'),
+    ('net.station:=abc',
+     'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (abc) must be less '
+     'than 255; Station = "abc" should be a whole number from 0 to 254'),
+    ('default_period:=-1', 'parameter default_period: default_period = -1 should be a whole '
+                           'number from 0 to 86400000'),
+    ('diagnostics_period:=abc',
+     "parameter diagnostics_period: diagnostics_period = 'abc' should be a number from 0.1 "
+     'to 60')])
+def test_faulty_parameter_is_told_in_one_line(
+        refusal: Callable[..., list[str]], assignment: str, expected: str) -> None:
+    (line,) = refusal(*ros_args(assignment))
+    level, _, name, text = line.split(' ', 3)
+    assert (level, name, text) == ('[FATAL]', '[abdf1]:', expected)
+
+
+@pytest.mark.parametrize(('arguments', 'expected'), [
+    (['--ros-args', '-r', '__node:=a-b'], "Couldn't parse remap rule: '-r __node:=a-b'."),
+    (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
+    (['--ros-args', '--bogus'], '--bogus'),
+    (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'")],
+    ids=['remap', 'parameter', 'unknown', 'long'])
+def test_unusable_arguments_are_told_in_one_line(
+        refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
+    lines = refusal(*arguments)
+    (line,) = [line for line in lines if line.startswith('abdf1: ')]
+    assert line.startswith('abdf1: bad arguments: ')
+    assert expected in line
+    assert 'Traceback' not in ' '.join(lines)

@@ -1,0 +1,548 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A running bridge seen over DDS: node and simulator are processes of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+import re
+import signal
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
+from rcl_interfaces.msg import Parameter
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rclpy.duration import Duration, Infinite
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import MultiArrayLayout, String, UInt8MultiArray, UInt16MultiArray
+from std_srvs.srv import Trigger
+from support.ros import (
+    details,
+    ERROR,
+    find_status,
+    get_parameters,
+    Inbox,
+    Observer,
+    OK,
+    Process,
+    until_status,
+    values_in,
+    WARN,
+)
+from support.simulator_process import make_files, READS, STATUSES, WRITES
+from support.vectors import load_json
+
+COUNTERS = [name for _, name in load_json('driver_tables.json')['counters']]
+WORDS = {OK: 'OK: ', WARN: 'WARN: ', ERROR: 'ERROR: '}
+
+
+class Bridge:
+    """A node that runs against a simulator, and what it says of itself."""
+
+    simulator: Process
+    node: Process
+
+    def __init__(self, port: Path, observer: Observer) -> None:
+        self.port = port
+        self.observer = observer
+        self.diagnostics = observer.diagnostics(port)
+        self.results = observer.results()
+        self.active = observer.listen(UInt16MultiArray, '/abdf1/active_stations')
+
+    def listen(self, tag: str, qos: QoSProfile | None = None) -> Inbox:
+        return self.observer.listen(READS[tag][0], f'/abdf1/read/{tag}', qos)
+
+    @contextmanager
+    def fault(self, command: str, station: int = 2) -> Iterator[None]:
+        """Switch a fault on, and afterwards off until all is well again."""
+        self.diagnostics.clear()
+        self.simulator.say(command)
+        try:
+            yield
+        finally:
+            self.simulator.say(f'normal {station}')
+            self.diagnostics.clear()
+            until_status(self.diagnostics, 'mappings', OK)
+            until_status(self.diagnostics, 'link', OK)
+            self.diagnostics.clear()
+
+    def write(self, tag: str, values: list[float] | str,
+              layout: MultiArrayLayout | None = None) -> DiagnosticStatus:
+        """Write once, and return the one result."""
+        kind = READS[tag][0] if tag in READS else UInt8MultiArray
+        message = kind(data=values)
+        if layout is not None:
+            message.layout = layout
+        self.results.clear()
+        publisher = self.observer.publisher(kind, f'/abdf1/write/{tag}')
+        publisher.publish(message)
+        result = self.results.first()
+        self.observer.node.destroy_publisher(publisher)
+        assert [result.name for result in self.results] == [tag]
+        return result
+
+
+@pytest.fixture(scope='module')
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
+    files = make_files(tmp_path_factory.mktemp('bridge'))
+    arguments = files.args('net.com_port:=2', 'diagnostics_period:=0.25')
+    with Observer() as observer:
+        bridge = Bridge(files.port, observer)
+        with files.start_simulator() as bridge.simulator, \
+                Process('node', *arguments) as bridge.node:
+            until_status(bridge.diagnostics, 'mappings', OK)
+            yield bridge
+            bridge.node.end(signal.SIGINT)
+            bridge.simulator.end(signal.SIGTERM)
+
+
+# Reading
+
+
+@pytest.mark.parametrize('tag', READS)
+def test_late_subscriber_gets_the_value_with_its_type_and_layout(
+        bridge: Bridge, tag: str) -> None:
+    kind, label, values = READS[tag]
+    inbox = bridge.listen(tag)
+    message = inbox.first()
+    assert values_in(message) == values
+    if kind is not String:
+        (dimension,) = message.layout.dim
+        assert message.layout.data_offset == 0
+        assert (dimension.label, dimension.size, dimension.stride) == (
+            label, len(values), len(values))
+    bridge.observer.forget(inbox)
+
+
+def test_topics_are_those_of_the_map_and_no_others(bridge: Bridge) -> None:
+    node = bridge.observer.node
+    expected = {f'/abdf1/read/{tag}' for tag in READS} | {f'/abdf1/write/{tag}' for tag in WRITES}
+    expected |= {'/abdf1/write_results', '/abdf1/active_stations'}
+    found = dict(node.get_topic_names_and_types())
+    assert {name for name in found if name.startswith('/abdf1/')} == expected
+    for tag, (kind, _, _) in READS.items():
+        assert found[f'/abdf1/read/{tag}'] == [f'std_msgs/msg/{kind.__name__}']
+    assert found['/abdf1/write/name'] == ['std_msgs/msg/String']
+    assert found['/abdf1/write_results'] == ['diagnostic_msgs/msg/DiagnosticStatus']
+    assert found['/abdf1/active_stations'] == ['std_msgs/msg/UInt16MultiArray']
+
+
+def read_qos(bridge: Bridge, tag: str) -> Any:
+    (endpoint,) = bridge.observer.node.get_publishers_info_by_topic(f'/abdf1/read/{tag}')
+    return endpoint.qos_profile
+
+
+def test_read_topic_offers_its_stale_time(bridge: Bridge) -> None:
+    qos = read_qos(bridge, 'heartbeat')
+    assert qos.reliability is ReliabilityPolicy.RELIABLE
+    assert qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    assert qos.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+    three_periods = Duration(seconds=3)
+    assert qos.lifespan == qos.deadline == qos.liveliness_lease_duration == three_periods
+
+
+def test_stale_time_is_never_less_than_what_the_line_can_do(bridge: Bridge) -> None:
+    link = find_status(bridge.diagnostics.first(), 'link')
+    scan_time = int(details(link)['expected scan time'].removesuffix(' ms'))
+    assert scan_time > 100  # the period of this mapping, which the line cannot keep
+    qos = read_qos(bridge, 'speeds')
+    assert qos.lifespan == qos.deadline == qos.liveliness_lease_duration
+    assert qos.lifespan.nanoseconds / 1e6 == pytest.approx(3 * scan_time, abs=3)
+
+
+def test_topic_published_on_change_promises_no_heartbeat(bridge: Bridge) -> None:
+    qos = read_qos(bridge, 'recipe')
+    assert qos.reliability is ReliabilityPolicy.RELIABLE
+    assert qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    assert qos.lifespan == qos.deadline == qos.liveliness_lease_duration == Infinite
+    assert qos.liveliness is LivelinessPolicy.AUTOMATIC
+
+
+@pytest.mark.parametrize('tag', sorted(WRITES))
+def test_write_topic_takes_nothing_sent_before_its_time(bridge: Bridge, tag: str) -> None:
+    (endpoint,) = bridge.observer.node.get_subscriptions_info_by_topic(f'/abdf1/write/{tag}')
+    assert endpoint.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+    assert endpoint.qos_profile.durability is DurabilityPolicy.VOLATILE
+
+
+def test_values_are_a_heartbeat_unless_published_on_change(bridge: Bridge) -> None:
+    always, change = bridge.listen('parts'), bridge.listen('recipe')
+    change.first()
+    always.first()
+    bridge.observer.until(lambda: len(always) > 5, 'six values of a topic that never changes')
+    assert all(values_in(message) == [-17] for message in always)
+    assert len(change) == 1
+    bridge.observer.forget(always)
+    bridge.observer.forget(change)
+
+
+# Stations that fail
+
+
+def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
+    stale_time = read_qos(bridge, 'parts').deadline
+    careful = bridge.listen('parts', QoSProfile(
+        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=stale_time,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=stale_time))
+    plain = bridge.listen('speeds')
+    careful.first()
+    bridge.observer.until(lambda: careful.liveliness, 'the publisher to be alive')
+    assert careful.liveliness[-1].alive_count == 1
+    assert not careful.deadlines
+    bridge.active.values([0b110] + 15 * [0])
+    with bridge.fault('silent 2'):
+        # The subscriber that asked for it is told.
+        bridge.observer.until(lambda: careful.deadlines, 'a missed deadline')
+        bridge.observer.until(lambda: not careful.liveliness[-1].alive_count, 'no liveliness')
+        assert careful.liveliness[-1].not_alive_count == 1
+        # The Active Node Table and the diagnostics tell it to all.
+        bridge.active.values([0b010] + 15 * [0])
+        status = until_status(bridge.diagnostics, 'station 2', ERROR)
+        assert re.fullmatch(
+            r'ERROR: station 2 inactive since \d+\.\d s', status.message), status.message
+        assert details(status)['active'] == 'no'
+        status = until_status(bridge.diagnostics, 'link', WARN)
+        assert status.message == 'WARN: port open, 1 of 2 stations do not answer'
+        status = until_status(bridge.diagnostics, 'mappings', ERROR,
+                              lambda status: details(status)['failed'] == '12')
+        assert re.fullmatch(
+            r'failed: C5:2\.ACC at station 2, last read \d+\.\d s ago; '
+            r'2509 ERR_INACTIVE_STATION: Slave Station \(2\) Inactive',
+            details(status)['parts']), status
+        assert 'speeds' not in details(status)
+        # A late subscriber gets no dead value, while the other station goes on.
+        late = bridge.listen('parts')
+        living = bridge.listen('speeds')
+        bridge.observer.until(lambda: len(living) > 3, 'values of the living station')
+        assert not late
+        assert plain.next()
+    # Values come back by themselves.
+    assert values_in(late.first()) == [-17]
+    bridge.active.clear()
+    assert values_in(careful.next()) == [-17]
+    bridge.observer.until(lambda: careful.liveliness[-1].alive_count == 1, 'liveliness again')
+    for inbox in (careful, plain, late, living):
+        bridge.observer.forget(inbox)
+    bridge.node.wait_for('[ERROR]', '2509 ERR_INACTIVE_STATION: Slave Station (2) Inactive')
+    bridge.node.wait_for('[INFO]', 'station 2 answers again')
+
+
+def test_active_stations_are_latched_and_published_on_change_only(bridge: Bridge) -> None:
+    late = bridge.observer.listen(UInt16MultiArray, '/abdf1/active_stations')
+    assert values_in(late.first()) == [0b110] + 15 * [0]
+    with bridge.fault('silent 1', station=1):
+        late.values([0b100] + 15 * [0])
+    late.until(lambda message: message.data[0] == 0b110, 'station 1 again')
+    heartbeat = bridge.listen('heartbeat')
+    bridge.observer.until(lambda: len(heartbeat) > 1, 'values')
+    assert [message.data[0] for message in late] == [0b110, 0b100, 0b110]
+    bridge.observer.forget(late)
+    bridge.observer.forget(heartbeat)
+
+
+def test_first_good_read_after_an_outage_is_published_even_on_change_only(
+        bridge: Bridge) -> None:
+    recipe = bridge.listen('recipe')
+    recipe.first()
+    with bridge.fault('silent 2'):
+        until_status(bridge.diagnostics, 'station 2', ERROR)
+        assert len(recipe) == 1
+    bridge.observer.until(lambda: len(recipe) == 2, 'the value after the outage')
+    bridge.observer.forget(recipe)
+
+
+def counter(bridge: Bridge, name: str) -> int:
+    bridge.diagnostics.clear()
+    return int(details(find_status(bridge.diagnostics.first(), 'counters'))[name])
+
+
+def test_slow_station_costs_polls_but_no_values(bridge: Bridge) -> None:
+    eots = counter(bridge, 'CNT_EOTS_RCVD')
+    parts = bridge.listen('parts')
+    with bridge.fault('slow 2 3'):
+        parts.clear()
+        bridge.observer.until(lambda: len(parts) > 3, 'values of a slow station')
+        assert all(values_in(message) == [-17] for message in parts)
+        assert counter(bridge, 'CNT_EOTS_RCVD') >= eots + 9
+        assert find_status(bridge.diagnostics.first(), 'station 2').level == OK
+    bridge.observer.forget(parts)
+
+
+def test_noise_damages_no_value(bridge: Bridge) -> None:
+    parts, total = bridge.listen('parts'), bridge.listen('total')
+    damaged = counter(bridge, 'CNT_CRC_ERRORS')
+    with bridge.fault('noise 2 0.02'):
+        bridge.observer.until(
+            lambda: counter(bridge, 'CNT_CRC_ERRORS') > damaged + 3, 'damaged frames')
+        assert all(values_in(message) == [-17] for message in parts)
+        assert all(values_in(message) == [-70000, 2000000000] for message in total)
+    bridge.node.wait_for('[ERROR]', '2506 ERR_BAD_CRC: Response with wrong CRC', '[station 2]')
+    bridge.observer.forget(parts)
+    bridge.observer.forget(total)
+
+
+def test_error_replies_are_shown_with_their_meaning(bridge: Bridge) -> None:
+    with bridge.fault('error 2 10'):
+        status = until_status(bridge.diagnostics, 'mappings', ERROR,
+                              lambda status: details(status)['failed'] == '12')
+        assert re.fullmatch(r'failed: L10:0 at station 2, last read \d+\.\d s ago; STS 10: .+',
+                            details(status)['total']), status
+        station = find_status(bridge.diagnostics[-1], 'station 2')
+        assert station.level == OK  # it answers
+        assert int(details(station)['error replies']) >= 8
+        assert find_status(bridge.diagnostics[-1], 'link').level == OK
+
+
+# Writing
+
+
+@pytest.mark.parametrize(('tag', 'values', 'shown', 'address', 'station'), [
+    ('levels', [-50.0, 150.0, 0.5], '[-50, 150, 0.5]', 'F8:0', '1'),
+    ('flags', [1, 0, 1], '[1, 0, 1]', 'B3:4/1', '1'),
+    ('preset', [-32768], '[-32768]', 'C5:2.PRE', '2'),
+    ('lamp', [1], '[1]', 'O:2.0/3', '2'),
+    ('total', [-2147483648, 70000], '[-2147483648, 70000]', 'L10:0', '2'),
+    ('name', 'Käfig 7', "'Käfig 7'", 'ST9:1', '2'),
+    ('digits', [9999, 0], '[9999, 0]', 'N7:30', '2'),
+    ('recipe', [0, 999, 1, 2], '[0, 999, 1, 2]', 'N7:10', '2')])
+def test_what_is_written_is_confirmed_and_comes_back(
+        bridge: Bridge, tag: str, values: list[float] | str, shown: str, address: str,
+        station: str) -> None:
+    inbox = bridge.listen(tag)
+    before = values_in(inbox.first())
+    assert before != values
+    result = bridge.write(tag, values)
+    assert (result.level, result.message) == (OK, 'written')
+    said = details(result)
+    assert 0 < float(said.pop('latency_ms')) < 5000
+    assert said == {'address': address, 'station': station, 'value': shown}
+    inbox.values(values)
+    assert bridge.write(tag, before).message == 'written'
+    inbox.values(before)
+    bridge.observer.forget(inbox)
+
+
+@pytest.mark.parametrize(('tag', 'bits', 'word_tag', 'word'), [
+    ('flags', [1, 0, 1], 'flag_word', 0xFFFB), ('lamp', [1], 'lamps', 0x00F8)])
+def test_bits_leave_the_other_bits_of_their_word_alone(
+        bridge: Bridge, tag: str, bits: list[float], word_tag: str, word: int) -> None:
+    inbox = bridge.listen(word_tag)
+    before = values_in(inbox.first())
+    assert bridge.write(tag, bits).message == 'written'
+    inbox.values([word])
+    assert bridge.write(tag, [0] * len(bits)).message == 'written'
+    inbox.clear()
+    inbox.values(list(before))
+    bridge.observer.forget(inbox)
+
+
+@pytest.mark.parametrize(('tag', 'values', 'reason'), [
+    ('recipe', [1, 2, 3], '3 values, the mapping has 4'),
+    ('recipe', [1, 2, 3, 4, 5], '5 values, the mapping has 4'),
+    ('recipe', [1, 2, 1000, 4], 'value 1000 at index 2 is outside Min 0, Max 999'),
+    ('recipe', [-1, 2, 3, 4], 'value -1 at index 0 is outside Min 0, Max 999'),
+    ('levels', [150.5, 0.0, 0.0], 'value 150.5 at index 0 is outside Min -50, Max 150'),
+    ('setpoint', [float('nan')], 'value nan at index 0 is no float32'),
+    ('setpoint', [float('inf')], 'value inf at index 0 is no float32'),
+    ('lamp', [2], 'value 2 at index 0 is no bool'),
+    ('lamp', [], '0 values, the mapping has 1'),
+    ('digits', [10000, 0], 'value 10000 at index 0 is no bcd16'),
+    ('name', 83 * 'x', '83 characters, a PLC string has 82'),
+    ('name', '5 €', "character '€' does not exist in a PLC")])
+def test_unfit_write_is_refused_with_the_reason(
+        bridge: Bridge, tag: str, values: list[float] | str, reason: str) -> None:
+    result = bridge.write(tag, values)
+    assert result.level == ERROR
+    assert result.message == f'not written: refused: {reason}'
+    inbox = bridge.listen(tag)
+    assert values_in(inbox.first()) == READS[tag][2]
+    bridge.observer.forget(inbox)
+
+
+def test_write_with_data_offset_is_refused(bridge: Bridge) -> None:
+    result = bridge.write('setpoint', [1.0], MultiArrayLayout(data_offset=1))
+    assert result.level == ERROR
+    assert result.message == 'not written: refused: layout.data_offset should be 0'
+
+
+def test_write_that_the_plc_refuses_has_failed(bridge: Bridge) -> None:
+    bridge.diagnostics.clear()
+    with bridge.fault('error 2 60'):
+        result = bridge.write('setpoint', [3.0])
+        assert result.level == ERROR
+        assert result.message.startswith('not written: the PLC refused it: STS 60: ')
+        status = until_status(bridge.diagnostics, 'writes', WARN)
+        assert re.fullmatch(
+            r'WARN: \d+ of \d+ writes confirmed; setpoint not written: the PLC refused it: '
+            r'STS 60: .+', status.message), status.message
+    with bridge.fault('error 2 F0 0B'):
+        result = bridge.write('setpoint', [3.0])
+        assert 'STS F0 EXT STS 0B: no access: privilege missing' in result.message
+    setpoint = bridge.listen('setpoint')
+    assert values_in(setpoint.first()) == [21.5]
+    bridge.observer.forget(setpoint)
+
+
+def test_write_whose_reply_does_not_come_is_unknown(bridge: Bridge) -> None:
+    with bridge.fault('slow 2 100000'):
+        result = bridge.write('setpoint', [21.5])
+        assert result.level == ERROR
+        assert result.message == 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: ' \
+                                 'Command Timed Out'
+
+
+def test_write_to_an_inactive_station_is_not_sent(bridge: Bridge) -> None:
+    with bridge.fault('silent 2'):
+        until_status(bridge.diagnostics, 'station 2', ERROR)
+        result = bridge.write('setpoint', [3.0])
+        assert result.level == ERROR
+        assert result.message == 'not written: not sent: 2509 ERR_INACTIVE_STATION: ' \
+                                 'Slave Station (2) Inactive'
+        assert bridge.write('levels', [12.5, 40.25, -3.5]).message == 'written'  # station 1
+    setpoint = bridge.listen('setpoint')
+    assert values_in(setpoint.next()) == [21.5]
+    bridge.observer.forget(setpoint)
+
+
+# Diagnostics
+
+
+def test_statuses_have_names_order_and_words(bridge: Bridge) -> None:
+    bridge.diagnostics.clear()
+    array = bridge.diagnostics.first()
+    assert [status.name for status in array.status] == [f'abdf1: {name}' for name in STATUSES]
+    assert array.header.stamp.sec == pytest.approx(time.time(), abs=10)
+    for status in array.status:
+        assert status.message.startswith(WORDS[status.level]), status.message
+        assert str(bridge.port) in status.hardware_id
+
+
+def test_every_status_comes_with_every_period(bridge: Bridge) -> None:
+    bridge.diagnostics.clear()
+    bridge.observer.until(lambda: len(bridge.diagnostics) > 6, 'seven diagnostics')
+    times = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9
+             for array in bridge.diagnostics]
+    assert (times[6] - times[0]) / 6 == pytest.approx(0.25, rel=0.5)
+    assert {len(array.status) for array in bridge.diagnostics} == {len(STATUSES)}
+
+
+def test_link_status_tells_of_port_and_load(bridge: Bridge) -> None:
+    bridge.diagnostics.clear()
+    bridge.diagnostics.first()
+    status = until_status(bridge.diagnostics, 'link', OK,
+                          lambda status: details(status)['scan time'] != 'unknown')
+    said = details(status)
+    assert status.message == 'OK: port open, 2 stations answer'
+    assert said['port'] == 'open'
+    assert said['settings'] == '115200 baud, CRC'
+    assert float(said['transactions per second']) > 1
+    assert re.fullmatch(r'[1-9]\d* %', said['line load'])
+    assert re.fullmatch(r'[1-9]\d* ms', said['scan time'])
+
+
+def test_station_status_tells_of_its_answers(bridge: Bridge) -> None:
+    bridge.diagnostics.clear()
+    status = find_status(bridge.diagnostics.first(), 'station 1')
+    said = details(status)
+    assert status.message == 'OK: station 1 active'
+    assert said['active'] == 'yes'
+    assert re.fullmatch(r'\d+\.\d s ago', said['last answer'])
+    assert re.fullmatch(r'0x[0-9A-F]{4}', said['last TNS'])
+    assert int(said['replies']) > 0
+
+
+def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Bridge) -> None:
+    bridge.diagnostics.clear()
+    before = details(find_status(bridge.diagnostics.first(), 'counters'))
+    assert list(before) == COUNTERS
+    assert len(COUNTERS) == 29
+    for name in ('CNT_MSG_PACKETS_SENT', 'CNT_CMD_MSGS_SENT', 'CNT_REPLY_MSGS_RCVD',
+                 'CNT_POLL_MSGS_SENT', 'CNT_ACKS_SENT', 'CNT_ACKS_RCVD', 'CRD_CHAR_SENT',
+                 'CRD_CHAR_RECV'):
+        assert int(before[name]) > 0, name
+    response = bridge.observer.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
+    assert response.success
+    bridge.diagnostics.clear()
+    after = details(find_status(bridge.diagnostics.first(), 'counters'))
+    assert list(after) == COUNTERS
+    assert 0 <= int(after['CNT_CMD_MSGS_SENT']) < int(before['CNT_CMD_MSGS_SENT'])
+    assert int(after['CRD_CHAR_SENT']) < int(before['CRD_CHAR_SENT'])
+
+
+# Parameters
+
+
+def test_net_file_is_seen_as_parameters(bridge: Bridge) -> None:
+    assert get_parameters(
+        bridge.observer, 'net.baud', 'net.timeout', 'net.nak_retries', 'net.station', 'net.mode',
+        'net.parity', 'net.error_code') == [115200, 200, 2, 5, 'Master', 'None', 'CRC']
+
+
+def test_port_is_used_instead_of_com_port(bridge: Bridge) -> None:
+    assert get_parameters(bridge.observer, 'port') == [str(bridge.port)]
+    bridge.diagnostics.clear()
+    statuses = bridge.diagnostics.first().status
+    assert [status.hardware_id for status in statuses] == [
+        str(bridge.port), str(bridge.port), f'{bridge.port} station 1',
+        f'{bridge.port} station 2', str(bridge.port), str(bridge.port)]
+
+
+def test_map_file_is_seen_as_parameters(bridge: Bridge) -> None:
+    columns = ('tag', 'command', 'address', 'station', 'plc_type', 'length', 'type', 'topic',
+               'period', 'publish', 'min', 'max')
+    names = [f'map.recipe.{column}' for column in columns]
+    assert get_parameters(bridge.observer, *names) == [
+        'recipe', 'ReadWrite', 'N7:10', '2', 'SLC', '4', 'int16', 'recipe', '', 'Change', '0',
+        '999']
+    assert get_parameters(bridge.observer, 'map.timer.done.address') == ['T4:1/DN']
+
+
+def test_no_parameter_can_be_set(bridge: Bridge) -> None:
+    listed = bridge.observer.call(
+        ListParameters, '/abdf1/list_parameters', ListParameters.Request())
+    names = [name for name in listed.result.names
+             if name != 'use_sim_time' and not name.startswith('qos_overrides')]
+    assert {'net_file', 'map_file', 'port', 'strict_map', 'read_only', 'default_period',
+            'diagnostics_period', 'stale_after', 'write_timeout', 'nak_on_command_timeout',
+            'expose_map_parameters', 'net.baud', 'map.recipe.max'} <= set(names)
+    response = bridge.observer.call(
+        GetParameters, '/abdf1/get_parameters', GetParameters.Request(names=names))
+    request = SetParameters.Request(parameters=[
+        Parameter(name=name, value=value)
+        for name, value in zip(names, response.values, strict=True)])
+    response = bridge.observer.call(SetParameters, '/abdf1/set_parameters', request)
+    assert len(response.results) == len(names)
+    for name, result in zip(names, response.results, strict=True):
+        assert not result.successful, name
+        assert 'read-only' in result.reason, name
+
+
+def test_parameters_are_described_with_their_ranges(bridge: Bridge) -> None:
+    names = ['default_period', 'diagnostics_period', 'net.station', 'net.baud', 'strict_map']
+    response = bridge.observer.call(DescribeParameters, '/abdf1/describe_parameters',
+                                    DescribeParameters.Request(names=names))
+    period, diagnostics, station, baud, strict = response.descriptors
+    assert all(descriptor.read_only and descriptor.description
+               for descriptor in response.descriptors)
+    assert (period.integer_range[0].from_value, period.integer_range[0].to_value) == (
+        0, 86_400_000)
+    assert diagnostics.floating_point_range[0].from_value == pytest.approx(0.1)
+    assert (station.integer_range[0].from_value, station.integer_range[0].to_value) == (0, 254)
+    assert '1200, 2400, 4800, 9600, 19200' in baud.description
+    assert not strict.integer_range

@@ -1,0 +1,328 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the diagnostics say, status by status, from the state of a real driver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import time
+from typing import Any
+
+from abdf1_ros.df1.stations import Station
+from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.mapping import load_mappings, Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
+from abdf1_ros.driver.values import Values
+from abdf1_ros.messages import Event, Message
+from abdf1_ros.node_diagnostics import Diagnostics, WriteLog
+from abdf1_ros.port import LinkThread, PortState
+from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
+from support.ros import details, ERROR, OK, WARN, write_csv
+
+PORT = '/dev/ttyUSB0'
+HEADER = 'Tag,Command,Address,Station,PLC_Type,Period'
+ROWS = ('speed,Read,N7:0,1,PLC5,1000', 'level,ReadWrite,F8:4,2,SLC,1000',
+        'lamp,Write,B3:0/1,2,SLC,')
+
+# A moment after the start, when the rates begin to be counted.
+NOW = float(int(time.monotonic()) + 1000)
+
+
+class Listener:
+    """Takes what a driver tells, and does nothing with it."""
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take values."""
+
+    def written(self, result: WriteResult) -> None:
+        """Take a result."""
+
+    def happened(self, event: Event) -> None:
+        """Take an event."""
+
+    def station_changed(self, station: Station) -> None:
+        """Take a change."""
+
+
+class Bench:
+    """Diagnostics of a driver that no port moves; tests set its state."""
+
+    def __init__(self, folder: Path, rows: tuple[str, ...] = ROWS) -> None:
+        mappings, problems = load_mappings(str(write_csv(folder / 'map.csv', HEADER, rows)))
+        assert not problems
+        self.driver = Driver(Network(), mappings, DriverSettings(), Listener())
+        self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
+        self.diagnostics = Diagnostics('line_a', self.driver, PORT)
+        self.diagnostics.attach(self.link)
+        self.set_port(True, 'open')
+
+    def set_port(self, is_open: bool, text: str) -> None:
+        self.link.state = PortState(is_open, text)
+
+    def point(self, tag: str) -> ReadPoint:
+        return next(point for mapping, point in self.driver.points.items() if mapping.tag == tag)
+
+    def mapping(self, tag: str) -> Mapping:
+        return next(mapping for mapping in self.driver.mappings if mapping.tag == tag)
+
+    def status(self, name: str, now: float = NOW) -> DiagnosticStatus:
+        statuses = self.diagnostics.statuses(now)
+        assert [status.level for status in statuses] == self.diagnostics.levels(now)
+        return next(status for status in statuses if status.name == f'line_a: {name}')
+
+    def says(self, name: str, now: float = NOW) -> tuple[bytes, str]:
+        status = self.status(name, now)
+        return status.level, status.message
+
+    def close(self) -> None:
+        self.link.stop()
+
+
+@pytest.fixture
+def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., Bench]:
+    def make(*rows: str) -> Bench:
+        bench = Bench(tmp_path, rows or ROWS)
+        request.addfinalizer(bench.close)
+        return bench
+    return make
+
+
+@pytest.fixture
+def bench(make_bench: Callable[..., Bench]) -> Bench:
+    return make_bench()
+
+
+def test_names_and_hardware_ids(bench: Bench) -> None:
+    assert [(status.name, status.hardware_id)
+            for status in bench.diagnostics.statuses(NOW)] == [
+        ('line_a: link', PORT), ('line_a: counters', PORT),
+        ('line_a: station 1', f'{PORT} station 1'), ('line_a: station 2', f'{PORT} station 2'),
+        ('line_a: mappings', PORT), ('line_a: writes', PORT)]
+
+
+# link
+
+
+def test_link_before_there_is_one(bench: Bench) -> None:
+    unattached = Diagnostics('line_a', bench.driver, PORT)
+    link = unattached.statuses(NOW)[0]
+    assert (link.level, link.message) == (ERROR, 'ERROR: not started yet')
+    assert details(link)['port'] == 'closed'
+
+
+def test_link_without_a_port(bench: Bench) -> None:
+    bench.set_port(False, 'cannot open the port: No such file or directory')
+    assert bench.says('link') == (
+        ERROR, 'ERROR: cannot open the port: No such file or directory')
+    assert details(bench.status('link'))['port'] == 'closed'
+
+
+def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
+    assert bench.says('link') == (OK, 'OK: port open, 2 stations answer')
+    bench.driver.stations.lost(2, NOW)
+    assert bench.says('link') == (WARN, 'WARN: port open, 1 of 2 stations do not answer')
+    bench.driver.stations.lost(1, NOW)
+    assert bench.says('link') == (ERROR, 'ERROR: port open, but none of 2 stations answers')
+    bench.driver.stations.heard(1, NOW)
+    bench.driver.stations.heard(2, NOW)
+    assert bench.says('link')[0] == OK
+
+
+def test_last_numbered_error_has_its_age(bench: Bench) -> None:
+    def last_error(now: float) -> str:
+        return details(bench.status('link', now))['last error']
+
+    assert last_error(NOW) == 'none'
+    bench.diagnostics.happened(Event(Message.ERR_COMMAND_TIMEOUT, (), 2), NOW)
+    expected = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'
+    assert last_error(NOW + 2.5) == f'{expected} (2.5 s ago)'
+    bench.diagnostics.happened(Event(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2), NOW + 3)
+    assert last_error(NOW + 100) == f'{expected} (100.0 s ago)'  # a notice is no error
+
+
+def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
+    bench.status('link', NOW)
+    bench.driver.transactions += 30
+    bench.driver.counters.chars_sent += 480
+    bench.driver.counters.chars_received += 480
+    values = details(bench.status('link', NOW + 2))
+    assert values['transactions per second'] == '15.0'
+    assert values['line load'] == '50 %'  # 960 characters of 10 bits at 9600 baud, in 2 s
+    assert values['settings'] == '9600 baud, CRC'
+    values = details(bench.status('link', NOW + 3))
+    assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
+
+
+def test_scan_time_is_unknown_before_the_second_read(bench: Bench) -> None:
+    values = details(bench.status('link'))
+    assert values['scan time'] == 'unknown'
+    expected = round(bench.driver.expected_scan_time * 1000)
+    assert values['expected scan time'] == f'{expected} ms'
+
+
+# counters
+
+
+def test_counters_begin_again_after_a_reset(bench: Bench) -> None:
+    counters = bench.driver.counters
+    counters.commands_sent, counters.replies_received, counters.crc_errors = 7, 6, 2
+    assert bench.says('counters') == (OK, 'OK: 7 commands sent, 6 replies received')
+    bench.diagnostics.reset_counters()
+    assert set(details(bench.status('counters')).values()) == {'0'}
+    counters.commands_sent += 1
+    assert bench.says('counters') == (OK, 'OK: 1 commands sent, 0 replies received')
+    values = details(bench.status('counters'))
+    assert (values['CNT_CMD_MSGS_SENT'], values['CNT_CRC_ERRORS']) == ('1', '0')
+
+
+# stations
+
+
+def test_station_before_its_first_answer(bench: Bench) -> None:
+    assert bench.says('station 1') == (OK, 'OK: station 1 not heard yet')
+    assert details(bench.status('station 1')) == {
+        'active': 'yes', 'last answer': 'none yet', 'last TNS': 'none yet', 'replies': '0',
+        'transactions without reply': '0', 'error replies': '0', 'last event': 'none'}
+
+
+def test_station_that_answers(bench: Bench) -> None:
+    bench.driver.stations.heard(1, NOW - 0.3)
+    station = bench.driver.stations[1]
+    station.last_tns, station.replies, station.remote_errors = 0xAB, 4, 1
+    assert bench.says('station 1') == (OK, 'OK: station 1 active')
+    values = details(bench.status('station 1'))
+    assert values['last answer'] == '0.3 s ago'
+    assert (values['last TNS'], values['replies'], values['error replies']) == (
+        '0x00AB', '4', '1')
+
+
+def test_station_that_is_silent(bench: Bench) -> None:
+    bench.driver.stations.heard(2, NOW - 20)
+    bench.driver.stations.lost(2, NOW - 12.3)
+    bench.diagnostics.happened(Event(Message.ERR_INACTIVE_STATION, (2,), 2), NOW - 12.3)
+    assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive since 12.3 s')
+    values = details(bench.status('station 2'))
+    assert (values['active'], values['last answer']) == ('no', '20.0 s ago')
+    assert values['last event'].startswith('2509 ERR_INACTIVE_STATION: Slave Station (2)')
+    assert bench.says('station 1')[0] == OK
+
+
+def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
+    bench.diagnostics.happened(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1), NOW)
+    bench.diagnostics.happened(Event(Message.NTC_REPLY_MSG_RCVD, (1,), 1), NOW)
+    assert details(bench.status('station 1'))['last event'].startswith(
+        '2519 NTC_NAK_LIMIT_EXCEEDED: ')
+
+
+# mappings
+
+
+def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
+    assert bench.says('mappings') == (
+        WARN, 'WARN: of 2 mappings 2 waiting for the first read')
+    assert details(bench.status('mappings'))['speed'] == \
+        'waiting for the first read: N7:0 at station 1, never read'
+    bench.point('speed').update(b'\x01\x00', NOW)
+    bench.point('level').update(bytes(4), NOW)
+    assert bench.says('mappings', NOW + 1.0) == (OK, 'OK: of 2 mappings 2 fresh')
+    assert details(bench.status('mappings', NOW + 1.0)) == {
+        'total': '2', 'fresh': '2', 'late': '0', 'stale': '0', 'failed': '0', 'waiting': '0'}
+    bench.point('level').update(bytes(4), NOW + 1.0)
+    assert bench.says('mappings', NOW + 2.0) == (WARN, 'WARN: of 2 mappings 1 fresh, 1 late')
+    assert details(bench.status('mappings', NOW + 2.0))['speed'] == \
+        'late: N7:0 at station 1, last read 2.0 s ago'
+    assert bench.says('mappings', NOW + 3.1) == (ERROR, 'ERROR: of 2 mappings 1 late, 1 stale')
+
+
+def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
+    bench.point('speed').update(b'\x01\x00', NOW)
+    bench.point('level').update(bytes(4), NOW)
+    bench.point('level').fail('STS 10: illegal command or format')
+    assert bench.says('mappings', NOW + 0.5) == (
+        ERROR, 'ERROR: of 2 mappings 1 failed, 1 fresh')
+    values = details(bench.status('mappings', NOW + 0.5))
+    assert values['level'] == \
+        'failed: F8:4 at station 2, last read 0.5 s ago; STS 10: illegal command or format'
+    assert 'speed' not in values
+
+
+def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
+    assert make_bench(ROWS[2]).says('mappings') == (OK, 'OK: no mapping reads')
+
+
+def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) -> None:
+    # That is what the link thread does when a PLC refuses an address.
+    scheduler = bench.driver._scheduler
+
+    class Divided:
+        """A job that gives way to two others while it is looked at."""
+
+        @property
+        def interval(self) -> float:
+            scheduler._jobs.add(object())
+            return 0.25
+
+    scheduler._jobs.clear()
+    scheduler._jobs.add(Divided())
+    assert details(bench.status('link'))['scan time'] == '250 ms'
+
+
+# writes
+
+
+def result(bench: Bench, outcome: Outcome, detail: str = '') -> WriteResult:
+    return WriteResult(bench.mapping('level'), outcome, detail, '[1]', 0.01)
+
+
+OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
+    (Outcome.WRITTEN, {'accepted': '1', 'confirmed': '1'}),
+    (Outcome.SUPERSEDED, {'accepted': '1', 'superseded': '1'}),
+    (Outcome.REFUSED, {'refused': '1'}),
+    (Outcome.NOT_SENT, {'accepted': '1', 'failed': '1'}),
+    (Outcome.FAILED, {'accepted': '1', 'failed': '1'}),
+    (Outcome.UNKNOWN, {'accepted': '1', 'unknown': '1'})]
+
+
+@pytest.mark.parametrize(('outcome', 'expected'), OUTCOMES,
+                         ids=[outcome.name for outcome, _ in OUTCOMES])
+def test_every_outcome_is_counted_in_its_place(
+        bench: Bench, outcome: Outcome, expected: dict[str, Any]) -> None:
+    log = WriteLog()
+    log.add(result(bench, outcome, 'why'), NOW)
+    values = log.values()
+    last = values.pop('last failure')
+    assert {key: value for key, value in values.items() if value != '0'} == expected
+    is_failure = outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED)
+    assert last == (f'level {outcome.value}: why' if is_failure else 'none')
+    assert log.judge(NOW)[0] == (WARN if is_failure else OK)
+
+
+def test_writes_before_the_first(bench: Bench) -> None:
+    assert bench.says('writes') == (OK, 'OK: 0 of 0 writes confirmed')
+
+
+def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
+    bench.diagnostics.written(result(bench, Outcome.WRITTEN), NOW)
+    bench.diagnostics.written(result(bench, Outcome.UNKNOWN, 'no reply'), NOW)
+    bench.diagnostics.written(result(bench, Outcome.WRITTEN), NOW + 1)
+    warning = 'WARN: 2 of 3 writes confirmed; level unknown whether written: no reply'
+    assert bench.says('writes', NOW + 1) == (WARN, warning)
+    assert bench.says('writes', NOW + 9.9) == (WARN, warning)
+    assert bench.says('writes', NOW + 10) == (OK, 'OK: 2 of 3 writes confirmed')
+    assert details(bench.status('writes', NOW + 10))['last failure'] == \
+        'level unknown whether written: no reply'

@@ -1,0 +1,164 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Numbered events in the log: real rclpy loggers, read where they write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import re
+
+from abdf1_ros.messages import Event, Message, Severity
+from abdf1_ros.node_log import EventLog
+import pytest
+from rclpy.logging import get_logger, LoggingSeverity
+
+LINE = re.compile(r'\[(\w+)\] \[[0-9.]+\] \[log_test\]: (.*)')
+
+ROUTINE = (Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
+           Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
+LEVELS = {Severity.CRITICAL: 'FATAL', Severity.ERROR: 'ERROR', Severity.NOTICE: 'INFO'}
+
+Lines = list[tuple[str, str]]
+
+
+class Clock:
+    """A clock that stands still until it is set."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def log(clock: Clock) -> EventLog:
+    return EventLog(get_logger('log_test'), clock)
+
+
+@pytest.fixture
+def logged(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[[], Lines]]:
+    """Return level and text of all that has been logged since the last call."""
+    def read() -> Lines:
+        output = ''.join(capfd.readouterr())
+        return [match.groups() for match in map(LINE.fullmatch, output.splitlines()) if match]
+    yield read
+    assert not read(), 'more was logged than looked at'
+
+
+def event(message: Message, station: int | None = 2) -> Event:
+    arguments = (1,) * len(re.findall('%', message.template))
+    return Event(message, arguments, station)
+
+
+@pytest.mark.parametrize('message', [entry for entry in Message if entry not in ROUTINE])
+def test_every_message_has_the_level_of_its_table(
+        log: EventLog, logged: Callable[[], Lines], message: Message) -> None:
+    log.add(event(message))
+    ((level, text),) = logged()
+    assert level == LEVELS[message.severity]
+    assert text.startswith(f'{message.number} {message.name}: ')
+    assert text.endswith(' [station 2]')
+
+
+def test_one_logger_takes_events_of_all_levels(
+        log: EventLog, logged: Callable[[], Lines]) -> None:
+    for message in Message:
+        log.add(event(message))
+    assert {level for level, _ in logged()} == {'FATAL', 'ERROR', 'INFO'}
+
+
+def test_cause_is_logged_once(log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+    for _ in range(100):
+        log.add(event(Message.ERR_BAD_CRC))
+        clock.now += 1.0
+    assert [text.split(':')[0] for _, text in logged()] == ['2506 ERR_BAD_CRC']
+
+
+def test_details_do_not_make_another_cause(log: EventLog, logged: Callable[[], Lines]) -> None:
+    log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 10), 1))
+    log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 11), 1))
+    assert logged() == [
+        ('ERROR', '2510 ERR_WRONG_MESSAGE: Wrong Message Received Src:0x01, Dst:0x05, '
+                  'Tns:0x000a [station 1]')]
+
+
+def test_another_station_or_message_is_another_cause(
+        log: EventLog, logged: Callable[[], Lines]) -> None:
+    for _ in range(2):
+        log.add(event(Message.ERR_COMMAND_TIMEOUT, 1))
+        log.add(event(Message.ERR_COMMAND_TIMEOUT, 2))
+        log.add(event(Message.ERR_COMMAND_TIMEOUT, None))
+        log.add(event(Message.ERR_RCVD_NAK_SYMBOL, 1))
+    assert logged() == [
+        ('ERROR', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 1]'),
+        ('ERROR', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'),
+        ('ERROR', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
+        ('ERROR', '2511 ERR_RCVD_NAK_SYMBOL: Received NAK Symbol [station 1]')]
+
+
+def test_cause_is_news_after_a_quiet_minute_and_its_repetitions_are_counted(
+        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+    text = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'
+    log.add(event(Message.ERR_COMMAND_TIMEOUT))
+    for _ in range(3):
+        clock.now += 59.9
+        log.add(event(Message.ERR_COMMAND_TIMEOUT))
+    assert logged() == [('ERROR', text)]
+    clock.now += 60.0
+    log.add(event(Message.ERR_COMMAND_TIMEOUT))
+    assert logged() == [('ERROR', f'{text} (3 more like it were not logged)')]
+    clock.now += 1.0
+    log.add(event(Message.ERR_COMMAND_TIMEOUT))
+    assert logged() == []
+
+
+def test_forgetting_a_station_makes_its_causes_news(
+        log: EventLog, logged: Callable[[], Lines]) -> None:
+    def happen() -> list[tuple[str, str]]:
+        log.add(event(Message.ERR_BAD_CRC, 1))
+        log.add(event(Message.ERR_COMMAND_TIMEOUT, 1))
+        log.add(event(Message.ERR_BAD_CRC, 2))
+        log.add(event(Message.ERR_BAD_CRC, None))
+        return [(text[:4], text[-3:]) for _, text in logged()]
+
+    assert len(happen()) == 4
+    assert happen() == []
+    log.forget(1)
+    assert happen() == [('2506', ' 1]'), ('2508', ' 1]')]
+    log.forget(77)
+    assert happen() == []
+
+
+def test_routine_is_for_debugging_only(
+        clock: Clock, logged: Callable[[], Lines], request: pytest.FixtureRequest) -> None:
+    logger = get_logger('log_test')
+    quiet = EventLog(logger, clock)
+    for message in ROUTINE:
+        quiet.add(event(message))
+    assert logged() == []
+    request.addfinalizer(lambda: logger.set_level(LoggingSeverity.INFO))
+    logger.set_level(LoggingSeverity.DEBUG)
+    talkative = EventLog(logger, clock)
+    for message in ROUTINE:
+        talkative.add(event(message))
+        talkative.add(event(message))
+    assert [(level, text[:4]) for level, text in logged()] == [
+        ('DEBUG', str(message.number)) for message in ROUTINE for _ in range(2)]

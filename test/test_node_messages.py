@@ -1,0 +1,140 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages, QoS and values of mappings, with the real std_msgs."""
+
+from __future__ import annotations
+
+from array import array
+import math
+from pathlib import Path
+from typing import Any
+
+from abdf1_ros.driver.mapping import load_mappings, Mapping
+from abdf1_ros.driver.values import ValueType
+from abdf1_ros.errors import FormatError
+from abdf1_ros.node_messages import (
+    latched_qos,
+    MESSAGES,
+    new_message,
+    read_qos,
+    values_of,
+    write_qos,
+)
+import pytest
+from rclpy.duration import Duration
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from std_msgs.msg import (
+    Float32MultiArray,
+    Int16MultiArray,
+    Int32MultiArray,
+    MultiArrayLayout,
+    String,
+    UInt8MultiArray,
+    UInt16MultiArray,
+    UInt32MultiArray,
+)
+from support.ros import write_csv
+
+TYPES = {
+    'bool': UInt8MultiArray, 'int16': Int16MultiArray, 'uint16': UInt16MultiArray,
+    'bcd16': UInt16MultiArray, 'int32': Int32MultiArray, 'uint32': UInt32MultiArray,
+    'float32': Float32MultiArray, 'string': String}
+
+
+def make_mapping(folder: Path, address: str, **cells: object) -> Mapping:
+    header = ','.join(['Tag,Command,Address,Station,PLC_Type', *cells])
+    row = ','.join(map(str, ['tag', 'Read', address, 2, 'SLC', *cells.values()]))
+    (mapping,), problems = load_mappings(str(write_csv(folder / 'map.csv', header, [row])))
+    assert not problems
+    return mapping
+
+
+def test_every_value_type_has_its_message() -> None:
+    assert MESSAGES == {ValueType(name): message for name, message in TYPES.items()}
+
+
+@pytest.mark.parametrize(('address', 'cells', 'kind'), [
+    ('B3:1/14', {'Length': 5}, UInt8MultiArray), ('N7:3', {'Length': 5}, Int16MultiArray),
+    ('B3:3', {'Length': 5}, UInt16MultiArray), ('F8:3', {'Length': 5}, Float32MultiArray),
+    ('L10:3', {'Length': 5}, Int32MultiArray),
+    ('N7:3', {'Length': 5, 'Type': 'uint32'}, UInt32MultiArray),
+    ('N7:3', {'Length': 5, 'Type': 'bcd16'}, UInt16MultiArray)])
+def test_layout_says_what_the_values_are(
+        tmp_path: Path, address: str, cells: dict[str, object], kind: Any) -> None:
+    message = new_message(make_mapping(tmp_path, address, **cells))
+    assert type(message) is kind
+    (dimension,) = message.layout.dim
+    assert (dimension.label, dimension.size, dimension.stride) == (address, 5, 5)
+    assert message.layout.data_offset == 0
+
+
+def test_string_has_no_layout(tmp_path: Path) -> None:
+    assert new_message(make_mapping(tmp_path, 'ST9:0')) == String()
+
+
+def test_values_of_arrays_and_strings() -> None:
+    assert values_of(Int16MultiArray(data=[-1, 2])) == array('h', [-1, 2])
+    assert values_of(String(data='text')) == 'text'
+    assert values_of(UInt8MultiArray()) == array('B')
+
+
+def test_values_that_do_not_start_at_the_beginning_are_refused() -> None:
+    message = Int16MultiArray(data=[1, 2], layout=MultiArrayLayout(data_offset=1))
+    with pytest.raises(FormatError, match=r'^layout\.data_offset should be 0$'):
+        values_of(message)
+
+
+def test_read_topic_offers_its_stale_time(tmp_path: Path) -> None:
+    profile = read_qos(make_mapping(tmp_path, 'N7:0'), 0.75)
+    assert profile.reliability is ReliabilityPolicy.RELIABLE
+    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 1)
+    assert profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+    stale_time = Duration(nanoseconds=750_000_000)
+    assert profile.lifespan == profile.deadline == stale_time
+    assert profile.liveliness_lease_duration == stale_time
+
+
+@pytest.mark.parametrize(('cells', 'stale_time'), [
+    ({'Publish': 'Change'}, 0.75), ({'Publish': 'Always'}, math.inf)])
+def test_topic_without_a_rhythm_promises_none(
+        tmp_path: Path, cells: dict[str, object], stale_time: float) -> None:
+    profile = read_qos(make_mapping(tmp_path, 'N7:0', **cells), stale_time)
+    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    default = QoSProfile(depth=1)
+    assert profile.lifespan == default.lifespan
+    assert profile.deadline == default.deadline
+    assert profile.liveliness_lease_duration == default.liveliness_lease_duration
+    assert profile.liveliness is not LivelinessPolicy.MANUAL_BY_TOPIC
+
+
+def test_write_topic_keeps_a_burst_but_nothing_from_before() -> None:
+    profile = write_qos()
+    assert profile.reliability is ReliabilityPolicy.RELIABLE
+    assert profile.durability is DurabilityPolicy.VOLATILE
+    assert profile.depth >= 1000  # as many as may wait for the line
+
+
+def test_latched_topic_keeps_one() -> None:
+    profile = latched_qos()
+    assert profile.reliability is ReliabilityPolicy.RELIABLE
+    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    assert profile.depth == 1

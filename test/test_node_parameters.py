@@ -1,0 +1,255 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters on a real node: what is declared, and what they come to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import math
+from pathlib import Path
+from typing import Any
+
+from abdf1_ros.driver.network import Network
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.node_parameters import Configuration, configure, Parameters
+from abdf1_ros.paths import config_file
+import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from support.ros import ros_args, write_csv
+
+MAP = ['recipe,ReadWrite,N7:10,2,SLC,4,0,999', 'line/door,Read,I:017/12,1,PLC5,,,']
+MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Min,Max'
+
+
+@pytest.fixture(scope='module')
+def context() -> Iterator[Context]:
+    context = Context()
+    context.init(args=[])
+    yield context
+    context.try_shutdown()
+
+
+Nodes = Callable[..., Node]
+
+
+@pytest.fixture
+def make_node(context: Context) -> Iterator[Nodes]:
+    """Return a node whose parameters are overridden."""
+    nodes = []
+
+    def make(values: dict[str, Any] | None = None, cli_args: list[str] | None = None) -> Node:
+        overrides = [Parameter(name, value=value) for name, value in (values or {}).items()]
+        nodes.append(Node('parameters', context=context, parameter_overrides=overrides,
+                          cli_args=cli_args, use_global_arguments=False))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, str]:
+    return {'net_file': str(write_csv(tmp_path / 'net.csv', 'Baud,Com_Port', ['9600,3'])),
+            'map_file': str(write_csv(tmp_path / 'map.csv', MAP_HEADER, MAP))}
+
+
+@pytest.fixture
+def configured(make_node: Nodes, files: dict[str, str]) -> Callable[..., Configuration]:
+    return lambda **values: configure(make_node(files | values))
+
+
+def problems_of(node: Node) -> list[str]:
+    with pytest.raises(ConfigurationError) as caught:
+        configure(node)
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_without_any_parameter_the_files_of_the_package_are_used(make_node: Nodes) -> None:
+    node = make_node()
+    configuration = configure(node)
+    assert configuration.parameters == Parameters()
+    assert not configuration.map_problems
+    assert configuration.mappings
+    assert node.get_parameter('net.timeout').value == configuration.network.timeout
+    assert config_file('net.csv').is_file()
+
+
+def test_defaults_are_those_of_the_contract() -> None:
+    parameters = Parameters()
+    assert (parameters.strict_map, parameters.read_only) == (False, False)
+    assert (parameters.default_period, parameters.diagnostics_period) == (100, 1.0)
+    assert (parameters.stale_after, parameters.write_timeout) == (3.0, 2.0)
+    assert (parameters.nak_on_command_timeout, parameters.expose_map_parameters) == (True, True)
+
+
+def test_every_parameter_is_declared_read_only_with_a_description(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    node = make_node(files)
+    before = set(node.get_parameters_by_prefix(''))
+    configure(node)
+    names = set(node.get_parameters_by_prefix('')) - before
+    assert names >= {f'net.{field}' for field in (
+        'station', 'mode', 'plc_type', 'error_code', 'nak_retries', 'enq_retries', 'cmd_timeout',
+        'com_port', 'baud', 'data_bits', 'stop_bits', 'parity', 'timeout', 'tx_delay',
+        'handshake')}
+    assert len([name for name in names if name.startswith('map.')]) == 2 * 12
+    for name in names:
+        descriptor = node.describe_parameter(name)
+        assert descriptor.read_only, name
+        assert descriptor.description or name.startswith('map.'), name
+
+
+def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) -> None:
+    network = configured().network
+    assert network == Network(baud=9600, com_port='3')
+    network = configured(**{'net.baud': 19200, 'net.timeout': 0}).network
+    assert network == Network(baud=19200, com_port='3', timeout=0)
+
+
+@pytest.mark.parametrize(('name', 'value', 'field', 'expected'), [
+    ('net.handshake', True, 'handshake', 'Yes'),  # YAML makes that of Yes
+    ('net.handshake', False, 'handshake', 'No'),
+    ('net.handshake', 'yes', 'handshake', 'Yes'),
+    ('net.parity', 'eVEN', 'parity', 'Even'),
+    ('net.com_port', 2, 'com_port', '2'),
+    ('net.com_port', '/dev/ttyUSB0', 'com_port', '/dev/ttyUSB0'),
+    ('net.station', '7', 'station', 7),
+    ('net.error_code', 'bcc', 'error_code', 'BCC')])
+def test_link_parameters_are_read_as_the_file_is(
+        configured: Callable[..., Configuration], name: str, value: Any, field: str,
+        expected: Any) -> None:
+    assert getattr(configured(**{name: value}).network, field) == expected
+
+
+@pytest.mark.parametrize(('values', 'port'), [
+    ({}, '/dev/ttyS2'), ({'net.com_port': 1}, '/dev/ttyS0'),
+    ({'net.com_port': 'socket://plc:4001'}, 'socket://plc:4001'),
+    ({'port': '/dev/ttyUSB7', 'net.com_port': 1}, '/dev/ttyUSB7'),
+    ({'port': 7}, '7')])
+def test_port(configured: Callable[..., Configuration], values: dict[str, Any],
+              port: str) -> None:
+    assert configured(**values).port == port
+
+
+@pytest.mark.parametrize(('name', 'value', 'expected'), [
+    ('stale_after', 5, 5.0), ('diagnostics_period', 60, 60.0), ('diagnostics_period', 0.1, 0.1),
+    ('default_period', 0, 0), ('default_period', 86_400_000, 86_400_000),
+    ('read_only', True, True), ('write_timeout', 0.05, 0.05)])
+def test_own_parameters(configured: Callable[..., Configuration], name: str, value: Any,
+                        expected: Any) -> None:
+    found = getattr(configured(**{name: value}).parameters, name)
+    assert found == expected
+    assert type(found) is type(expected)
+
+
+@pytest.mark.parametrize(('name', 'value', 'expected'), [
+    ('default_period', -1, 'default_period = -1 should be a whole number from 0 to 86400000'),
+    ('default_period', 1.5, 'default_period = 1.5 should be a whole number from 0 to 86400000'),
+    ('default_period', True, 'default_period = True should be a whole number from 0 to 86400000'),
+    ('diagnostics_period', 0.0, 'diagnostics_period = 0.0 should be a number from 0.1 to 60'),
+    ('diagnostics_period', 61, 'diagnostics_period = 61.0 should be a number from 0.1 to 60'),
+    ('stale_after', math.nan, 'stale_after = nan should be a number from 1 to 1000'),
+    ('stale_after', 'long', "stale_after = 'long' should be a number from 1 to 1000"),
+    ('read_only', 1, 'read_only = 1 should be true or false'),
+    ('strict_map', 'on', "strict_map = 'on' should be true or false"),
+    ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
+    ('net.station', 255,
+     '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
+     'Station = "255" should be a whole number from 0 to 254'),
+    ('net.station', 5.0,
+     '2552 CRT_BAD_STATION_ID: Invalid station number (5.0) must be less than 255; '
+     'Station = "5.0" should be a whole number from 0 to 254'),
+    ('net.mode', 'Client',
+     '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Client), should be one of Master, Slave, or '
+     'Peer; Mode = "Client" should be one of Master, Slave, Peer'),
+    ('net.cmd_timeout', 5001,
+     '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (5001) should be in range [500, 5000]; '
+     'Cmd_Timeout = "5001" should be a whole number from 500 to 5000'),
+    ('net.baud', 9601, 'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, '
+                       '57600, 115200'),
+    ('net.com_port', 0, 'Com_Port = "0" should be a number from 1, a device path such as '
+                        '/dev/ttyUSB0, or a URL such as socket://host:port'),
+    ('net.handshake', 1, 'Handshake = "1" should be one of Yes, No')])
+def test_faulty_value_is_a_problem_that_says_what_would_be_right(
+        make_node: Nodes, files: dict[str, str], name: str, value: Any, expected: str) -> None:
+    assert problems_of(make_node(files | {name: value})) == [f'parameter {name}: {expected}']
+
+
+def test_all_problems_are_told_together(make_node: Nodes, files: dict[str, str]) -> None:
+    write_csv(Path(files['map_file']), MAP_HEADER, ['recipe,Rad,N7:10,2,SLC,4,0,999'])
+    found = problems_of(make_node(files | {
+        'default_period': -1, 'strict_map': True, 'net.station': 255, 'net.baud': 0}))
+    assert [problem.split(': ')[0] for problem in found] == [
+        'parameter default_period', 'parameter net.station', 'parameter net.baud',
+        f'{files["map_file"]}:2:2 (Command)']
+
+
+def test_missing_files_are_problems(make_node: Nodes) -> None:
+    missing = {'net_file': '/nowhere/net.csv', 'map_file': '/nowhere/map.csv'}
+    assert problems_of(make_node(missing)) == [
+        f'{path}: cannot be read: No such file or directory' for path in missing.values()]
+
+
+def test_bad_row_is_left_out_unless_the_map_is_strict(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    write_csv(Path(files['map_file']), MAP_HEADER, ['bad,Read,N7:0,300,SLC,,,', *MAP])
+    configuration = configure(make_node(files))
+    assert [mapping.tag for mapping in configuration.mappings] == ['recipe', 'line/door']
+    (problem,) = configuration.map_problems
+    assert '2501 ERR_BAD_STATION: Item: 1, ' in str(problem)
+    assert problems_of(make_node(files | {'strict_map': True})) == [str(problem)]
+
+
+def test_mappings_are_shown_with_their_defaults(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    node = make_node(files)
+    configure(node)
+    shown = {name: parameter.value
+             for name, parameter in node.get_parameters_by_prefix('map.line.door').items()}
+    assert shown == {
+        'tag': 'line/door', 'command': 'Read', 'address': 'I:017/12', 'station': '1',
+        'plc_type': 'PLC5', 'length': '1', 'type': 'bool', 'topic': 'line/door', 'period': '',
+        'publish': 'Always', 'min': '', 'max': ''}
+
+
+def test_mappings_can_be_kept_out_of_the_parameters(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    node = make_node(files | {'expose_map_parameters': False})
+    assert len(configure(node).mappings) == 2
+    assert not node.get_parameters_by_prefix('map')
+
+
+def test_mappings_are_in_their_file_alone(make_node: Nodes, files: dict[str, str]) -> None:
+    node = make_node(files | {'map.recipe.max': '5'})
+    assert configure(node).mappings[0].maximum == 999
+    assert node.get_parameter('map.recipe.max').value == '999'
+
+
+def test_parameter_file(make_node: Nodes, files: dict[str, str], tmp_path: Path) -> None:
+    path = tmp_path / 'parameters.yaml'
+    path.write_text(
+        '/**:\n  ros__parameters:\n    default_period: 250\n    stale_after: 4\n'
+        '    net:\n      baud: 38400\n      handshake: Yes\n      parity: Odd\n',
+        encoding='utf-8')
+    arguments = [*ros_args(*(f'{name}:={value}' for name, value in files.items())),
+                 '--params-file', str(path)]
+    configuration = configure(make_node(cli_args=arguments))
+    assert configuration.parameters.default_period == 250
+    assert configuration.parameters.stale_after == 4.0
+    assert configuration.network == Network(
+        baud=38400, com_port='3', handshake='Yes', parity='Odd')

@@ -1,0 +1,507 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ports and the link thread, on pseudo-terminals and sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+import itertools
+import os
+from pathlib import Path
+import queue
+import socket
+import threading
+import time
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Symbol
+from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.driver.network import Network
+from abdf1_ros.errors import PortLost
+from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState, SerialPort
+import pytest
+import serial
+from support.ptys import PATIENCE, Pty, wait_until
+
+READY = b'ready'
+
+
+class Script:
+    """A procedure that says when it begins, tells what it hears, and how it ended."""
+
+    def __init__(self, *steps: Step) -> None:
+        self.heard: queue.Queue[Symbol | None] = queue.Queue()
+        self.ended: queue.Queue[BaseException | None] = queue.Queue()
+        self.machine = Machine(self._run, checksum=Checksum.CRC)
+        self._steps = steps
+
+    def _run(self, machine: Machine) -> Procedure:
+        try:
+            yield Step(READY, 0)
+            for step in self._steps:
+                self.heard.put((yield step))
+        except BaseException as error:
+            self.ended.put(error)
+            raise
+        yield Step(None, None)
+
+    def next(self) -> Symbol | None:
+        """Return what came of the next step."""
+        return self.heard.get(timeout=PATIENCE)
+
+    def end(self) -> str:
+        """Return the error that ended the procedure."""
+        return repr(self.ended.get(timeout=PATIENCE))
+
+
+class Impatient(LinkThread):
+    """A link thread that keeps its pauses short and tells how long they should be."""
+
+    def __init__(self, machine: Machine, opener: Callable[[], Port], most: int,
+                 **options: object) -> None:
+        super().__init__(machine, opener, **options)  # type: ignore[arg-type]
+        self.pauses: list[float] = []
+        self._most = most
+
+    def _pause(self, seconds: float) -> None:
+        self.pauses.append(seconds)
+        if len(self.pauses) >= self._most:
+            self._stopping = True
+
+
+@pytest.fixture
+def pty(tmp_path: Path) -> Iterator[Pty]:
+    line = Pty(tmp_path / 'line')
+    yield line
+    line.close()
+
+
+class Link:
+    """A link thread with the states it has gone through."""
+
+    def __init__(self) -> None:
+        self.states: queue.Queue[PortState] = queue.Queue()
+        self.threads: list[LinkThread] = []
+
+    def start(self, machine: Machine, name: Path | str, **options: object) -> LinkThread:
+        """Run ``machine`` on the port of that name."""
+        network = Network(com_port=str(name))
+        thread = LinkThread(
+            machine, lambda: open_port(network), on_state=self.states.put,
+            last_back_off=0.02, **options)  # type: ignore[arg-type]
+        self.threads.append(thread)
+        thread.start()
+        return thread
+
+    def state(self) -> PortState:
+        """Return the next state."""
+        return self.states.get(timeout=PATIENCE)
+
+
+@pytest.fixture
+def link() -> Iterator[Link]:
+    links = Link()
+    yield links
+    for thread in links.threads:
+        if thread.is_alive():
+            thread.stop()
+
+
+def test_machine_runs_on_a_port(pty: Pty, link: Link) -> None:
+    script = Script(Step(b'', PATIENCE), Step(b'again', PATIENCE))
+    thread = link.start(script.machine, pty.name)
+    assert link.state() == PortState(True, 'open') == thread.state
+    assert pty.read(5) == READY
+    pty.write(ACK)
+    assert script.next() == Control(Code.ACK)
+    assert pty.read(5) == b'again'
+    pty.write(EOT[:1])
+    pty.write(EOT[1:])
+    assert script.next() == Control(Code.EOT)
+    assert script.machine.counters.chars_received == 4
+    assert script.machine.counters.chars_sent == 10
+
+
+def test_deadlines_of_the_machine_are_kept(pty: Pty, link: Link) -> None:
+    script = Script(*[Step(b'x', 0.02)] * 3)
+    began = time.monotonic()
+    link.start(script.machine, pty.name)
+    assert [script.next() for _ in range(3)] == [None] * 3
+    assert time.monotonic() - began >= 0.06
+    assert pty.read(8) == READY + b'xxx'
+
+
+def test_wake_ends_a_rest(pty: Pty, link: Link) -> None:
+    script = Script(Step(None, None), Step(b'awake', None))
+    thread = link.start(script.machine, pty.name)
+    assert pty.read(5) == READY
+    thread.wake()
+    assert script.next() is None
+    assert pty.read(5) == b'awake'
+
+
+def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) -> None:
+    script = Script(Step(b'', PATIENCE))
+    machine = script.machine
+    thread = LinkThread(machine, lambda: open_port(Network(com_port=str(pty.name))))
+    link.threads.append(thread)
+    for _ in range(100_000):  # more than the pipe takes
+        thread.wake()
+    thread.start()
+    assert pty.read(5) == READY
+    pty.write(ACK)
+    assert script.next() == Control(Code.ACK)
+
+
+def test_port_that_vanishes_is_opened_again_when_it_is_back(pty: Pty, link: Link) -> None:
+    script = Script(Step(b'', None))
+    thread = link.start(script.machine, pty.name)
+    assert link.state().is_open
+    assert pty.read(5) == READY
+    pty.close()
+    lost = link.state()
+    assert not lost.is_open
+    assert lost.text.startswith('the port was lost: ')
+    assert script.end().startswith('PortLost(')
+    assert script.machine.counters.read_errors == 1
+    state = link.state()
+    assert state.text.startswith('cannot open the port: ')
+    assert 'No such file or directory' in state.text
+    back = Pty(pty.name)
+    try:
+        while not (state := link.state()).is_open:
+            assert state.text.startswith('cannot open the port: ')
+        assert back.read(5) == READY
+        back.write(ACK)
+        assert script.next() == Control(Code.ACK)
+        thread.stop()
+    finally:
+        back.close()
+
+
+def test_attempts_to_open_come_further_and_further_apart() -> None:
+    def refuse() -> Port:
+        raise OSError(16, 'Device or resource busy')
+
+    states: list[PortState] = []
+    thread = Impatient(Script().machine, refuse, 9, on_state=states.append)
+    thread.run()
+    assert thread.pauses == [0.5, 1, 2, 4, 8, 16, 30, 30, 30]
+    assert set(states) == {PortState(False, 'cannot open the port: Device or resource busy')}
+    thread.stop()
+
+
+def test_back_off_begins_anew_after_the_port_was_open(pty: Pty) -> None:
+    tries = itertools.count()
+
+    def open_at_third() -> Port:
+        if next(tries) != 3:
+            raise OSError('not now')
+        port = open_port(Network(com_port=str(pty.name)))
+        pty.close()
+        return port
+
+    thread = Impatient(Script(Step(b'', None)).machine, open_at_third, 6)
+    thread.run()
+    assert thread.pauses == [0.5, 1, 2, 0.5, 0.5, 1]
+    thread.stop()
+
+
+def test_stop_before_start() -> None:
+    LinkThread(Script().machine, lambda: pytest.fail('opened')).stop()
+
+
+@pytest.mark.parametrize('step', [
+    Step(None, None), Step(None, 3600.0), Step(b'', None), Step(b'x', 3600.0)])
+def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> None:
+    script = Script(step)
+    thread = link.start(script.machine, pty.name)
+    assert pty.read(5) == READY
+    thread.stop()
+    assert not thread.is_alive()
+    assert script.end() == repr(PortLost('the driver is stopping'))
+    assert not thread.state.is_open
+    assert script.machine.counters.read_errors == 0
+
+
+def test_stop_while_the_port_is_not_there(tmp_path: Path) -> None:
+    asked = threading.Event()
+
+    def refuse() -> Port:
+        asked.set()
+        raise OSError('no')
+
+    thread = LinkThread(Script().machine, refuse, last_back_off=3600.0)
+    thread.start()
+    assert asked.wait(PATIENCE)
+    began = time.monotonic()
+    thread.stop()
+    assert not thread.is_alive()
+    assert time.monotonic() - began < PATIENCE / 2
+
+
+def test_port_is_given_back_after_stop(pty: Pty, link: Link) -> None:
+    thread = link.start(Script(Step(b'', None)).machine, pty.name)
+    assert link.state().is_open
+    thread.stop()
+    open_port(Network(com_port=str(pty.name))).close()
+
+
+class Broken:
+    """A machine's procedure that fails as soon as it runs."""
+
+    def __init__(self) -> None:
+        self.machine = Machine(self._run, checksum=Checksum.CRC)
+        self.runs = 0
+
+    def _run(self, machine: Machine) -> Procedure:
+        self.runs += 1
+        raise ZeroDivisionError
+        yield Step(None, None)
+
+
+class _NoLine:
+    """A port on which nothing ever happens."""
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Return nothing."""
+        return b''
+
+    def write(self, data: bytes) -> None:
+        """Drop it."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def test_three_faults_within_a_minute_end_the_thread() -> None:
+    broken, faults, states = Broken(), list[Exception](), list[PortState]()
+    thread = Impatient(broken.machine, _NoLine, 100, on_fault=faults.append,
+                       on_state=states.append, clock=lambda: 5.0)
+    thread.run()
+    assert thread.has_failed
+    assert broken.runs == len(faults) == 3
+    assert all(isinstance(fault, ZeroDivisionError) for fault in faults)
+    assert states[1] == PortState(False, 'internal error: ZeroDivisionError()')
+    assert thread.pauses == [0.5, 0.5]
+    thread.stop()
+
+
+@pytest.mark.parametrize('apart, fails', [(29.0, True), (31.0, False)])
+def test_faults_that_are_rare_do_not_end_the_thread(apart: float, fails: bool) -> None:
+    broken, now = Broken(), [0.0]
+
+    def wait(error: Exception) -> None:
+        now[0] += apart
+
+    thread = Impatient(broken.machine, _NoLine, 20, on_fault=wait, clock=lambda: now[0])
+    thread.run()
+    assert thread.has_failed is fails
+    assert broken.runs == (3 if fails else 20)
+    thread.stop()
+
+
+def test_fault_ends_what_runs_and_the_next_port_has_a_fresh_procedure(
+        pty: Pty, link: Link) -> None:
+    faults: queue.Queue[Exception] = queue.Queue()
+    script = Script(Step(b'', None), Step(b'', None))
+    script.heard.put = _fail_once(script.heard.put)  # type: ignore[method-assign]
+    thread = link.start(script.machine, pty.name, on_fault=faults.put)
+    assert pty.read(5) == READY
+    pty.write(ACK)
+    assert isinstance(faults.get(timeout=PATIENCE), ZeroDivisionError)
+    assert pty.read(5) == READY
+    pty.write(ACK)
+    assert script.next() == Control(Code.ACK)
+    assert not thread.has_failed
+
+
+def _fail_once(put: Callable[..., None]) -> Callable[..., None]:
+    calls = itertools.count()
+
+    def fail_first(item: Symbol | None) -> None:
+        if next(calls) == 0:
+            raise ZeroDivisionError
+        put(item)
+    return fail_first
+
+
+def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) -> None:
+    other = serial.Serial(str(pty.name), exclusive=True)
+    script = Script()
+    link.start(script.machine, pty.name)
+    state = link.state()
+    assert not state.is_open
+    assert 'lock' in state.text
+    assert str(pty.name) in state.text or 'Resource temporarily unavailable' in state.text
+    other.close()
+    while not link.state().is_open:
+        pass
+    assert pty.read(5) == READY
+
+
+@pytest.mark.parametrize('name, text', [
+    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'Could not configure port'),
+    ('socket://127.0.0.1:1', 'refused'), ('foo://x', 'protocol'), ('/tmp', 'directory')])
+def test_port_that_cannot_be_opened(name: str, text: str) -> None:
+    with pytest.raises(OSError, match=text):
+        open_port(Network(com_port=name))
+
+
+def test_setting_that_the_device_does_not_have(pty: Pty) -> None:
+    network = Network(com_port=str(pty.name))
+    open_port(network).close()
+    # A pty has no parity; the C library says so when there is nothing else to change.
+    with pytest.raises(OSError, match='Invalid argument'):
+        open_port(replace(network, parity='Even'))
+
+
+def test_name_of_the_port_overrides_the_file(pty: Pty) -> None:
+    port = open_port(Network(com_port='/nowhere'), str(pty.name))
+    port.write(b'abc')
+    assert pty.read(3) == b'abc'
+    port.close()
+
+
+@pytest.fixture
+def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
+    ours, theirs = socket.socketpair()
+    yield DescriptorPort(ours.fileno(), ours.close), theirs
+    theirs.close()
+    ours.close()
+
+
+@pytest.fixture
+def wake() -> Iterator[tuple[int, int]]:
+    pipe = os.pipe()
+    yield pipe
+    for descriptor in pipe:
+        os.close(descriptor)
+
+
+def test_read_returns_what_is_there(
+        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
+    port, other = sockets
+    other.send(b'abc')
+    assert port.read(None, wake[0]) == b'abc'
+    assert port.read(0.0, wake[0]) == b''
+    assert port.read(0.001, wake[0]) == b''
+
+
+def test_read_ends_when_woken(
+        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
+    os.write(wake[1], b'w')
+    assert sockets[0].read(None, wake[0]) == b''
+
+
+def test_read_from_a_closed_line(
+        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
+    port, other = sockets
+    other.close()
+    with pytest.raises(OSError, match='the other end has closed the connection'):
+        port.read(None, wake[0])
+
+
+def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -> None:
+    port, other = sockets
+    other.close()
+    with pytest.raises(BrokenPipeError):
+        port.write(b'abc')
+
+
+def test_write_to_a_line_that_takes_no_more_does_not_hang(
+        sockets: tuple[DescriptorPort, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.port._WRITE_TIMEOUT', 0.05)
+    with pytest.raises(OSError, match='the line takes no data; is Handshake right'):
+        sockets[0].write(bytes(10_000_000))
+
+
+def test_write_waits_for_a_line_that_is_slow(
+        sockets: tuple[DescriptorPort, socket.socket]) -> None:
+    port, other = sockets
+    received = bytearray()
+
+    def read_all() -> None:
+        while len(received) < 1_000_000:
+            received.extend(other.recv(65536))
+
+    reader = threading.Thread(target=read_all)
+    reader.start()
+    port.write(bytes(1_000_000))
+    reader.join(PATIENCE)
+    assert len(received) == 1_000_000
+
+
+def test_full_pty_is_a_lost_port(
+        pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.port._WRITE_TIMEOUT', 0.05)
+    script = Script(Step(bytes(1_000_000), None))
+    link.start(script.machine, pty.name)
+    assert link.state().is_open
+    assert link.state() == PortState(
+        False, 'the port was lost: the line takes no data; is Handshake right?')
+    assert script.end().startswith('PortLost(')
+
+
+def test_port_without_a_descriptor(wake: tuple[int, int]) -> None:
+    port = open_port(Network(com_port='loop://', baud=115200))
+    assert isinstance(port, SerialPort)
+    port.write(b'abc')
+    assert port.read(PATIENCE, wake[0]) == b'abc'
+    assert port.read(0.0, wake[0]) == b''
+    assert port.read(0.02, wake[0]) == b''
+    os.write(wake[1], b'w')
+    assert port.read(None, wake[0]) == b''
+    port.close()
+
+
+def test_machine_runs_on_a_port_without_a_descriptor(link: Link) -> None:
+    script = Script(Step(ACK, PATIENCE), Step(None, None), Step(b'', None))
+    thread = link.start(script.machine, 'loop://')
+    assert script.next() == Control(Code.ACK)
+    thread.wake()
+    assert script.next() is None
+    thread.stop()
+    assert script.end() == repr(PortLost('the driver is stopping'))
+
+
+def test_machine_runs_on_a_socket_url(link: Link) -> None:
+    script = Script(Step(b'', None))
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        server.settimeout(PATIENCE)
+        link.start(script.machine, f'socket://127.0.0.1:{server.getsockname()[1]}')
+        assert link.state().is_open
+        client, _ = server.accept()
+        with client:
+            client.settimeout(PATIENCE)
+            data = b''
+            while len(data) < 5:
+                data += client.recv(5)
+            assert data == READY
+            client.sendall(ACK)
+            assert script.next() == Control(Code.ACK)
+        assert link.state().text == \
+            'the port was lost: the other end has closed the connection'
+        again, _ = server.accept()
+        again.close()
+
+
+def test_state_is_closed_after_the_end(pty: Pty, link: Link) -> None:
+    thread = link.start(Script().machine, pty.name)
+    assert link.state().is_open
+    wait_until(lambda: thread.state.is_open)
+    thread.stop()
+    assert not thread.state.is_open

@@ -1,0 +1,287 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated PLC: its data file, its motions and its faults, on a clock of the test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Code, Control, Frame, Poll
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
+import pytest
+from support.driver_bench import simulated_plc, stored
+
+HEADER = ','.join(COLUMNS)
+ACKNOWLEDGED = Control(Code.ACK)
+
+
+class Clock:
+    """A clock that stands until it is set."""
+
+    def __init__(self) -> None:
+        self.now = 50.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / 'simulator.csv'
+
+
+def load(path: Path, clock: Clock, *rows: str) -> list[SimulatedPlc]:
+    path.write_text('\n'.join([HEADER, *rows]), encoding='utf-8')
+    return load_plcs(str(path), Checksum.CRC, clock)
+
+
+def faults(path: Path, *rows: str) -> list[str]:
+    with pytest.raises(ConfigurationError) as caught:
+        load(path, Clock(), *rows)
+    return [str(problem).split('simulator.csv:')[1] for problem in caught.value.problems]
+
+
+class Master:
+    """Sends commands to a PLC, frame by frame."""
+
+    def __init__(self, plc: SimulatedPlc) -> None:
+        self._plc = plc
+        self._tns = 0
+
+    def deliver(self, data: bytes) -> bytes:
+        """Send a command; return what the PLC says to that."""
+        self._tns += 1
+        packet = Packet(self._plc.station, 5, 0x0F, 0, self._tns, data)
+        return self._plc.handle(Frame(packet.encode(), self._plc.station))
+
+    def poll(self) -> bytes:
+        """Poll; return what the PLC says to that."""
+        return self._plc.handle(Poll(self._plc.station, True))
+
+    def read(self, text: str, words: int = 1) -> bytes:
+        """Return words, by a whole transaction."""
+        address = Address.parse(text, self._plc.table.plc_type)
+        dialect = DIALECTS[address.plc_type]
+        assert self.deliver(dialect.read(address, words)) == frames.ACK
+        decoder = frames.FrameDecoder(Checksum.CRC, frames.Duplex.HALF)
+        decoder.feed(self.poll())
+        symbol = decoder.next_symbol()
+        assert isinstance(symbol, Frame)
+        self._plc.handle(ACKNOWLEDGED)
+        reply = Packet.decode(symbol.data)
+        assert reply.sts == 0
+        return dialect.read_data(address, words, reply.data)
+
+    def number(self, text: str) -> int:
+        """Return a word as a signed number."""
+        return int.from_bytes(self.read(text), 'little', signed=True)
+
+
+def test_data_file(path: Path, clock: Clock) -> None:
+    one, two = load(path, clock, '1,PLC5,N7:0,3,1 -2 3,,', '1,PLC5,B3:0/4,3,1 0 1,,',
+                    '1,PLC5,F8:1,1,1.5,,', '1,plc5,ST9:0,1,Hi,,', '2,SLC,L10:1,1,70000,,',
+                    '2,slc,I:1.0,2,5,,')
+    assert (one.station, two.station) == (1, 2)
+    assert stored(one, 'N7:0', 3) == b'\1\0\xfe\xff\3\0'
+    assert stored(one, 'B3:0') == b'\x50\0'
+    assert stored(one, 'F8:0', 4) == bytes(4) + b'\0\0\xc0\x3f'
+    assert stored(one, 'ST9:0', 2) == b'\2\0iH'
+    assert stored(two, 'L10:1', 2) == b'\x70\x11\1\0'
+    assert stored(two, 'I:1.0', 2) == b'\5\0\0\0'  # what is not named is 0
+
+
+@pytest.mark.parametrize('row, text', [
+    ('300,PLC5,N7:0,,,,', '2:1 (Station): Station = "300" should be a whole number from 0 to '
+                          '254'),
+    ('x,PLC5,N7:0,,,,', '2:1 (Station): Station = "x" should be a whole number from 0 to 254'),
+    ('1,PLC9,N7:0,,,,', '2:2 (PLC_Type): PLC_Type = "PLC9" should be one of PLC5, SLC'),
+    ('1,PLC5,N7,,,,', '2:3 (Address): an element is missing, as in N7:0'),
+    ('1,PLC5,N7:1000,,,,', '2:3 (Address): elements of N run from 0 to 999'),
+    ('1,PLC5,N7:0,0,,,', '2:4 (Length): Length = "0" should be a whole number from 1 to 1000'),
+    ('1,PLC5,N7:0,1,1 2,,', '2:5 (Values): 2 values, the mapping has 1'),
+    ('1,PLC5,N7:0,1,40000,,', '2:5 (Values): value 40000 at index 0 is no int16'),
+    ('1,PLC5,N7:0,1,1.5,,', '2:5 (Values): value 1.5 at index 0 is no int16'),
+    ('1,PLC5,B3:0/0,1,2,,', '2:5 (Values): value 2 at index 0 is no bool'),
+    ('1,PLC5,ST9:0,1,' + 'x' * 83 + ',,', '2:5 (Values): 83 characters, a PLC string has 82'),
+    ('1,PLC5,N7:0,1,,Jump,5', '2:6 (Motion): Motion = "Jump" should be one of Ramp, Toggle'),
+    ('1,PLC5,N7:0,1,,Ramp,', '2:7 (Period): Period = "" should be a whole number from 1 to '
+                             '3600000'),
+    ('1,PLC5,N7:0,1,,Ramp,0', '2:7 (Period): Period = "0" should be a whole number from 1 to '
+                              '3600000'),
+    ('1,PLC5,ST9:0,1,,Ramp,5', '2:6 (Motion): a string does not move'),
+])
+def test_fault_of_the_data_file(path: Path, row: str, text: str) -> None:
+    assert faults(path, row) == [text]
+
+
+def test_value_that_is_no_number(path: Path) -> None:
+    text, = faults(path, '1,PLC5,N7:0,1,abc,,')
+    assert text.startswith('2:5 (Values): ')
+    assert "'abc'" in text
+
+
+def test_every_fault_of_the_data_file_is_reported(path: Path) -> None:
+    assert [text.split(': ')[0] for text in faults(
+        path, '1,PLC5,N7:0,,,,', '1,SLC,N7:0,,,,', '1,PLC5,F7:0,,,,', 'x,PLC5,N7:0,,,,')] == [
+        '3:2 (PLC_Type)', '4:3 (Address)', '5:1 (Station)']
+
+
+def test_station_of_two_families(path: Path) -> None:
+    assert faults(path, '1,PLC5,N7:0,,,,', '1,SLC,N7:0,,,,') == [
+        '3:2 (PLC_Type): station 1 is a PLC5 already']
+
+
+def test_file_of_two_types(path: Path) -> None:
+    assert faults(path, '1,PLC5,N7:0,,,,', '1,PLC5,F7:0,,,,') == [
+        '3:3 (Address): file 7 is of type N already']
+
+
+def test_shipped_file_is_good(clock: Clock) -> None:
+    path = Path(__file__).resolve().parent.parent / 'config' / 'simulator.csv'
+    plcs = load_plcs(str(path), Checksum.BCC, clock)
+    assert [(plc.station, plc.table.plc_type.value) for plc in plcs] == [(1, 'PLC5'), (2, 'SLC')]
+
+
+def test_ramp(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,PLC5,N7:0,2,10 998,Ramp,250')
+    master = Master(plc)
+    seen = []
+    for passed in (0.0, 0.249, 0.25, 0.499, 0.5, 2.6):
+        clock.now = 50.0 + passed
+        seen.append((master.number('N7:0'), master.number('N7:1')))
+    assert seen == [(10, 998), (10, 998), (11, 999), (11, 999), (12, 0), (20, 8)]
+
+
+def test_toggle(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,PLC5,B3:0,1,65535,,', '1,PLC5,B3:0/3,1,0,Toggle,100')
+    master = Master(plc)
+    seen = []
+    for passed in (0.0, 0.1, 0.2, 0.5, 0.7, 0.8):
+        clock.now = 50.0 + passed + 0.001
+        seen.append(master.number('B3:0'))
+    assert seen == [-9, -1, -9, -1, -1, -9]
+
+
+def test_ramp_of_floats_and_members(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,SLC,F8:0,1,40.25,Ramp,100', '1,SLC,T4:0.ACC,1,5,Ramp,100')
+    clock.now += 0.301
+    master = Master(plc)
+    assert master.read('F8:0', 2) == bytes.fromhex('00 00 2d 42')  # 43.25
+    assert master.number('T4:0.ACC') == 8
+    assert master.read('T4:0', 2) == bytes(4)
+
+
+def test_motion_goes_on_from_what_was_written(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,SLC,N7:0,1,0,Ramp,100')
+    master = Master(plc)
+    address = Address.parse('N7:0', plc.table.plc_type)
+    master.deliver(DIALECTS[address.plc_type].write(address, b'\x64\0'))
+    master.poll()
+    plc.handle(ACKNOWLEDGED)
+    clock.now += 0.1
+    assert master.number('N7:0') == 101
+
+
+@pytest.fixture
+def plc(clock: Clock) -> SimulatedPlc:
+    return simulated_plc(1, 'SLC', clock, ('N7:0', 10))
+
+
+READ = bytes.fromhex('a2 02 07 89 00 00')
+
+
+def test_without_faults(plc: SimulatedPlc) -> None:
+    master = Master(plc)
+    assert master.poll() == frames.EOT
+    assert master.deliver(READ) == frames.ACK
+    assert master.poll() == frames.message_frame(
+        bytes.fromhex('05 01 4f 00 01 00 00 00'), Checksum.CRC)
+
+
+def test_silent(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(silent=True)
+    master = Master(plc)
+    assert (master.deliver(READ), master.poll()) == (b'', b'')
+    plc.faults = Faults()
+    assert master.poll() == frames.EOT  # it has not heard anything
+    assert master.number('N7:0') == 0
+
+
+def test_slow(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(slow=3)
+    master = Master(plc)
+    for _ in range(2):
+        assert master.deliver(READ) == frames.ACK
+        answers = [master.poll() for _ in range(4)]
+        assert answers[:3] == [frames.EOT] * 3
+        assert answers[3].startswith(frames.STX)
+        plc.handle(ACKNOWLEDGED)
+
+
+def test_slow_station_does_not_answer_polls_of_others(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(slow=1)
+    master = Master(plc)
+    master.deliver(READ)
+    assert plc.handle(Poll(2, True)) == plc.handle(Poll(1, False)) == b''
+    assert master.poll() == frames.EOT
+    assert master.poll().startswith(frames.STX)
+
+
+@pytest.mark.parametrize('status, link_data', [
+    ((0x50,), '05 01 4f 50 01 00'), ((0xF0, 0x0B), '05 01 4f f0 01 00 0b')])
+def test_error(plc: SimulatedPlc, status: tuple[int, ...], link_data: str) -> None:
+    plc.faults = Faults(status=status)
+    master = Master(plc)
+    master.deliver(READ)
+    assert master.poll() == frames.message_frame(bytes.fromhex(link_data), Checksum.CRC)
+
+
+def test_error_executes_nothing(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(status=(0x50,))
+    Master(plc).deliver(bytes.fromhex('aa 02 07 89 00 00 05 00'))
+    assert stored(plc, 'N7:0') == b'\0\0'
+
+
+def test_noise_damages_its_share(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(noise=0.1)
+    sent = bytes(10_000)
+    received = plc.damaged(sent)
+    assert len(received) == len(sent)
+    damaged = [byte for byte in received if byte]
+    assert 900 < len(damaged) < 1100
+    assert set(damaged) == {1 << bit for bit in range(8)}
+    plc.faults = Faults(noise=1.0)
+    assert all(plc.damaged(frames.ACK))
+    assert plc.damaged(frames.ACK) != frames.ACK
+
+
+def test_noise_is_the_same_in_every_run(clock: Clock) -> None:
+    heard = []
+    for _ in range(2):
+        plc = simulated_plc(1, 'SLC', clock, ('N7:0', 10))
+        plc.faults = Faults(noise=0.5)
+        heard.append(plc.damaged(bytes(100)))
+    assert heard[0] == heard[1] != bytes(100)
