@@ -33,7 +33,8 @@ from types import FrameType
 from typing import Any
 
 from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.driver.values import Values

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 import math
 import os
@@ -183,6 +184,7 @@ class LinkThread(threading.Thread):
         self._last_back_off = last_back_off
         self._clock = clock
         self._stopping = False
+        self._is_closed = False
         self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
         self._wake_reader, self._wake_writer = os.pipe()
         os.set_blocking(self._wake_reader, False)
@@ -190,10 +192,9 @@ class LinkThread(threading.Thread):
 
     def wake(self) -> None:
         """Tell the machine, from any thread, that there may be something new to do."""
-        try:
-            os.write(self._wake_writer, b'w')
-        except BlockingIOError:
-            pass  # it is being woken already
+        if not self._is_closed:
+            with suppress(BlockingIOError):  # it is being woken already
+                os.write(self._wake_writer, b'w')
 
     def stop(self) -> None:
         """End the thread, finishing what it does with an error, and wait for its end."""
@@ -201,11 +202,21 @@ class LinkThread(threading.Thread):
         self.wake()
         if self.is_alive():
             self.join()
-        os.close(self._wake_reader)
-        os.close(self._wake_writer)
+        if not self._is_closed:
+            self._is_closed = True
+            os.close(self._wake_reader)
+            os.close(self._wake_writer)
 
     def run(self) -> None:
         """Keep the port open and the machine running."""
+        try:
+            self._keep_open()
+        except Exception as error:  # a bug outside of the machine; nobody else would see it
+            self.has_failed = True
+            self.state = PortState(False, f'internal error: {error!r}')
+            self._on_fault(error)
+
+    def _keep_open(self) -> None:
         back_off = _FIRST_BACK_OFF
         while not self._stopping and not self.has_failed:
             try:

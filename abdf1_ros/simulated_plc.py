@@ -20,6 +20,7 @@ from collections import deque
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from enum import Enum
+import math
 import random
 from typing import TypeVar
 
@@ -80,12 +81,14 @@ class Faults:
     """
     What is wrong with a station at the moment.
 
-    ``silent``: it does not answer. ``slow``: so many polls get EOT before each reply. ``noise``:
-    the share of its characters that is damaged. ``status``: STS and EXT STS of every reply.
+    ``silent``: it does not answer. ``slow``: so many polls get EOT before each reply. ``delay``:
+    polls get EOT until so many seconds after the command. ``noise``: the share of its
+    characters that is damaged. ``status``: STS and EXT STS of every reply.
     """
 
     silent: bool = False
     slow: int = 0
+    delay: float = 0.0
     noise: float = 0.0
     status: tuple[int, ...] = ()
 
@@ -128,14 +131,15 @@ class SimulatedPlc:
         self._movers: list[_Mover] = []
         self._random = random.Random(seed + station)
         self._polls_to_refuse = 0
+        self._ready = -math.inf  # clock value (s) from which the last command's reply is there
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer a symbol, as well as the faults allow."""
         if self.faults.silent:
             return b''
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
-        if is_poll and self._polls_to_refuse > 0:
-            self._polls_to_refuse -= 1
+        if is_poll and (self._polls_to_refuse > 0 or self._clock() < self._ready):
+            self._polls_to_refuse = max(0, self._polls_to_refuse - 1)
             return self.damaged(frames.EOT)
         return self.damaged(self.slave.handle(symbol))
 
@@ -186,8 +190,9 @@ class SimulatedPlc:
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command and return its reply."""
-        self._polls_to_refuse = self.faults.slow
         now = self._clock()
+        self._polls_to_refuse = self.faults.slow
+        self._ready = now + self.faults.delay if self.faults.delay else -math.inf
         for mover in self._movers:
             mover.advance(self.table, now)
         if self.faults.status:

@@ -60,6 +60,7 @@ _COMMANDS = """\
 commands, on standard input or with --at:
   silent STATION              it stops answering
   slow STATION POLLS          so many polls get EOT before each reply
+  delay STATION MS            polls get EOT until so many ms after each command
   noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
   error STATION STS [EXT]     every reply says this error (hexadecimal)
   normal STATION              it works again
@@ -90,6 +91,8 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
             faults.silent = True
         elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
             faults.slow = int(arguments[0])
+        elif verb == 'delay' and len(arguments) == 1 and not is_full_duplex:
+            faults.delay = float(arguments[0]) / 1000
         elif verb == 'noise' and len(arguments) == 1:
             faults.noise = float(arguments[0])
         elif verb == 'error' and len(arguments) in (1, 2):

@@ -39,6 +39,7 @@ from support.ros import (
     Plcs,
     ros_args,
     until_status,
+    values_in,
     WARN,
     write_csv,
 )
@@ -283,6 +284,39 @@ def test_loss_of_the_port_leaves_no_write_without_a_result(make_bench: Benches) 
     until_status(bench.diagnostics, 'link', ERROR)
     publish(*8 * [0])
     assert bench.until_results(4)[-1].message == 'not written: refused: the port is not open'
+
+
+def test_read_only_node_refuses_every_write(make_bench: Benches) -> None:
+    bench = make_bench(*LAMPS, parameters=('read_only:=true',))
+    bench.publisher(UInt8MultiArray, 'lamps')(1, 1)
+    assert messages(bench.until_results(2)) == {
+        'not written: refused: this node is read_only': 2}
+    assert bench.words('B3:0') == [0]
+
+
+# Maps with faults
+
+
+def test_bad_row_is_told_and_left_out_and_the_rest_runs(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench('bad_station,Read,N7:0,255,SLC,1,', 'bad_type,Read,N7:0,2,PLC9,1,',
+                       'missing,Read,N99:0,1,PLC5,1,', SPEED)
+    speed = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed')
+    assert values_in(speed.first()) == [0, 0]
+    lines = [line for line in ''.join(capfd.readouterr()).splitlines() if '[ERROR]' in line]
+    assert len(lines) == 2
+    assert ':2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, ' in lines[0]
+    assert ':3:5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 2, ' in lines[1]
+    assert all(line.endswith(' (row left out)') for line in lines)
+    read_topics = {name for name, _ in bench.node.get_topic_names_and_types()
+                   if name.startswith('/abdf1/read/')}
+    assert read_topics == {'/abdf1/read/missing', '/abdf1/read/speed'}
+    # What only the PLC can know shows in the diagnostics, mapping by mapping.
+    status = until_status(bench.diagnostics, 'mappings', ERROR)
+    assert status.message == 'ERROR: of 2 mappings 1 failed, 1 fresh'
+    assert details(status)['missing'] == (
+        'failed: N99:0 at station 1, never read; STS F0 EXT STS 06: address does not point to '
+        'something usable')
 
 
 # Ends

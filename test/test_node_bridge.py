@@ -387,7 +387,8 @@ def test_write_that_the_plc_refuses_has_failed(bridge: Bridge) -> None:
         result = bridge.write('setpoint', [3.0])
         assert result.level == ERROR
         assert result.message.startswith('not written: the PLC refused it: STS 60: ')
-        status = until_status(bridge.diagnostics, 'writes', WARN)
+        status = until_status(bridge.diagnostics, 'writes', WARN,
+                              lambda status: 'STS 60' in status.message)
         assert re.fullmatch(
             r'WARN: \d+ of \d+ writes confirmed; setpoint not written: the PLC refused it: '
             r'STS 60: .+', status.message), status.message
@@ -435,10 +436,10 @@ def test_statuses_have_names_order_and_words(bridge: Bridge) -> None:
 
 def test_every_status_comes_with_every_period(bridge: Bridge) -> None:
     bridge.diagnostics.clear()
-    bridge.observer.until(lambda: len(bridge.diagnostics) > 6, 'seven diagnostics')
+    bridge.observer.until(lambda: len(bridge.diagnostics) > 4, 'five diagnostics')
     times = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9
              for array in bridge.diagnostics]
-    assert (times[6] - times[0]) / 6 == pytest.approx(0.25, rel=0.5)
+    assert (times[4] - times[0]) / 4 == pytest.approx(0.25, rel=0.5)
     assert {len(array.status) for array in bridge.diagnostics} == {len(STATUSES)}
 
 

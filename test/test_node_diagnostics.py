@@ -22,7 +22,8 @@ import time
 from typing import Any
 
 from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import load_mappings, Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult

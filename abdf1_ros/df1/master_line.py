@@ -36,9 +36,10 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import LISTEN_ON, Machine, Step
-from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.errors import StationInactive, WrongCommandCode
+from abdf1_ros.errors import StationInactive
 from abdf1_ros.messages import Event, Message
 
 # What an operating system or USB adapter may hold a byte back; no wait is shorter, so that
@@ -227,7 +228,7 @@ class MasterLine:
         packet = Packet.decode(frame.data)
         station = self.stations[number]
         is_new = packet.duplicate_key != station.last_key
-        if is_new and self._is_to_forward(packet) and len(self._forwards) >= MAX_FORWARDS:
+        if is_new and self._is_to_forward(packet) and self.is_full:
             return None  # not acknowledged: the slave keeps it
         self.counters.acks_sent += 1
         yield Step(frames.ACK, 0)
@@ -240,19 +241,11 @@ class MasterLine:
             self.counters.error_messages_received += packet.sts != 0
         else:
             self.counters.commands_received += 1
-        station.last_tns = packet.tns
         return packet
 
     def check_reply(self, number: int, reply: Packet, command: Packet) -> None:
         """Account for the reply to ``command``; WrongCommandCode when it is another's."""
-        expected = command.cmd | REPLY_BIT
-        if reply.cmd != expected:
-            self.counters.invalid_messages += 1
-            details = number, reply.cmd, expected
-            self.note(Message.ERR_BAD_FUNCTION_CODE, *details, station=number)
-            raise WrongCommandCode(*details)
-        self.stations[number].replies += 1
-        self.note(Message.NTC_REPLY_MSG_RCVD, number, station=number)
+        check_reply(reply, command, self.stations[number], self.counters, self._report)
 
     def take_unwanted(self, number: int, packet: Packet) -> None:
         """
@@ -272,7 +265,7 @@ class MasterLine:
             self.counters.stale_messages += 1
         else:
             self.counters.invalid_messages += not is_ours
-        self.note(Message.ERR_WRONG_MESSAGE, packet.src, packet.dst, packet.tns, station=number)
+        self._report(wrong_message(packet, number))
 
     def forward(self) -> Generator[Step, Symbol | None, Packet | None]:
         """
@@ -296,6 +289,11 @@ class MasterLine:
     def has_forwards(self) -> bool:
         """Tell whether messages wait to be passed on."""
         return bool(self._forwards)
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether no more messages can be kept to be passed on."""
+        return len(self._forwards) >= MAX_FORWARDS
 
     def forget_forwards(self) -> None:
         """Drop what waits to be passed on."""

@@ -46,7 +46,8 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
 from abdf1_ros.df1.machine import KEEP, Machine, Procedure, Step
-from abdf1_ros.df1.packet import Packet, REPLY_BIT
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
@@ -113,12 +114,14 @@ class FullDuplexPeer:
         while True:
             self._expire()
             source.expire(self._machine.now)
+            # In turns: an other end that never stops asking must not keep us from asking.
             if self._replies:
                 yield from self._send_reply(self._replies.popleft())
-                continue
             task = self._next_task(source)
             if task is not None:
                 yield from self._send_command(task)
+                continue
+            if self._replies:
                 continue
             symbol = yield Step(None, self._idle_time(source))
             if symbol is not None:
@@ -283,22 +286,16 @@ class FullDuplexPeer:
         entry = self._outstanding.pop((packet.src, packet.tns), None)
         if entry is None:
             self._counters.stale_messages += 1
-            self._note(Message.ERR_WRONG_MESSAGE, packet.src, packet.dst, packet.tns,
-                       station=packet.src)
+            self._report(wrong_message(packet, packet.src))
             return
-        station = self._stations[packet.src]
-        station.last_tns = packet.tns
         self._stations.heard(packet.src, self._machine.now)
-        expected = entry.task.command.cmd | REPLY_BIT
-        if packet.cmd != expected:
-            self._counters.invalid_messages += 1
-            details = packet.src, packet.cmd, expected
-            self._note(Message.ERR_BAD_FUNCTION_CODE, *details, station=packet.src)
-            entry.task.fail(WrongCommandCode(*details))
-            return
-        station.replies += 1
-        self._note(Message.NTC_REPLY_MSG_RCVD, packet.src, station=packet.src)
-        entry.task.reply(packet)
+        try:
+            check_reply(packet, entry.task.command, self._stations[packet.src],
+                        self._counters, self._report)
+        except WrongCommandCode as error:
+            entry.task.fail(error)
+        else:
+            entry.task.reply(packet)
 
     def _expire(self) -> None:
         """End the commands whose reply is overdue (S0, counter 2545)."""

@@ -1,3 +1,17 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """
 The master with standard polling: every station is polled all the time, commands in between.
 
@@ -85,6 +99,7 @@ class _PollList:
     started: float | None = None
     position: int = 0
     next_inactive: int = 0
+    is_kept_waiting: bool = False
 
     def turn(self, now: float) -> None:
         """Begin again at the top."""
@@ -93,12 +108,12 @@ class _PollList:
         self.started = now
         self.position = 0
 
-    def inactive(self, stations: ActiveStationList) -> int | None:
+    def inactive(self, is_active: Callable[[int], bool]) -> int | None:
         """Return the inactive station whose turn it is, or None when all are active."""
         for step in range(len(self.stations)):
             at = (self.next_inactive + step) % len(self.stations)
-            if not stations[self.stations[at]].active:
-                self.next_inactive = at + 1
+            if not is_active(self.stations[at]):
+                self.next_inactive = at
                 return self.stations[at]
         return None
 
@@ -131,6 +146,7 @@ class StandardPollingMaster:
         self._normal = _PollList(polling.normal)
         self._outstanding: dict[int, _Outstanding] = {}
         self._next_inactive_poll = 0.0
+        self._last_probed: _PollList | None = None
 
     @property
     def _is_listed(self) -> bool:
@@ -151,16 +167,22 @@ class StandardPollingMaster:
         """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
         self._line.forget_forwards()
         self._outstanding.clear()
+        self._priority.started = self._normal.started = None  # no scan lasts across a stop
         while True:
             begun = self._machine.now
             yield from self._scan(source)
             if self._machine.now == begun:  # nobody is there to be polled now
+                yield from self._between_polls(source)
                 yield Step(None, _PAUSE)
+
+    def _is_active(self, number: int) -> bool:
+        """Tell whether a place in a list has its turn; our own is no station of the line."""
+        return number == self._settings.station or self._stations[number].active
 
     def _scan(self, source: TaskSource) -> Talk:
         self._priority.turn(self._machine.now)
         for number in self._priority.stations:
-            if self._stations[number].active:
+            if self._is_active(number):
                 yield from self._visit(number, source)
         yield from self._visit_inactive(self._priority, source)
         yield from self._visit_group(source)
@@ -177,7 +199,7 @@ class StandardPollingMaster:
         while normal.position < len(normal.stations) and visited < group_size:
             number = normal.stations[normal.position]
             normal.position += 1
-            if self._stations[number].active:
+            if self._is_active(number):
                 visited += 1
                 yield from self._visit(number, source)
         if normal.position >= len(normal.stations):
@@ -186,11 +208,15 @@ class StandardPollingMaster:
 
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
         """Poll one inactive station of a list, if the living can spare the time."""
-        if self._machine.now < self._next_inactive_poll:
+        number = polled.inactive(self._is_active)
+        polled.is_kept_waiting = number is not None \
+            and self._machine.now < self._next_inactive_poll
+        other = self._normal if polled is self._priority else self._priority
+        is_others_turn = other.is_kept_waiting and polled is self._last_probed
+        if number is None or polled.is_kept_waiting or is_others_turn:
             return
-        number = polled.inactive(self._stations)
-        if number is None:
-            return
+        polled.next_inactive += 1
+        self._last_probed = polled
         yield from self._between_polls(source)
         begun = self._machine.now
         answer = yield from self._line.poll(number)
@@ -214,7 +240,8 @@ class StandardPollingMaster:
                 self._end(number, error)
                 return
             yield from self._answered(number, answer)
-            if isinstance(answer, Control) or not self._polling.multiple:
+            if isinstance(answer, Control) or not self._polling.multiple \
+                    or self._line.is_full:
                 yield from self._pace(begun)
                 return
 
@@ -263,6 +290,9 @@ class StandardPollingMaster:
         """Send messages to be passed on, and commands to stations that owe us no reply."""
         while self._line.has_forwards:
             yield from self._line.forward()
+        for number in list(self._outstanding):
+            if not self._stations[number].active:  # it did not take what was passed on
+                self._end(number, StationInactive(number))
         for _ in range(COMMANDS_BETWEEN_POLLS):
             task = source.next_task(self._machine.now, self._outstanding)
             if task is None:

@@ -108,6 +108,7 @@ class HalfDuplexSlave:
         if isinstance(symbol, Poll):
             return self._polled(symbol)
         if isinstance(symbol, Frame):
+            self._just_sent = just_sent and self._is_echo(symbol)
             return self._received(symbol)
         if symbol == Control(Code.ACK) and just_sent:
             # An ACK names no station: it is ours only straight after our own message.
@@ -118,6 +119,17 @@ class HalfDuplexSlave:
             self._release(is_delivered=False)
             self._queue.clear()  # the reset of the whole line (M 2-7, 3-11)
         return b''
+
+    def withdraw(self) -> None:
+        """Do not send a command of our own again; whoever calls this has ended it."""
+        if self._held is not None and not self._held.packet.is_reply:
+            self._held = None
+
+    def _is_echo(self, frame: Frame) -> bool:
+        """Tell whether we hear ourselves, which two-wire adapters let us."""
+        held = self._held
+        return held is not None and frame.station is None and frame.fault is None \
+            and frame.data == held.packet.encode()
 
     def _release(self, is_delivered: bool) -> None:
         """Let go of the held message; a command's sender is told how it went (KF2 4-31)."""
@@ -141,10 +153,11 @@ class HalfDuplexSlave:
         if packet.duplicate_key == self._last_key and self._settings.duplicate_detection:
             self.counters.duplicate_messages += 1
             return self._ack(frame)
-        if len(self._queue) >= self._settings.queue_size:
+        wants_reply = frame.station != BROADCAST and not packet.is_reply
+        if wants_reply and len(self._queue) >= self._settings.queue_size:
             return b''  # sink full: neither acknowledged nor remembered
         self._last_key = packet.duplicate_key
-        self._execute(packet, wants_reply=frame.station != BROADCAST)
+        self._execute(packet, wants_reply)
         return self._ack(frame)
 
     def _execute(self, packet: Packet, wants_reply: bool) -> None:

@@ -1,3 +1,17 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """
 A slave that is a driver of its own: it serves the master, and sends commands when it is polled.
 
@@ -12,14 +26,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from abdf1_ros.df1.machine import Machine, Procedure, Step
-from abdf1_ros.df1.packet import Packet, REPLY_BIT
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandTimeout, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
-# How often (s) a slave that hears nothing looks what has become overdue.
+# How often (s) a slave looks what has become overdue.
 _TICK = 0.25
 
 
@@ -50,6 +65,7 @@ class SlaveLink:
         self._cmd_timeout = cmd_timeout
         self._poll_timeout = poll_timeout
         self._report = report
+        self._slave: HalfDuplexSlave | None = None
         self._source: TaskSource | None = None
         self._outstanding: _Outstanding | None = None
         self._last_poll = 0.0
@@ -57,17 +73,18 @@ class SlaveLink:
     def run(self, source: TaskSource) -> Procedure:
         """Answer the master for ever."""
         slave = HalfDuplexSlave(self._settings, self._serve, self._machine.counters, self)
-        self._source = source
+        self._slave, self._source = slave, source
         self._outstanding = None
         self._last_poll = self._machine.now
+        next_look = self._machine.now + _TICK
         while True:
-            symbol = yield Step(None, _TICK)
-            if symbol is None:
-                self._look_after(source)
-                continue
-            answer = slave.handle(symbol)
+            symbol = yield Step(None, max(0.0, next_look - self._machine.now))
+            answer = b'' if symbol is None else slave.handle(symbol)
             if answer:
                 yield Step(answer, 0)
+            if symbol is None or self._machine.now >= next_look:  # the line may never be still
+                self._look_after(source)
+                next_look = self._machine.now + _TICK
 
     def polled(self) -> None:
         """Take note that the master has polled us."""
@@ -86,9 +103,15 @@ class SlaveLink:
         return task.command
 
     def delivered(self, command: Packet) -> None:
-        """Begin to wait for the reply."""
-        if self._outstanding is not None:
-            self._outstanding.deadline = self._machine.now + self._cmd_timeout
+        """Begin to wait for the reply, where there will be one."""
+        entry = self._outstanding
+        if entry is None:
+            return
+        if command.dst == BROADCAST:
+            self._outstanding = None
+            entry.task.reply(command.reply())
+            return
+        entry.deadline = self._machine.now + self._cmd_timeout
 
     def undelivered(self, command: Packet) -> None:
         """Fail the command that the master did not take."""
@@ -101,21 +124,17 @@ class SlaveLink:
         entry = self._outstanding
         if entry is None or not reply.answers(entry.task.command):
             self._machine.counters.stale_messages += 1
-            self._note(Message.ERR_WRONG_MESSAGE, reply.src, reply.dst, reply.tns,
-                       station=reply.src)
+            self._report(wrong_message(reply, reply.src))
             return
         self._outstanding = None
         self._stations.heard(reply.src, self._machine.now)
-        expected = entry.task.command.cmd | REPLY_BIT
-        if reply.cmd != expected:
-            self._machine.counters.invalid_messages += 1
-            details = reply.src, reply.cmd, expected
-            self._note(Message.ERR_BAD_FUNCTION_CODE, *details, station=reply.src)
-            entry.task.fail(WrongCommandCode(*details))
-            return
-        self._stations[reply.src].replies += 1
-        self._note(Message.NTC_REPLY_MSG_RCVD, reply.src, station=reply.src)
-        entry.task.reply(reply)
+        try:
+            check_reply(reply, entry.task.command, self._stations[reply.src],
+                        self._machine.counters, self._report)
+        except WrongCommandCode as error:
+            entry.task.fail(error)
+        else:
+            entry.task.reply(reply)
 
     def _look_after(self, source: TaskSource) -> None:
         """End what is overdue."""
@@ -126,9 +145,13 @@ class SlaveLink:
             self._fail()
         if not self._poll_timeout or now - self._last_poll < self._poll_timeout:
             return
-        if self._outstanding is not None:
-            self._fail()
+        if self._slave is not None:
+            self._slave.withdraw()
+        self._fail()
+        waiting = []  # all first: a read that fails is soon due again
         while (task := source.next_task(now)) is not None:
+            waiting.append(task)
+        for task in waiting:
             task.fail(CommandTimeout())
 
     def _fail(self) -> None:

@@ -24,21 +24,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Container, Generator, Iterable, Sequence
-from dataclasses import dataclass
 import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
-from abdf1_ros.df1.slave import SlaveSettings
-from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
+from abdf1_ros.driver.links import DriverSettings, make_link
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Block, Planner
@@ -50,7 +44,7 @@ from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.dialects import DIALECTS
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.status import check_status, is_address_fault
+from abdf1_ros.pccc.status import check_status, is_address_fault, is_local
 
 # What a station takes to answer, for the estimate of the scan time (M 14-2 counts two answers
 # for each transaction; PLCs serve the port once per program scan).
@@ -61,9 +55,6 @@ Request = tuple[int, bytes]
 """CMD, and what stands behind TNS."""
 
 Steps = Generator[Request, Packet, None]
-
-
-Link = HalfDuplexMaster | StandardPollingMaster | FullDuplexPeer | SlaveLink
 
 
 class Listener(Protocol):
@@ -80,32 +71,6 @@ class Listener(Protocol):
 
     def station_changed(self, station: Station) -> None:
         """Take note that a station has become active or inactive."""
-
-
-@dataclass(frozen=True, slots=True)
-class DriverSettings:
-    """
-    What is not in the net CSV; times in seconds.
-
-    ``stale_after`` counts periods. ``max_outstanding`` commands may wait for their reply at a
-    time in full duplex. ``polling`` is for standard polling, None for one list of all mapped
-    stations. ``first_tns`` is the transaction number to begin with, which should be random, or
-    a restarted driver repeats itself and is taken for a duplicate. All else is explained with
-    the settings of masters and slaves in ``df1``.
-    """
-
-    default_period: float = 0.1
-    stale_after: float = 3.0
-    write_timeout: float = 2.0
-    read_only: bool = False
-    nak_on_command_timeout: bool = True
-    max_outstanding: int = 1
-    accept_slave_messages: bool = True
-    polling: PollingSettings | None = None
-    eot_suppression: bool = False
-    duplicate_detection: bool = True
-    poll_timeout: float = 60.0
-    first_tns: int = 0
 
 
 class Driver:
@@ -131,7 +96,8 @@ class Driver:
         self._settings = settings
         self._listener = listener
         self._served = Served(PlcType(network.plc_type), mappings, self._serve_written)
-        self.link = self._make_link()
+        self.link = make_link(network, settings, self.machine, self.stations,
+                              self._served.serve, listener.happened)
         self._tns = settings.first_tns
         self._last_tns: dict[int, int] = {}
         self._planner = Planner(
@@ -181,35 +147,6 @@ class Driver:
         """Report that a request to write was not taken."""
         self._listener.written(
             WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
-
-    def _make_link(self) -> Link:
-        network, settings = self.network, self._settings
-        timeout, cmd_timeout = network.timeout / 1000, network.cmd_timeout / 1000
-        serve, report = self._served.serve, self._listener.happened
-        if network.mode == 'Peer':
-            peer_settings = PeerSettings(
-                network.checksum, network.nak_retries, network.enq_retries, timeout,
-                cmd_timeout, settings.max_outstanding)
-            return FullDuplexPeer(self.machine, peer_settings, self.stations, serve, report)
-        if network.mode == 'Slave':
-            slave_settings = SlaveSettings(
-                network.station, network.checksum, network.nak_retries,
-                eot_suppression=settings.eot_suppression,
-                duplicate_detection=settings.duplicate_detection)
-            return SlaveLink(self.machine, slave_settings, self.stations, serve,
-                             cmd_timeout=cmd_timeout, poll_timeout=settings.poll_timeout,
-                             report=report)
-        master_settings = MasterSettings(
-            network.station, network.checksum, network.nak_retries, network.enq_retries,
-            timeout, cmd_timeout, settings.nak_on_command_timeout,
-            accept_slave_messages=settings.accept_slave_messages)
-        if network.polling == 'Standard':
-            mapped = tuple(station.number for station in self.stations)
-            polling = settings.polling or PollingSettings(mapped)
-            return StandardPollingMaster(
-                self.machine, master_settings, polling, self.stations, report, serve)
-        return HalfDuplexMaster(
-            self.machine, master_settings, self.stations, report, serve)
 
     def _point(self, mapping: Mapping) -> ReadPoint:
         if mapping.serves:
@@ -371,7 +308,9 @@ class Driver:
                 done += 1
         except RemoteError as error:
             self.stations[station].remote_errors += 1
-            self._finish_write(write, Outcome.FAILED, str(error), done)
+            is_refused = not done and not is_local(error)
+            outcome = Outcome.FAILED if is_refused else Outcome.UNKNOWN
+            self._finish_write(write, outcome, str(error), done)
         except LinkError as error:
             outcome = Outcome.UNKNOWN if error.sent or done else Outcome.NOT_SENT
             self._finish_write(write, outcome, str(error), done)
@@ -385,6 +324,7 @@ class Driver:
 
     def _finish_write(self, write: Write, outcome: Outcome, detail: str, done: int) -> None:
         if 0 < done < len(write.commands):
+            outcome = Outcome.PARTLY
             detail += f' (after {done} of {len(write.commands)} packets were written)'
         self._listener.written(write.result(outcome, detail, self.machine.now))
 

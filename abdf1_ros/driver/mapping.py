@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 import math
+import re
 from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -221,7 +222,10 @@ class _RowReader:
             value = float(text.replace(',', '.')) if text else default
         except ValueError:
             value = math.nan
-        if math.isnan(value) or (text and math.isinf(value)):
+        if re.fullmatch(r'[+-]?[0-9]+,[0-9]{3}', text):
+            self._fault(column, f'{column} = "{text}" could be two numbers; write '
+                                f'{text.replace(",", "")} or {text.replace(",", ".")}')
+        elif math.isnan(value) or (text and math.isinf(value)):
             self._fault(column, f'{column} = "{text}" should be a number')
         return value
 

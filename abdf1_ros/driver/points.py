@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -42,8 +43,8 @@ class ReadPoint:
     """
     What is known of one mapping that reads.
 
-    ``period`` and ``stale_time`` are in seconds: a value older than one and a half periods is
-    late, one older than ``stale_time`` stale. ``error`` says why the last read gave no value.
+    ``period`` and ``stale_time`` are in seconds: a value is late when it is older than one and
+    a half periods and than half of ``stale_time``, stale when older than all of it. ``error`` says why the last read gave no value.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
@@ -103,6 +104,7 @@ class Outcome(Enum):
     REFUSED = 'not written: refused'
     NOT_SENT = 'not written: not sent'
     FAILED = 'not written: the PLC refused it'
+    PARTLY = 'only partly written'
     UNKNOWN = 'unknown whether written'
 
 
@@ -168,8 +170,11 @@ def _text(value: float) -> str:
 def _check_limits(mapping: Mapping, values: Sequence[float] | str) -> None:
     if isinstance(values, str):
         return
+    minimum, maximum = mapping.minimum, mapping.maximum
+    if mapping.type is ValueType.FLOAT32:  # the limits as near as values can come to them
+        minimum, maximum = array('f', (minimum, maximum))
     for index, value in enumerate(values):
-        if not mapping.minimum <= value <= mapping.maximum:
+        if not minimum <= value <= maximum:
             raise FormatError(f'value {_text(value)} at index {index} is outside '
                               f'Min {mapping.minimum:.15g}, Max {mapping.maximum:.15g}')
 

@@ -362,6 +362,32 @@ def test_reply_goes_out_before_the_next_command() -> None:
     assert peer.wait(2.0)[0] == (1.0, peer.frame(OUR_REPLY))
 
 
+def test_replies_and_commands_go_out_in_turns() -> None:
+    peer = bench(max_outstanding=3)
+    ours = [later(COMMAND, number) for number in range(3)]
+    theirs = [later(THEIRS, number) for number in range(3)]
+    peer.begin(ours[0])
+    for packet in theirs:
+        assert peer.hear_packet(packet).endswith(ACK)
+    for packet in ours[1:]:
+        peer.begin(packet)
+    said = [peer.hear(ACK) for _ in range(6)]
+    assert said == [*map(peer.frame, (
+        theirs[0].reply(), ours[1], theirs[1].reply(), ours[2], theirs[2].reply())), b'']
+
+
+def test_other_end_that_never_stops_asking_does_not_keep_us_from_asking() -> None:
+    peer = bench()
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+    errand = peer.begin(COMMAND)
+    said = b''
+    for number in range(1, 5):
+        assert peer.hear_packet(later(THEIRS, number)) == ACK
+        said += peer.hear(ACK)
+    assert peer.frame(COMMAND) in said
+    assert errand.sent
+
+
 def test_timers_run_from_the_last_byte() -> None:
     peer = bench(timing=LineTiming(char_time=0.01))
     peer.begin(COMMAND)
@@ -496,6 +522,12 @@ def test_bytes_that_are_no_message_are_no_old_ack(begin: bytes) -> None:
     answer = peer.hear(ENQ)
     if not has_response and begin[-1] != 0x10:
         assert ACK not in before + answer
+
+
+def test_noise_before_a_message_does_not_spoil_its_ack() -> None:
+    peer = bench()
+    assert peer.hear(b'\0\xFF\x10\x10' + UNKNOWN + peer.frame(REPLY)) == ACK
+    assert peer.hear(ENQ) == ACK
 
 
 def test_response_between_message_and_enq_changes_nothing() -> None:

@@ -22,7 +22,7 @@ import random
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.driver import DriverSettings
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Freshness, Outcome
@@ -296,7 +296,7 @@ def test_failed_after_some_packets_of_a_long_write() -> None:
     bench.write(mapping, [1] * 250)
     bench.run(2.0)
     result, = write_results(bench)
-    assert result.startswith('not written: the PLC refused it: STS F0 EXT STS 07')
+    assert result.startswith('only partly written: STS F0 EXT STS 07')
     assert result.endswith('(after 1 of 3 packets were written)')
 
 
@@ -558,6 +558,20 @@ def test_inactive_station_costs_the_others_little() -> None:
     assert rate > 0.85 * best
     assert all(bench.driver.points[mapping].error ==
                '2509 ERR_INACTIVE_STATION: Slave Station (2) Inactive' for mapping in dead)
+
+
+def test_all_points_of_a_station_fail_as_soon_as_it_is_inactive() -> None:
+    living = make_mapping('N7:0', station=1)
+    dead = [make_mapping(f'N{file}:0', station=2) for file in (7, 9, 10)]
+    bench, _ = make_bench(living, *dead)
+    plc = bench.plc(2, 'PLC5', ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
+    bench.open()
+    bench.run(1.0)
+    plc.faults.silent = True
+    bench.run_until(lambda: bool(bench.listener.changes))
+    assert all(bench.driver.points[mapping].freshness(bench.clock()) is Freshness.FAILED
+               for mapping in dead)
+    assert bench.driver.points[living].error is None
 
 
 def test_station_that_comes_back_is_read_again_whole() -> None:

@@ -242,6 +242,13 @@ def test_mapping_that_fills_a_packet_is_one_request_and_one_longer_two(
         ('N7:0', limit), (f'N7:{limit}', 1)]
 
 
+@pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 118)])
+def test_packet_is_filled_to_its_last_word_and_no_further(plc: str, limit: int) -> None:
+    first = make_mapping('N7:0', plc=plc, length=60)
+    assert len(plan(first, make_mapping('N7:60', plc=plc, length=limit - 60))) == 1
+    assert len(plan(first, make_mapping('N7:60', plc=plc, length=limit - 59))) == 2
+
+
 def test_mapping_is_never_torn_when_neighbours_overlap_the_limit() -> None:
     blocks = plan(make_mapping('N7:0', length=60), make_mapping('N7:50', length=60),
                   make_mapping('N7:100', length=60))

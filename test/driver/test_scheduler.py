@@ -366,6 +366,23 @@ def test_coverage_of_a_write_is_by_words() -> None:
         assert job.covers(Write(mapping, [0] * length, 0.0)) is covered, text
 
 
+def test_reads_of_a_busy_station_are_passed_over_and_stay_due() -> None:
+    one, other = make_job(station=1), make_job(station=2)
+    bench = Bench(one, other)
+    assert bench.scheduler.next_read(0.0, busy={1}) is other
+    assert bench.scheduler.next_read(0.0, busy={1}) is None
+    assert bench.scheduler.next_read(0.0) is one
+
+
+def test_writes_to_a_busy_station_wait_and_the_others_go() -> None:
+    bench = Bench()
+    first = bench.write(WORD, 1, 0.0)
+    second = bench.write(make_mapping('N7:5', 'Write', station=2), 1, 0.0)
+    assert bench.scheduler.next_write(0.0, busy={1}) is second
+    assert bench.scheduler.next_write(0.0, busy={1}) is None
+    assert bench.scheduler.next_write(0.0) is first
+
+
 def test_parts_replace_a_job() -> None:
     whole, left, right = make_job(), make_job('N7:1'), make_job('N7:2')
     bench = Bench(whole)
@@ -407,9 +424,9 @@ class AnyOrder(RuleBasedStateMachine):
     def time_passes(self, seconds: float) -> None:
         self.now += seconds
 
-    @rule()
-    def take_read(self) -> None:
-        job = self.bench.scheduler.next_read(self.now)
+    @rule(busy=st.frozensets(st.integers(1, 2)))
+    def take_read(self, busy: frozenset[int]) -> None:
+        job = self.bench.scheduler.next_read(self.now, busy)
         if job is not None:
             assert job not in self.taken
             self.taken.append(job)

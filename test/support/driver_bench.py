@@ -24,7 +24,8 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.slave import Station as LineStation
 from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, WriteResult

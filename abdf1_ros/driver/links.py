@@ -1,0 +1,96 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The link of each mode: which procedure of the link layer runs, with which settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.master_line import MasterSettings
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.df1.slave_link import SlaveLink
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.network import Network
+from abdf1_ros.messages import Event
+
+Link = HalfDuplexMaster | StandardPollingMaster | FullDuplexPeer | SlaveLink
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSettings:
+    """
+    What is not in the net CSV; times in seconds.
+
+    ``stale_after`` counts periods. ``max_outstanding`` commands may wait for their reply at a
+    time in full duplex. ``polling`` is for standard polling, None for one list of all mapped
+    stations. ``first_tns`` is the transaction number to begin with, which should be random, or
+    a restarted driver repeats itself and is taken for a duplicate. All else is explained with
+    the settings of masters and slaves in ``df1``.
+    """
+
+    default_period: float = 0.1
+    stale_after: float = 3.0
+    write_timeout: float = 2.0
+    read_only: bool = False
+    nak_on_command_timeout: bool = True
+    max_outstanding: int = 1
+    accept_slave_messages: bool = True
+    polling: PollingSettings | None = None
+    eot_suppression: bool = False
+    duplicate_detection: bool = True
+    poll_timeout: float = 60.0
+    first_tns: int = 0
+
+
+def make_link(network: Network, settings: DriverSettings, machine: Machine,
+              stations: ActiveStationList, serve: Callable[[Packet], Packet],
+              report: Callable[[Event], None]) -> Link:
+    """Return the link for the Mode (and Polling) of a net CSV."""
+    timeout, cmd_timeout = network.timeout / 1000, network.cmd_timeout / 1000
+    if network.mode == 'Peer':
+        peer_settings = PeerSettings(
+            network.checksum, network.nak_retries, network.enq_retries, timeout, cmd_timeout,
+            settings.max_outstanding)
+        return FullDuplexPeer(machine, peer_settings, stations, serve, report)
+    if network.mode == 'Slave':
+        slave_settings = SlaveSettings(
+            network.station, network.checksum, network.nak_retries,
+            eot_suppression=settings.eot_suppression,
+            duplicate_detection=settings.duplicate_detection)
+        return SlaveLink(machine, slave_settings, stations, serve, cmd_timeout=cmd_timeout,
+                         poll_timeout=settings.poll_timeout, report=report)
+    master_settings = MasterSettings(
+        network.station, network.checksum, network.nak_retries, network.enq_retries, timeout,
+        cmd_timeout, settings.nak_on_command_timeout,
+        accept_slave_messages=settings.accept_slave_messages)
+    if network.polling == 'Standard':
+        return StandardPollingMaster(
+            machine, master_settings, _polling(settings, stations), stations, report, serve)
+    return HalfDuplexMaster(machine, master_settings, stations, report, serve)
+
+
+def _polling(settings: DriverSettings, stations: ActiveStationList) -> PollingSettings:
+    """Return the poll lists, with every mapped station in one: no other reply would come."""
+    polling = settings.polling or PollingSettings(())
+    listed = {*polling.priority, *polling.normal}
+    mapped = (station.number for station in stations)
+    return replace(polling, normal=(
+        *polling.normal, *(number for number in mapped if number not in listed)))

@@ -1,0 +1,169 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A line for benchmarks: two pseudo-terminals, paced as a port of that speed would be.
+
+Between them a thread for each direction hands on every byte at the moment it would have left
+the port (10 bits a character). ``measure`` runs the driver at one end against simulated
+stations at the other, and counts what it does in a time.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+import math
+import os
+from pathlib import Path
+import select
+import sys
+import threading
+import time
+import tty
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+
+from abdf1_ros.df1.machine import Machine  # noqa: E402
+from abdf1_ros.df1.slave import multidrop  # noqa: E402
+from abdf1_ros.df1.stations import Station  # noqa: E402
+from abdf1_ros.driver.driver import Driver, DriverSettings  # noqa: E402
+from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.driver.network import Network  # noqa: E402
+from abdf1_ros.driver.points import WriteResult  # noqa: E402
+from abdf1_ros.driver.values import Values, ValueType  # noqa: E402
+from abdf1_ros.messages import Event, Severity  # noqa: E402
+from abdf1_ros.pccc.address import Address  # noqa: E402
+from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
+from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
+from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
+
+BITS = 10
+WORDS = 10
+
+
+class Wire(threading.Thread):
+    """One direction of the line: hands on bytes at the speed of a port."""
+
+    def __init__(self, source: int, target: int, char_time: float) -> None:
+        super().__init__(daemon=True)
+        self._source, self._target, self._char_time = source, target, char_time
+        self.stopping = False
+
+    def run(self) -> None:
+        """Hand on bytes, each when it has left."""
+        free = time.monotonic()
+        while not self.stopping:
+            if not select.select([self._source], [], [], 0.1)[0]:
+                continue
+            data = os.read(self._source, 4096)
+            free = max(free, time.monotonic())
+            for byte in data:
+                free += self._char_time
+                time.sleep(max(0.0, free - time.monotonic()))
+                os.write(self._target, bytes((byte,)))
+
+
+class Listener:
+    """Counts what should not happen."""
+
+    def __init__(self) -> None:
+        self.troubles = 0
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take values."""
+
+    def written(self, result: WriteResult) -> None:
+        """Take the result of a write."""
+
+    def happened(self, event: Event) -> None:
+        """Count errors and retries."""
+        self.troubles += event.message.severity is Severity.ERROR or event.message.number in (
+            2519, 2520, 2521, 2522)
+
+    def station_changed(self, station: Station) -> None:
+        """Count a lost station."""
+        self.troubles += not station.active
+
+
+def block_of(station: int) -> Mapping:
+    """Return the row that reads ten words of a station, as often as the line allows."""
+    return Mapping(
+        station, station, f's{station}', f's{station}', Command.READ,
+        Address.parse('N7:0', PlcType.SLC), station, PlcType.SLC, WORDS, ValueType.INT16,
+        f's{station}', 0)
+
+
+def simulated(station: int, network: Network, delay: float = 0.0) -> SimulatedPlc:
+    """Return a PLC whose replies are ready ``delay`` s after the command."""
+    table = DataTable(PlcType.SLC)
+    table.create(Address.parse('N7:0', PlcType.SLC), WORDS)
+    plc = SimulatedPlc(station, table, network.checksum, time.monotonic)
+    plc.faults.delay = delay
+    return plc
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a run has shown: per second, in seconds, and counts."""
+
+    transactions: float
+    scan_time: float
+    slowest_scan: float
+    troubles: int
+    polls: float
+
+
+def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedPlc],
+            settle: float, seconds: float) -> Measured:
+    """Run a master with ``mappings`` against ``stations``; the time to settle does not count."""
+    listener = Listener()
+    driver = Driver(network, mappings, DriverSettings(), listener)
+    far = Machine(multidrop(stations), checksum=network.checksum)
+    with ExitStack() as stack:
+        pairs = [os.openpty(), os.openpty()]
+        for pair in pairs:
+            tty.setraw(pair[1])
+            for descriptor in pair:
+                stack.callback(os.close, descriptor)
+
+        def open_port(side: int) -> DescriptorPort:
+            descriptor = os.dup(pairs[side][1])
+            return DescriptorPort(descriptor, lambda: os.close(descriptor))
+
+        wires = [Wire(pairs[0][0], pairs[1][0], BITS / network.baud),
+                 Wire(pairs[1][0], pairs[0][0], BITS / network.baud)]
+        links = [LinkThread(far, lambda: open_port(1)),
+                 LinkThread(driver.machine, lambda: open_port(0))]
+        for thread in [*wires, *links]:
+            thread.start()
+        time.sleep(settle)
+        troubles = listener.troubles
+        began, before, polls = time.monotonic(), driver.transactions, driver.counters.polls_sent
+        scans: list[float] = []
+        while time.monotonic() - began < seconds:
+            time.sleep(0.05)
+            if (scan := driver.scan_time) is not None:
+                scans.append(scan)
+        passed = time.monotonic() - began
+        done, polled = driver.transactions - before, driver.counters.polls_sent - polls
+        for link in links:
+            link.stop()
+        for wire in wires:
+            wire.stopping = True
+            wire.join()
+    mean = sum(scans) / len(scans) if scans else math.nan
+    return Measured(done / passed, mean, max(scans, default=math.nan),
+                    listener.troubles - troubles, polled / passed)

@@ -1,0 +1,234 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Measure what more than one outstanding command brings on a full-duplex line.
+
+Method. Two pseudo-terminals, and between them a thread for each direction that hands on every
+byte at the moment it would have left a port of --baud (10 bits a character). At one end the
+simulator's peer with a PLC-5 table: responses (ACK) go out at once, each reply --think ms
+after it was ready, one after the other, as a PLC that serves its port once in a program scan.
+At the other end the driver in Mode Peer, with a map of ten blocks of ten words in ten files
+that are all read as often as the line allows. For each setting of max_outstanding the driver
+runs --seconds; the first second does not count. "scan time" is how long the slowest block
+waited between its last two reads, averaged over ten looks a second; "troubles" counts errors
+and retries, of which there should be none.
+
+Run it as "python test/benchmarks/peer_outstanding.py"; it needs nothing but the package.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import deque
+from contextlib import ExitStack
+import math
+import os
+from pathlib import Path
+import select
+import sys
+import threading
+import time
+import tty
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+
+from abdf1_ros.df1.frames import Duplex, STX  # noqa: E402
+from abdf1_ros.df1.machine import LineTiming, Machine  # noqa: E402
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings  # noqa: E402
+from abdf1_ros.df1.stations import ActiveStationList, Station  # noqa: E402
+from abdf1_ros.driver.driver import Driver  # noqa: E402
+from abdf1_ros.driver.links import DriverSettings  # noqa: E402
+from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.driver.network import BAUD_RATES, Network  # noqa: E402
+from abdf1_ros.driver.points import WriteResult  # noqa: E402
+from abdf1_ros.driver.values import Values, ValueType  # noqa: E402
+from abdf1_ros.messages import Event, Severity  # noqa: E402
+from abdf1_ros.pccc.address import Address  # noqa: E402
+from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
+from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
+from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
+
+BITS = 10
+BLOCKS = range(20, 30)  # file numbers
+WORDS = 10
+
+
+class Wire(threading.Thread):
+    """One direction of the line: hands on bytes at the speed of a port."""
+
+    def __init__(self, source: int, target: int, char_time: float) -> None:
+        super().__init__(daemon=True)
+        self._source, self._target, self._char_time = source, target, char_time
+        self.stopping = False
+
+    def run(self) -> None:
+        """Hand on bytes, each when it has left."""
+        free = time.monotonic()
+        while not self.stopping:
+            if not select.select([self._source], [], [], 0.1)[0]:
+                continue
+            data = os.read(self._source, 4096)
+            free = max(free, time.monotonic())
+            for byte in data:
+                free += self._char_time
+                time.sleep(max(0.0, free - time.monotonic()))
+                os.write(self._target, bytes((byte,)))
+
+
+class ThinkingPort:
+    """A port on which messages leave later than responses."""
+
+    def __init__(self, port: DescriptorPort, think: float) -> None:
+        self._port = port
+        self._think = think
+        self._waiting: deque[bytes] = deque()
+        self._news = threading.Condition()
+        self._closed = False
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes."""
+        return self._port.read(timeout, wake)
+
+    def write(self, data: bytes) -> None:
+        """Send the responses, and put the message behind them aside."""
+        start = data.find(STX)
+        start = len(data) if start < 0 or not self._think else start
+        if start:
+            self._port.write(data[:start])
+        if data[start:]:
+            with self._news:
+                self._waiting.append(data[start:])
+                self._news.notify()
+
+    def _run(self) -> None:
+        while not self._closed:
+            with self._news:
+                self._news.wait_for(lambda: bool(self._waiting) or self._closed)
+            time.sleep(self._think)
+            with self._news:
+                if self._closed:
+                    return
+                self._port.write(self._waiting.popleft())
+
+    def close(self) -> None:
+        """Close the port."""
+        with self._news:
+            self._closed = True
+            self._news.notify()
+        self._port.close()
+
+
+class Listener:
+    """Counts what should not happen."""
+
+    def __init__(self) -> None:
+        self.troubles = 0
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take values."""
+
+    def written(self, result: WriteResult) -> None:
+        """Take the result of a write."""
+
+    def happened(self, event: Event) -> None:
+        """Count errors and retries."""
+        self.troubles += event.message.severity is Severity.ERROR or event.message.number in (
+            2519, 2520, 2521, 2522)
+
+    def station_changed(self, station: Station) -> None:
+        """Count a lost station."""
+        self.troubles += not station.active
+
+
+def mappings() -> list[Mapping]:
+    """Return ten rows that no command can read together."""
+    return [Mapping(
+        number, number, f'n{number}', f'n{number}', Command.READ,
+        Address.parse(f'N{number}:0', PlcType.PLC5), 1, PlcType.PLC5, WORDS, ValueType.INT16,
+        f'n{number}', 0) for number in BLOCKS]
+
+
+def measure(outstanding: int, baud: int, think: float,
+            seconds: float) -> tuple[float, float, int, float]:
+    """Return transactions per second, scan time, troubles, and line time of a transaction."""
+    network = Network(mode='Peer', baud=baud)
+    table = DataTable(PlcType.PLC5)
+    for mapping in mappings():
+        table.create(mapping.address, WORDS)
+    plc = SimulatedPlc(1, table, network.checksum, time.monotonic)
+    listener = Listener()
+    driver = Driver(network, mappings(), DriverSettings(max_outstanding=outstanding), listener)
+    far = Machine(
+        lambda machine: FullDuplexPeer(
+            machine, PeerSettings(network.checksum), ActiveStationList(), plc.serve).run(plc),
+        checksum=network.checksum, duplex=Duplex.FULL, timing=LineTiming(BITS / baud))
+    with ExitStack() as stack:
+        pairs = [os.openpty(), os.openpty()]
+        for pair in pairs:
+            tty.setraw(pair[1])
+            for descriptor in pair:
+                stack.callback(os.close, descriptor)
+
+        def open_port(side: int) -> DescriptorPort:
+            descriptor = os.dup(pairs[side][1])
+            return DescriptorPort(descriptor, lambda: os.close(descriptor))
+
+        wires = [Wire(pairs[0][0], pairs[1][0], BITS / baud),
+                 Wire(pairs[1][0], pairs[0][0], BITS / baud)]
+        links = [LinkThread(driver.machine, lambda: open_port(0)),
+                 LinkThread(far, lambda: ThinkingPort(open_port(1), think))]
+        for thread in [*wires, *links]:
+            thread.start()
+        time.sleep(1.0)
+        began, before, scans = time.monotonic(), driver.transactions, []
+        while time.monotonic() - began < seconds:
+            time.sleep(0.1)
+            scans.append(driver.scan_time or math.nan)
+        passed, done = time.monotonic() - began, driver.transactions - before
+        for link in links:
+            link.stop()
+        for wire in wires:
+            wire.stopping = True
+            wire.join()
+    line_time = driver.blocks[0].line_time
+    return done / passed, sum(scans) / len(scans), listener.troubles, line_time
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--baud', type=int, choices=BAUD_RATES, default=19200)
+    parser.add_argument('--think', type=float, default=20.0, metavar='MS')
+    parser.add_argument('--seconds', type=float, default=10.0)
+    parser.add_argument('--outstanding', type=int, nargs='+', default=[1, 2, 3])
+    options = parser.parse_args()
+    print(f'{len(BLOCKS)} blocks of {WORDS} words, {options.baud} baud, '
+          f'{options.think:g} ms of thinking per command, {options.seconds:g} s each')
+    print('outstanding  transactions/s  scan time   ratio  troubles')
+    first = math.nan
+    for outstanding in options.outstanding:
+        rate, scan, troubles, line_time = measure(
+            outstanding, options.baud, options.think / 1000, options.seconds)
+        first = rate if math.isnan(first) else first
+        print(f'{outstanding:11d}  {rate:14.1f}  {1000 * scan:6.0f} ms  {rate / first:6.2f}'
+              f'  {troubles:8d}', flush=True)
+    print(f'characters of one transaction take {1000 * line_time:.1f} ms in both directions')
+
+
+if __name__ == '__main__':
+    main()

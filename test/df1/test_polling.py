@@ -1,0 +1,512 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Standard polling, rule by rule (1766-RM001 and the manuals of the PLC-5 and Logix masters)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings, StandardPollingMaster
+from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
+from hypothesis import given, strategies
+import pytest
+from support.multidrop import MasterBench
+from support.peers import Errand
+from support.properties import PROPERTY
+
+SETTINGS = MasterSettings(
+    station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
+
+
+def bench(polling: PollingSettings, *, dead: tuple[int, ...] = (),
+          settings: MasterSettings = SETTINGS, **options: Any) -> MasterBench:
+    """Return a master and the stations of its lists."""
+    numbers = sorted({*polling.priority, *polling.normal} - {settings.station})
+    return MasterBench(*numbers, settings=settings, polling=polling, dead=dead, **options)
+
+
+def ended(errand: Errand) -> bool:
+    """Tell whether a command has its end."""
+    return errand.result is not None
+
+
+def polls(rig: MasterBench, count: int) -> list[int]:
+    """Let the master poll so often; return whom."""
+    machine = rig.master.machine
+
+    def polled() -> list[int]:
+        return [int(text[1:]) for _, text in machine.log if text[0] == 'P']
+
+    rig.line.run(lambda: len(polled()) >= count, 60.0)
+    return polled()[:count]
+
+
+def test_all_active_stations_are_polled_in_the_order_of_the_list() -> None:
+    rig = bench(PollingSettings((3, 1, 2)))
+    rig.start()
+    assert polls(rig, 9) == [3, 1, 2] * 3
+    assert rig.master.said.startswith('P3 P1 P2 P3')
+
+
+def test_priority_list_comes_first_in_every_scan() -> None:
+    rig = bench(PollingSettings((1, 2, 3), priority=(9, 8)))
+    rig.start()
+    assert polls(rig, 10) == [9, 8, 1, 2, 3] * 2
+
+
+@pytest.mark.parametrize(('size', 'expected'), [
+    (1, [9, 1, 9, 2, 9, 3, 9, 4, 9, 1]), (2, [9, 1, 2, 9, 3, 4, 9, 1, 2]),
+    (3, [9, 1, 2, 3, 9, 4, 9, 1, 2, 3]), (0, [9, 1, 2, 3, 4, 9, 1]),
+    (200, [9, 1, 2, 3, 4, 9, 1])])
+def test_group_goes_on_where_it_stopped(size: int, expected: list[int]) -> None:
+    rig = bench(PollingSettings((1, 2, 3, 4), priority=(9,), group_size=size))
+    rig.start()
+    assert polls(rig, len(expected)) == expected
+
+
+def test_group_counts_active_stations_only() -> None:
+    rig = bench(PollingSettings((1, 2, 3, 4), priority=(9,), group_size=2), dead=(1, 3))
+    rig.start(1, 3)
+    rig.master.link._next_inactive_poll = 1e9  # type: ignore[union-attr]
+    assert polls(rig, 6) == [9, 2, 4, 9, 2, 4]
+
+
+def test_one_inactive_station_of_each_list_in_a_scan() -> None:
+    rig = bench(PollingSettings((1, 2, 3), priority=(9, 8, 7)))
+    rig.start(1, 2, 3, 8, 7)
+    # Those that answer are active from then on, and answers cost next to nothing of the time.
+    assert polls(rig, 4) == [9, 8, 1, 9]
+    polls(rig, 100)
+    assert rig.master.changes == [(8, True), (1, True), (7, True), (2, True), (3, True)]
+    rig.forget()
+    assert polls(rig, 12)[:6] in [[*cycle] for cycle in (
+        [9, 8, 7, 1, 2, 3], [8, 7, 1, 2, 3, 9], [7, 1, 2, 3, 9, 8], [1, 2, 3, 9, 8, 7],
+        [2, 3, 9, 8, 7, 1], [3, 9, 8, 7, 1, 2])]
+
+
+def test_inactive_normal_station_is_polled_when_all_active_ones_had_their_turn() -> None:
+    rig = bench(PollingSettings((1, 2, 3), priority=(9,), group_size=1), dead=(3,))
+    rig.start(3)
+    assert polls(rig, 6) == [9, 1, 9, 2, 9, 3]
+
+
+def test_nobody_lives_and_each_list_has_its_turn() -> None:
+    rig = bench(PollingSettings((1, 2, 3), priority=(9, 8)), dead=(1, 2, 3, 8, 9))
+    rig.start(1, 2, 3, 8, 9)
+    assert polls(rig, 10) == [9, 1, 8, 2, 9, 3, 8, 1, 9, 2]
+    # One after the other without any pause: there is nobody to spare the time for.
+    times = [when for when, _ in rig.master.machine.log]
+    assert all(after - before < SETTINGS.timeout + 0.01 for before, after in pairwise(times))
+
+
+@pytest.mark.parametrize('priority', [(), (9,)])
+def test_inactive_stations_get_an_eighth_of_the_time_at_most(priority: tuple[int, ...]) -> None:
+    dead = (2, 3, 4)
+    rig = bench(PollingSettings((1, *dead), priority=priority), dead=(*dead, *priority))
+    rig.start(*dead, *priority)
+    rig.run(20.0)
+    wasted = sum(len(rig.master.times(f'P{number}')) for number in (*dead, *priority))
+    assert 0.1 <= wasted * SETTINGS.timeout / 20.0 <= 1 / 8 + 0.01
+    each = [len(rig.master.times(f'P{number}')) for number in dead]
+    assert max(each) - min(each) <= 1
+
+
+def test_dead_priority_station_does_not_keep_normal_ones_from_coming_back() -> None:
+    rig = bench(PollingSettings((1, 2), priority=(9, 8)), dead=(8,))
+    rig.start(1, 2, 8)
+    rig.run(20.0)
+    assert {(1, True), (2, True)} <= set(rig.master.changes)
+    assert rig.master.times('P8')
+
+
+def test_dead_normal_station_does_not_keep_a_priority_one_from_coming_back() -> None:
+    rig = bench(PollingSettings((1, 2), priority=(9,)), dead=(2,))
+    rig.start(2, 9)
+    rig.run(20.0)
+    assert rig.master.changes == [(9, True)]
+
+
+def test_two_kinds_of_dead_share_what_there_is() -> None:
+    rig = bench(PollingSettings((1, 2), priority=(9,)), dead=(2, 9))
+    rig.start(2, 9)
+    rig.run(30.0)
+    assert abs(len(rig.master.times('P2')) - len(rig.master.times('P9'))) <= 1
+
+
+@pytest.mark.parametrize(('multiple', 'expected'), [
+    (False, [1, 2, 1, 2, 1, 2, 1, 2]), (True, [1, 1, 1, 1, 2, 1, 2, 1])])
+def test_single_and_multiple_messages_per_scan(multiple: bool, expected: list[int]) -> None:
+    rig = bench(PollingSettings((1, 2), multiple=multiple))
+    for _ in range(3):
+        rig.message(1, 5)
+    rig.start()
+    assert polls(rig, 8) == expected
+    assert len(rig.master.served) == 3
+
+
+def test_commands_leave_between_polls_and_complete_in_the_order_of_the_list() -> None:
+    rig = bench(PollingSettings((1, 2, 3)))
+    order: list[int] = []
+    errands = [rig.ask(number) for number in (3, 2, 1)]
+    for errand in errands:
+        reply = errand.reply
+        errand.reply = lambda packet, reply=reply: (  # type: ignore[method-assign]
+            order.append(packet.src), reply(packet))[1]
+    rig.start()
+    rig.run(0.2)
+    assert rig.master.said.startswith('C3 C2 C1 P1 P2 P3 P1')
+    assert order == [1, 2, 3]
+    assert [errand.result for errand in errands] == [
+        errand.command.reply() for errand in errands]
+    assert rig.master.numbers() == [(2523, 1), (2523, 2), (2523, 3)]
+
+
+def test_command_that_comes_in_the_middle_of_a_scan_leaves_before_the_next_poll() -> None:
+    rig = bench(PollingSettings((1, 2, 3)))
+    rig.start()
+    polls(rig, 2)
+    errand = rig.ask(1)
+    rig.line.run(lambda: ended(errand), 1.0)
+    assert rig.master.said == 'P1 P2 C1 P3 P1'
+
+
+def test_at_most_four_commands_between_two_polls() -> None:
+    rig = bench(PollingSettings(tuple(range(10, 20))))
+    errands = [rig.ask(number) for number in range(10, 20)]
+    rig.start()
+    rig.line.run(lambda: all(map(ended, errands)), 5.0)
+    assert COMMANDS_BETWEEN_POLLS == 4
+    assert rig.master.said.startswith(
+        'C10 C11 C12 C13 P10 C14 C15 C16 C17 P11 C18 C19 P12 P13')
+
+
+def test_never_two_commands_at_one_station() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    first, second, other = rig.ask(1), rig.ask(1), rig.ask(2)
+    rig.start()
+    rig.line.run(lambda: ended(second), 1.0)
+    assert rig.master.said == 'C1 C2 P1 C1 P2 P1'
+    assert ended(first) and ended(other)
+
+
+def test_thinking_times_of_stations_run_side_by_side() -> None:
+    rig = bench(PollingSettings(tuple(range(10, 20))))
+    for slave in rig.slaves.values():
+        slave.delay = 0.3
+    errands = [rig.ask(number) for number in rig.slaves]
+    rig.start()
+    rig.line.run(lambda: all(map(ended, errands)), 5.0)
+    assert rig.clock() < 0.3 + 0.35
+
+
+@pytest.mark.parametrize(('normal', 'expected'), [
+    ((1, 5, 2), 'P1 C1 C2 P2 P1 P2'), ((5, 1, 2), 'C1 C2 P1 P2'), ((1, 2), 'P1 P2 C1 C2 P1 P2')])
+def test_in_sequence_commands_leave_at_our_own_place(normal: tuple[int, ...],
+                                                     expected: str) -> None:
+    rig = bench(PollingSettings(normal, in_sequence=True))
+    errands = [rig.ask(1), rig.ask(2)]
+    rig.start()
+    rig.line.run(lambda: all(map(ended, errands)), 1.0)
+    assert rig.master.said == expected
+
+
+def test_our_own_place_may_be_in_the_priority_list() -> None:
+    rig = bench(PollingSettings((1, 2), priority=(5,), in_sequence=True))
+    errand = rig.ask(2)
+    rig.start()
+    rig.line.run(lambda: ended(errand), 1.0)
+    assert rig.master.said == 'C2 P1 P2'
+
+
+def test_our_own_place_is_no_station_of_the_line() -> None:
+    rig = bench(PollingSettings((1, 5), priority=(5,)), dead=(1,))
+    rig.start(1)
+    rig.run(2.0)
+    assert [station.number for station in rig.master.stations] == [1]
+    assert rig.master.stations.words() == [0] * 16
+    # It is not among the living either, for whom the dead would have to wait.
+    assert len(rig.master.times('P1')) > 15
+    assert not rig.master.times('P5')
+
+
+def test_dead_station_becomes_inactive_after_its_retries_and_its_command_fails() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    rig[1].deaf = False
+    errand = rig.ask(1)
+    rig.start()
+    rig.line.run(lambda: 'C1 P1' in rig.master.said or bool(rig[1].served), 1.0)
+    rig[1].silent = True
+    rig.line.run(lambda: ended(errand), 5.0)
+    assert isinstance(errand.result, StationInactive)
+    assert errand.sent
+    assert rig.master.changes == [(1, False)]
+    assert rig.master.said == 'C1 P1 P1 P1'
+    assert rig.master.counts()['enq_retries'] == SETTINGS.enq_retries
+    assert rig.master.counts()['enq_limit_exceeded'] == 1
+    assert [entry for entry in rig.master.numbers() if entry[0] in (2520, 2509)] == [
+        (2520, 2), (2509, 1)]
+
+
+def test_station_that_does_not_take_its_command_becomes_inactive() -> None:
+    rig = bench(PollingSettings((1, 2)), dead=(1,))
+    errand = rig.ask(1)
+    rig.start()
+    rig.line.run(lambda: ended(errand), 5.0)
+    assert isinstance(errand.result, StationInactive)
+    assert rig.master.said == 'C1 C1'
+    assert rig.master.counts()['nak_retries'] == 1
+    rig.forget()
+    assert polls(rig, 2) == [2, 1]
+
+
+def test_command_to_an_inactive_station_fails_at_once_and_was_never_sent() -> None:
+    rig = bench(PollingSettings((1, 2)), dead=(1,))
+    rig.start(1)
+    polls(rig, 2)
+    rig.forget()
+    errand = rig.ask(1)
+    polls(rig, 1)
+    assert isinstance(errand.result, StationInactive)
+    assert not errand.sent
+    assert 'C1' not in rig.master.said
+
+
+@pytest.mark.parametrize('answer', ['EOT', 'message'])
+def test_any_answer_makes_a_station_active(answer: str) -> None:
+    rig = bench(PollingSettings((1, 2)))
+    if answer == 'message':
+        rig.message(1, 5)
+    rig.start(1)
+    polls(rig, 3)
+    assert rig.master.changes == [(1, True)]
+    assert len(rig.master.served) == (answer == 'message')
+    errand = rig.ask(1)
+    rig.line.run(lambda: ended(errand), 1.0)
+    assert isinstance(errand.result, Packet)
+
+
+def test_inactive_station_gets_no_second_poll_and_no_retry_counts() -> None:
+    rig = bench(PollingSettings((1, 2)), dead=(1,))
+    rig.start(1)
+    rig.run(0.5)
+    assert len(rig.master.times('P1')) == 1
+    assert not {'enq_retries', 'enq_limit_exceeded'} & set(rig.master.counts())
+    assert rig.master.numbers() == []
+
+
+def test_command_timeout_is_noticed_at_the_stations_own_poll() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    rig[1].delay = 1.0
+    errand = rig.ask(1)
+    rig.start()
+    rig.line.run(lambda: ended(errand), 2.0)
+    assert isinstance(errand.result, CommandTimeout)
+    assert SETTINGS.cmd_timeout <= errand.seconds < SETTINGS.cmd_timeout + 0.05
+    assert rig.master.counts()['command_timeouts'] == 1
+    assert rig.master.numbers() == [(2508,)]
+    assert rig.master.stations[1].active
+    assert 'NAK' not in rig.master.said
+
+
+def test_reply_that_comes_after_its_time_is_stale() -> None:
+    rig = bench(PollingSettings((1,)))
+    rig[1].delay = 0.7
+    errand = rig.ask(1)
+    rig.start()
+    rig.run(1.0)
+    assert isinstance(errand.result, CommandTimeout)
+    assert rig.master.counts()['stale_messages'] == 1
+    assert rig.master.numbers() == [(2508,), (2510, 1, 5, errand.command.tns)]
+
+
+def test_next_command_may_leave_after_a_timeout() -> None:
+    rig = bench(PollingSettings((1,)))
+    rig[1].delay = 0.7
+    rig.ask(1)
+    rig.start()
+    rig.run(0.6)
+    rig[1].delay = 0.0
+    errand = rig.ask(1)
+    rig.run(0.5)
+    assert errand.result == errand.command.reply()
+
+
+def test_nak_is_never_sent_whatever_the_setting() -> None:
+    rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, nak_on_command_timeout=True))
+    rig[1].delay = 9.0
+    rig.start()
+    for _ in range(4):
+        rig.ask(1)
+    rig.run(5.0)
+    assert rig.master.counts()['command_timeouts'] == 4
+    assert 'naks_sent' not in rig.master.counts()
+
+
+def test_reply_with_a_wrong_command_code() -> None:
+    rig = bench(PollingSettings((1,)))
+    rig[1].slave._serve = lambda command: replace(command.reply(), cmd=0x46)
+    errand = rig.ask(1)
+    rig.start()
+    rig.run(0.2)
+    assert isinstance(errand.result, WrongCommandCode)
+    assert rig.master.numbers() == [(2505, 1, 0x46, 0x4F)]
+    assert rig.master.counts()['invalid_messages'] == 1
+
+
+def test_broadcast_goes_once_and_nobody_is_polled_for_it() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    errand = rig.ask(BROADCAST)
+    rig.start()
+    rig.run(0.2)
+    log = rig.master.machine.log
+    assert [text for _, text in log[:2]] == ['C255', 'P1']
+    assert log[1][0] - log[0][0] >= BROADCAST_PAUSE
+    assert errand.result == errand.command.reply()
+    assert errand.sent
+    assert [len(slave.served) for slave in rig.slaves.values()] == [1, 1]
+    assert rig.master.said.count('C255') == 1
+    assert [station.number for station in rig.master.stations] == [1, 2]
+
+
+@pytest.mark.parametrize('in_sequence', [True, False])
+def test_broadcast_without_any_station_to_poll(in_sequence: bool) -> None:
+    rig = bench(PollingSettings((), in_sequence=in_sequence))
+    rig.start()
+    rig.run(1.0)
+    assert rig.master.said == ''
+    errand = rig.ask(BROADCAST)
+    rig.run(0.2)
+    assert errand.result == errand.command.reply()
+    assert rig.master.said == 'C255'
+
+
+def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
+    rig = bench(PollingSettings((1,)), dead=(1,))
+    rig.start(1)
+    rig.master.stations.heard(77, 0.0)  # lives, but is in no list
+    rig.run(0.3)
+    errand = rig.ask(BROADCAST)
+    rig.run(0.2)
+    assert ended(errand)
+
+
+def test_scan_times() -> None:
+    rig = bench(PollingSettings((1, 2, 3), priority=(9,), group_size=1))
+    link = rig.master.link
+    assert isinstance(link, StandardPollingMaster)
+    rig.start()
+    assert (link.normal_scan.last, link.priority_scan.last) == (None, None)
+    rig.run(1.0)
+    priority, normal = link.priority_scan, link.normal_scan
+    assert priority.last == priority.longest == pytest.approx(12 * 10 / 19200)
+    assert normal.last == normal.longest == pytest.approx(3 * 12 * 10 / 19200)
+    rig.ask(2)
+    rig.run(1.0)
+    assert priority.longest is not None and priority.last is not None
+    assert priority.longest > 1.5 * priority.last
+    assert normal.longest is not None and normal.last is not None
+    assert normal.longest > 1.2 * normal.last
+
+
+def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
+    rig = bench(PollingSettings((1,)))
+    link = rig.master.link
+    assert isinstance(link, StandardPollingMaster)
+    rig.start()
+    rig.run(1.0)
+    rig.master.machine.stop(PortLost('unplugged'))
+    rig.run(30.0)
+    rig.master.machine.start(rig.clock())
+    rig.line.wake(rig.master.machine)
+    rig.run(1.0)
+    assert link.normal_scan.longest is not None
+    assert link.normal_scan.longest < 1.0
+
+
+def test_line_without_a_speed_is_polled_no_faster_than_the_set_one() -> None:
+    rig = bench(PollingSettings((1, 2)), baud=19200)
+    rig.line.char_time = 0.0  # as TCP: what is written is there
+    rig.start()
+    rig.run(1.0)
+    assert 0.8 < rig.master.counts()['polls_sent'] * 6 * 10 / 19200 <= 1.01
+
+
+def test_start_is_a_clean_one() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    rig[1].delay = 0.2
+    rig.ask(1)
+    rig.start()
+    rig.run(0.1)
+    rig.master.machine.stop(PortLost('unplugged'))
+    rig.master.machine.start(rig.clock())
+    errand = rig.ask(1)
+    rig.run(0.5)
+    assert errand.result == errand.command.reply()
+    assert rig.master.counts()['stale_messages'] == 1
+
+
+def test_multiple_messages_stop_when_no_more_can_be_kept() -> None:
+    rig = bench(PollingSettings((1, 2), multiple=True))
+    for _ in range(40):
+        rig.message(1, 2)
+    rig.start()
+    rig.run(10.0)
+    assert rig[1].failed == []
+    assert len(rig[2].served) == len(rig[1].heard) == 40
+    assert all(reply.sts == 0 for reply in rig[1].heard)
+
+
+def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    rig[2].delay = 0.4
+    errand = rig.ask(2)
+    rig.start()
+    rig.run(0.1)
+    rig[2].deaf = True  # takes no more commands, and then dies
+    rig.message(1, 2)
+    rig.line.run(lambda: (2, False) in rig.master.changes, 5.0)
+    rig[2].silent = True
+    rig.run(1.0)
+    assert isinstance(errand.result, StationInactive)
+    assert [reply.sts for reply in rig[1].heard] == [2]
+
+
+@PROPERTY
+@given(strategies.lists(strategies.integers(1, 12), max_size=20),
+       strategies.frozensets(strategies.integers(1, 12), max_size=6),
+       strategies.integers(0, 5), strategies.booleans(), strategies.booleans())
+def test_every_command_ends_once_and_order_per_station_is_kept(
+        asked: list[int], dead: frozenset[int], group_size: int, multiple: bool,
+        in_sequence: bool) -> None:
+    polling = PollingSettings(
+        tuple(range(1, 9)), tuple(range(9, 13)), group_size, multiple, in_sequence)
+    rig = bench(polling, dead=tuple(dead))
+    errands = [rig.ask(number) for number in asked]
+    rig.start()
+    rig.line.run(lambda: all(map(ended, errands)), 60.0)
+    for errand in errands:
+        kind = StationInactive if errand.command.dst in dead else Packet
+        assert isinstance(errand.result, kind)
+    for number, slave in rig.slaves.items():
+        mine = [errand.command for errand in errands if errand.command.dst == number]
+        assert slave.served == ([] if number in dead else mine)
+    gap = 0
+    for _, text in rig.master.machine.log:
+        gap = 0 if text[0] == 'P' else gap + (text[0] == 'C')
+        assert gap <= COMMANDS_BETWEEN_POLLS * (1 + SETTINGS.nak_retries) * 2

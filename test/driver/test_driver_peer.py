@@ -1,0 +1,358 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver in Mode Peer: reads, writes and served words, in both directions at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from abdf1_ros.df1.frames import ACK, Code, Control, Duplex, Frame, FrameDecoder, message_frame
+from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import Freshness, Outcome
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.file_types import PlcType
+import pytest
+from support.driver_bench import Recorder, simulated_plc, store, stored
+from support.mappings import make_mapping
+from support.peers import Errand
+from support.virtual_line import Noise, QUIET, VirtualLine
+
+US, PLC = 5, 1
+FILES = (('N7:0', 256), ('F8:0', 64), ('B3:0', 16), ('N9:0', 20))
+
+
+class Bench:
+    """The driver at one end, a simulated PLC at the other."""
+
+    def __init__(self, mappings: Sequence[Mapping], *, family: str = 'PLC5', check: str = 'CRC',
+                 outstanding: int = 1, chunk: int = 1, first_tns: int = 0) -> None:
+        self.network = Network(mode='Peer', plc_type=family, error_code=check, baud=19200,
+                               timeout=300, cmd_timeout=500)
+        self.listener = Recorder(self.clock)
+        self.driver = Driver(
+            self.network, mappings,
+            DriverSettings(max_outstanding=outstanding, first_tns=first_tns), self.listener)
+        self.plc = simulated_plc(PLC, family, self.clock, *FILES, checksum=check)
+        self.far = Machine(self._far_end, checksum=self.network.checksum, duplex=Duplex.FULL)
+        self.line = VirtualLine(self.driver.machine, self.far, baud=19200, chunk=chunk)
+        self.said: list[str] = []
+        self._family = PlcType(family)
+        self._tns = 0x4000
+
+    def _far_end(self, machine: Machine) -> Procedure:
+        settings = PeerSettings(self.network.checksum)
+        return FullDuplexPeer(machine, settings, ActiveStationList(), self.plc.serve).run(self.plc)
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.line.now
+
+    def start(self) -> None:
+        """Connect both ends."""
+        self.line.start()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.line.run_for(seconds)
+
+    def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
+        """Ask for a write, as the node does."""
+        self.driver.write(mapping, values, self.line.now)
+        self.line.wake(self.driver.machine)
+
+    def message(self, text: str, *values: float) -> None:
+        """Let the PLC's own program write to us."""
+        self.plc.send(Address.parse(text, self._family), list(values), US, self.said.append)
+        self.line.wake(self.far)
+
+    def plc_reads(self, text: str, words: int) -> tuple[int, bytes]:
+        """Return STS and the words that the PLC's own program reads from us."""
+        dialect = DIALECTS[self._family]
+        place = Address.parse(text, self._family)
+        self._tns += 1
+        errand = Errand(Packet(
+            US, PLC, dialect.cmd, 0, self._tns, dialect.read(place, words)), self.clock)
+        self.plc.outbox.append(errand)  # type: ignore[arg-type]
+        self.line.wake(self.far)
+        self.line.run(lambda: errand.result is not None, 5.0)
+        reply = errand.result
+        assert isinstance(reply, Packet), reply
+        return reply.sts, dialect.read_data(place, words, reply.data) if not reply.sts else b''
+
+
+def serve_row(text: str, family: str = 'PLC5', length: int = 1, **other: object) -> Mapping:
+    """Return a Serve row."""
+    return make_mapping(text, 'Serve', station=US, plc=family, length=length,
+                        **other)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+@pytest.mark.parametrize(('outstanding', 'chunk'), [(1, 1), (3, 1), (2, 14)])
+def test_reads(family: str, check: str, outstanding: int, chunk: int) -> None:
+    integers = make_mapping('N7:0', plc=family, length=3)
+    floats = make_mapping('F8:2', plc=family, length=2)
+    bits = make_mapping('B3:1/4', plc=family, length=6)
+    long = make_mapping('N7:10', plc=family, length=200)
+    bench = Bench([integers, floats, bits, long], family=family, check=check,
+                  outstanding=outstanding, chunk=chunk)
+    store(bench.plc, 'N7:0', [0x1003, -2, 16])
+    store(bench.plc, 'F8:2', [1.5, -0.25])
+    store(bench.plc, 'B3:1/4', [1, 0, 0, 1, 1, 1])
+    store(bench.plc, 'N7:10', list(range(200)))
+    bench.start()
+    bench.run(3.0)
+    assert bench.listener.values(integers)[-1] == [0x1003, -2, 16]
+    assert bench.listener.values(floats)[-1] == [1.5, -0.25]
+    assert bench.listener.values(bits)[-1] == [1, 0, 0, 1, 1, 1]
+    assert {tuple(values) for values in bench.listener.values(long)} == {tuple(range(200))}
+    assert bench.listener.numbers() == {2523}
+    assert bench.listener.changes == []
+    counters = bench.driver.counters
+    assert counters.commands_sent - counters.replies_received in range(outstanding + 1)
+    assert bench.driver.transactions == counters.replies_received > 10
+
+
+@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('outstanding', [1, 3])
+def test_writes(family: str, outstanding: int) -> None:
+    words = make_mapping('N7:10', 'ReadWrite', plc=family, length=4)
+    floats = make_mapping('F8:0', 'Write', plc=family)
+    bits = make_mapping('B3:2/3', 'Write', plc=family, length=3)
+    bench = Bench([words, floats, bits], family=family, outstanding=outstanding)
+    store(bench.plc, 'B3:2', [0xFFFF])
+    bench.start()
+    bench.run(0.5)
+    bench.write(words, [1, -2, 16, 0x1010])
+    bench.write(floats, [2.5])
+    bench.write(bits, [0, 1, 0])
+    bench.run(1.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN] * 3
+    assert stored(bench.plc, 'N7:10', 4) == b'\1\0\xfe\xff\x10\0\x10\x10'
+    assert stored(bench.plc, 'F8:0', 2) == b'\0\0\x20\x40'
+    assert stored(bench.plc, 'B3:2') == b'\xd7\xff'
+    assert bench.listener.values(words)[-1] == [1, -2, 16, 0x1010]
+
+
+def test_write_that_the_plc_refuses() -> None:
+    mapping = make_mapping('N20:0', 'Write')
+    bench = Bench([mapping])
+    bench.start()
+    bench.write(mapping, [1])
+    bench.run(1.0)
+    assert bench.listener.outcomes() == [Outcome.FAILED]
+    assert bench.driver.counters.error_messages_received == 1
+
+
+@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
+    pushed = serve_row('N7:50', family, 4)
+    bits = serve_row('B3:5/0', family, 8)
+    bench = Bench([pushed, bits, make_mapping(plc=family)], family=family, check=check)
+    bench.start()
+    bench.run(1.0)
+    began = bench.clock()
+    bench.message('N7:50', 11, 22)
+    bench.run(0.5)
+    assert bench.listener.values(pushed) == [[11, 22, 0, 0]]
+    assert bench.listener.times(pushed)[0] - began < 0.1
+    assert bench.listener.values(bits) == []
+    bench.message('B3:5/2', 1)
+    bench.run(0.5)
+    assert bench.listener.values(bits) == [[0, 0, 1, 0, 0, 0, 0, 0]]
+    assert bench.said == ['confirmed', 'confirmed']
+    counters = bench.driver.counters
+    assert (counters.commands_received, counters.replies_sent) == (2, 2)
+    assert counters.error_messages_sent == counters.duplicate_messages == 0
+
+
+def test_message_to_what_is_not_served_is_refused() -> None:
+    pushed = serve_row('N7:50', length=4)
+    bench = Bench([pushed])
+    bench.start()
+    bench.message('N7:54', 1)
+    bench.message('N7:0', 1)
+    bench.message('N10:0', 1)
+    bench.run(1.0)
+    assert [text.partition(':')[0] for text in bench.said] == [
+        'STS F0 EXT STS 07', 'STS F0 EXT STS 07', 'STS F0 EXT STS 06']
+    assert bench.listener.reads == []
+    assert bench.driver.counters.error_messages_sent == 3
+
+
+@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+def test_what_ros_writes_is_read_by_the_plc(family: str) -> None:
+    words, bits = serve_row('N7:50', family, 4), serve_row('B3:5/4', family, 4)
+    bench = Bench([words, bits, make_mapping(plc=family)], family=family)
+    bench.start()
+    bench.run(0.3)
+    assert bench.plc_reads('N7:50', 4) == (0, bytes(8))
+    bench.write(words, [-1, 0x1010, 3, 4])
+    bench.write(bits, [1, 0, 1, 1])
+    bench.run(0.3)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.WRITTEN]
+    assert bench.plc_reads('N7:50', 4) == (0, b'\xff\xff\x10\x10\3\0\4\0')
+    assert bench.plc_reads('B3:5', 1) == (0, b'\xd0\0')
+    assert bench.listener.values(words) == []
+    assert bench.plc_reads('N7:54', 1)[0] != 0
+
+
+def test_values_for_served_words_are_checked() -> None:
+    mapping = serve_row('N7:50', length=2, minimum=0, maximum=9)
+    bench = Bench([mapping])
+    bench.start()
+    for values in ([1], [1, 10], [-1, 1], [1, 2, 3]):
+        bench.write(mapping, values)
+    assert bench.listener.outcomes() == [Outcome.REFUSED] * 4
+    bench.write(mapping, [0, 9])
+    bench.run(0.1)
+    assert bench.listener.outcomes()[-1] is Outcome.WRITTEN
+    assert bench.plc_reads('N7:50', 2) == (0, b'\0\0\x09\0')
+
+
+@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('outstanding', [1, 3])
+def test_everything_at_once(family: str, outstanding: int) -> None:
+    read = make_mapping('N7:0', plc=family, length=10, period=0)
+    others = [make_mapping(f'N7:{60 + 60 * n}', plc=family, period=0) for n in range(3)]
+    write = make_mapping('N9:0', 'Write', plc=family, length=2)
+    pushed = serve_row('N7:50', family, 2)
+    pulled = serve_row('N9:10', family, 2)
+    bench = Bench([read, *others, write, pushed, pulled], family=family, outstanding=outstanding)
+    bench.start()
+    for number in range(1, 41):
+        store(bench.plc, 'N7:0', [number] * 10)
+        bench.write(write, [number, -number])
+        bench.write(pulled, [number, 2 * number])
+        bench.message('N7:50', number, 3 * number)
+        bench.run(0.15)
+        assert stored(bench.plc, 'N9:0', 2) == b''.join(
+            value.to_bytes(2, 'little', signed=True) for value in (number, -number))
+        assert bench.listener.values(pushed)[-1] == [number, 3 * number]
+        assert bench.plc_reads('N9:10', 2) == (0, bytes((number, 0, 2 * number, 0)))
+    assert [values[0] for values in bench.listener.values(pushed)] == list(range(1, 41))
+    assert bench.said == ['confirmed'] * 40
+    assert bench.listener.outcomes() == [Outcome.WRITTEN] * 80
+    seen = [values[0] for values in bench.listener.values(read)]
+    assert seen == sorted(seen)
+    assert set(seen) >= set(range(1, 41))
+    assert all(len(set(values)) == 1 for values in bench.listener.values(read))
+    assert bench.listener.numbers() == {2523}
+    counters = bench.driver.counters
+    assert (counters.commands_received, counters.replies_sent) == (80, 80)
+    assert counters.enq_retries == counters.nak_retries == counters.command_timeouts == 0
+
+
+def test_more_outstanding_commands_do_not_mix_up_blocks() -> None:
+    rows = [make_mapping(f'N7:{20 * n}', length=2, period=0) for n in range(12)]
+    bench = Bench(rows, outstanding=3, first_tns=0xFFF0)
+    for number in range(12):
+        store(bench.plc, f'N7:{20 * number}', [number, 100 + number])
+    bench.start()
+    bench.run(5.0)
+    for number, mapping in enumerate(rows):
+        values = bench.listener.values(mapping)
+        assert len(values) > 5
+        assert {tuple(entry) for entry in values} == {(number, 100 + number)}
+
+
+def test_dead_line_and_recovery() -> None:
+    read, write = make_mapping(), make_mapping('N7:5', 'Write')
+    pushed = serve_row('N7:50')
+    bench = Bench([read, write, pushed])
+    bench.start()
+    bench.run(0.5)
+    bench.line.noise = Noise(lost=1.0)
+    bench.write(write, [5])
+    bench.run(10.0)
+    assert bench.listener.changes == [(PLC, False)]
+    assert bench.listener.outcomes() == [Outcome.UNKNOWN]
+    assert bench.driver.points[read].freshness(bench.clock()) is Freshness.FAILED
+    assert bench.driver.points[pushed].freshness(bench.clock()) is not Freshness.FAILED
+    assert {2515, 2520, 2522, 2509} <= bench.listener.numbers()
+    before = len(bench.listener.values(read))
+    bench.line.noise = QUIET
+    bench.run(5.0)
+    assert bench.listener.changes == [(PLC, False), (PLC, True)]
+    assert len(bench.listener.values(read)) > before + 10
+    bench.message('N7:50', 9)
+    bench.run(1.0)
+    assert bench.listener.values(pushed) == [[9]]
+
+
+def test_served_words_survive_a_lost_port() -> None:
+    words = serve_row('N7:50', length=2)
+    bench = Bench([words])
+    bench.start()
+    bench.write(words, [1, 2])
+    bench.run(0.1)
+    bench.driver.machine.stop()
+    bench.write(words, [3, 4])
+    assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.REFUSED]
+    bench.start()
+    bench.run(0.1)
+    assert bench.plc_reads('N7:50', 2) == (0, b'\1\0\2\0')
+
+
+def test_our_own_station_is_no_station_of_the_line() -> None:
+    bench = Bench([serve_row('N7:50'), make_mapping()])
+    assert [station.number for station in bench.driver.stations] == [PLC]
+    assert len(bench.driver.blocks) == 1
+
+
+def test_served_word_that_nobody_has_to_write_is_not_late() -> None:
+    free, expected = serve_row('N7:50'), serve_row('N7:60', period=200)
+    bench = Bench([free, expected])
+    bench.start()
+    bench.run(5.0)
+    now = bench.clock()
+    assert bench.driver.points[free].freshness(now) is Freshness.FRESH
+    assert bench.driver.points[expected].freshness(now) is Freshness.WAITING
+    bench.message('N7:60', 1)
+    bench.run(0.1)
+    assert bench.driver.points[expected].freshness(bench.clock()) is Freshness.FRESH
+    bench.run(5.0)
+    assert bench.driver.points[expected].freshness(bench.clock()) is Freshness.STALE
+
+
+def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
+    words = serve_row('N7:50')
+    bench = Bench([make_mapping(), words])
+    machine = bench.driver.machine
+    machine.start(0.0)
+    assert machine.data_to_send()
+    machine.receive_data(ACK, 0.1)  # and its reply takes its time
+    bench.driver.write(words, [7], 0.2)
+    machine.wake(0.2)
+    dialect = DIALECTS[PlcType.PLC5]
+    place = Address.parse('N7:50', PlcType.PLC5)
+    command = Packet(US, PLC, dialect.cmd, 0, 1, dialect.read(place, 1))
+    machine.receive_data(message_frame(command.encode(), bench.network.checksum), 0.3)
+    decoder = FrameDecoder(bench.network.checksum, Duplex.FULL)
+    decoder.feed(machine.data_to_send())
+    assert decoder.next_symbol() == Control(Code.ACK)
+    reply = decoder.next_symbol()
+    assert isinstance(reply, Frame)
+    assert dialect.read_data(place, 1, Packet.decode(reply.data).data) == b'\7\0'
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]

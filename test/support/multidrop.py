@@ -1,0 +1,357 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Half-duplex lines with several nodes: masters of both kinds, slaves that ask by themselves."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Container, Iterable
+from dataclasses import asdict
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, Poll, Symbol
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.master_line import MasterSettings
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.slave_link import SlaveLink
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.errors import CommandTimeout
+from abdf1_ros.messages import Event
+from support.peers import Errand
+from support.virtual_line import char_time, VirtualLine
+
+Serve = Callable[[Packet], Packet]
+
+
+class Errands:
+    """Commands that wait for a link; after ``patience`` s of waiting they fail."""
+
+    def __init__(self, clock: Callable[[], float], patience: float = float('inf')) -> None:
+        self.clock = clock
+        self.waiting: deque[Errand] = deque()
+        self.all: list[Errand] = []
+        self.patience = patience
+
+    def add(self, command: Packet) -> Errand:
+        """Queue a command."""
+        errand = Errand(command, self.clock)
+        self.waiting.append(errand)
+        self.all.append(errand)
+        return errand
+
+    def next_task(self, now: float, busy: Container[int] = ()) -> Errand | None:
+        """Return the next command for a station that is not busy."""
+        self.expire(now)
+        for errand in self.waiting:
+            if errand.command.dst not in busy:
+                self.waiting.remove(errand)
+                return errand
+        return None
+
+    def next_due(self) -> float | None:
+        """Return None: there is something to do when there is."""
+        return None
+
+    def expire(self, now: float) -> None:
+        """End what has waited too long."""
+        while self.waiting and now - self.waiting[0].begun > self.patience:
+            self.waiting.popleft().fail(CommandTimeout())
+
+
+class Told(Machine):
+    """A machine that keeps what it has put on the line, as symbols with their time."""
+
+    def __init__(self, procedure: Callable[[Machine], Procedure], settings: MasterSettings,
+                 timing: LineTiming | None) -> None:
+        super().__init__(procedure, checksum=settings.checksum, timing=timing,
+                         forget_on_send=True)
+        self.log: list[tuple[float, str]] = []
+        self.sent: list[bytes] = []
+        self._reader = FrameDecoder(settings.checksum, Duplex.HALF)
+
+    def data_to_send(self) -> bytes:
+        """Return the bytes to put on the line, and note them."""
+        data = super().data_to_send()
+        if data:
+            self.sent.append(data)
+        self._reader.feed(data)
+        while (symbol := self._reader.next_symbol()) is not None:
+            self.log.append((self.now, _text(symbol)))
+        return data
+
+
+def _text(symbol: Symbol) -> str:
+    """Return "P3" for a poll of 3, "C3" and "R3" for a command and a reply to it, or "ACK"."""
+    if isinstance(symbol, Poll):
+        return f'P{symbol.station}'
+    if isinstance(symbol, Frame):
+        return f'{"R" if Packet.decode(symbol.data).is_reply else "C"}{symbol.station}'
+    assert isinstance(symbol, Control)
+    return symbol.code.name
+
+
+class MasterNode(Errands):
+    """A master with message-based polling, or with the standard one where ``polling`` is given."""
+
+    def __init__(self, settings: MasterSettings, clock: Callable[[], float],
+                 polling: PollingSettings | None = None, *, numbers: Iterable[int] = (),
+                 timing: LineTiming | None = None, serve: Serve | None = Packet.reply) -> None:
+        super().__init__(clock)
+        self.events: list[Event] = []
+        self.changes: list[tuple[int, bool]] = []
+        self.served: list[Packet] = []
+        self.stations = ActiveStationList(
+            numbers, lambda station: self.changes.append((station.number, station.active)))
+        self.machine = Told(lambda machine: self.link.run(self), settings, timing)
+        served = None if serve is None else self._serve
+        self._execute = serve
+        self.link: HalfDuplexMaster | StandardPollingMaster
+        if polling is None:
+            self.link = HalfDuplexMaster(
+                self.machine, settings, self.stations, self.events.append, served)
+        else:
+            self.link = StandardPollingMaster(
+                self.machine, settings, polling, self.stations, self.events.append, served)
+
+    def _serve(self, command: Packet) -> Packet:
+        self.served.append(command)
+        assert self._execute is not None
+        return self._execute(command)
+
+    def numbers(self) -> list[tuple[int, ...]]:
+        """Return number and arguments of every event so far."""
+        return [(event.message.number, *event.args) for event in self.events]
+
+    def counts(self) -> dict[str, int]:
+        """Return the counters that are not zero, without the characters."""
+        return {name: count for name, count in asdict(self.machine.counters).items()
+                if count and not name.startswith('chars_')}
+
+    @property
+    def said(self) -> str:
+        """Return what it has sent so far, without the ACKs."""
+        return ' '.join(text for _, text in self.machine.log if text != 'ACK')
+
+    def times(self, text: str) -> list[float]:
+        """Return when it has sent this."""
+        return [when for when, entry in self.machine.log if entry == text]
+
+
+class Slave:
+    """
+    A station on the line of a test.
+
+    It is dead while ``silent``, deaf to commands while ``deaf``, and has a reply ready
+    ``delay`` s after the command. ``outbox`` holds commands of its own, ``heard`` the replies
+    to them.
+    """
+
+    def __init__(self, number: int, clock: Callable[[], float], serve: Serve = Packet.reply,
+                 queue_size: int = 4, retries: int = 3) -> None:
+        self.number = number
+        self.silent = self.deaf = False
+        self.delay = 0.0
+        self.outbox: deque[Packet] = deque()
+        self.served: list[Packet] = []
+        self.heard: list[Packet] = []
+        self.failed: list[Packet] = []
+        self.polls = 0
+        self._clock = clock
+        self._execute = serve
+        self._ready = 0.0
+        self.slave = HalfDuplexSlave(
+            SlaveSettings(number, queue_size=queue_size, retries=retries), self._serve,
+            initiator=self)
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Answer, if it is alive."""
+        if isinstance(symbol, Poll) and symbol.station == self.number:
+            self.polls += 1
+            if not self.silent and self._clock() < self._ready:
+                return frames.EOT
+        is_command = isinstance(symbol, Frame) and symbol.station == self.number
+        if self.silent or (self.deaf and is_command):
+            return b''
+        return self.slave.handle(symbol)
+
+    def _serve(self, command: Packet) -> Packet:
+        self.served.append(command)
+        self._ready = self._clock() + self.delay
+        return self._execute(command)
+
+    def polled(self) -> None:
+        """Do nothing."""
+
+    def next_command(self) -> Packet | None:
+        """Return a command of its own."""
+        return self.outbox.popleft() if self.outbox else None
+
+    def delivered(self, command: Packet) -> None:
+        """Do nothing."""
+
+    def undelivered(self, command: Packet) -> None:
+        """Keep what the master did not take."""
+        self.failed.append(command)
+
+    def replied(self, reply: Packet) -> None:
+        """Keep a reply."""
+        self.heard.append(reply)
+
+
+class MasterBench:
+    """A master and ``Slave``s on a line without noise; frames arrive whole."""
+
+    def __init__(self, *numbers: int, settings: MasterSettings,
+                 polling: PollingSettings | None = None, serve: Serve | None = Packet.reply,
+                 baud: int = 19200, dead: Iterable[int] = (), retries: int = 3) -> None:
+        self.slaves = {number: Slave(number, self.clock, retries=retries) for number in numbers}
+        for number in dead:
+            self.slaves[number].silent = True
+        self.master = MasterNode(settings, self.clock, polling, numbers=numbers, serve=serve,
+                                 timing=LineTiming(char_time(baud)))
+        self.far = Machine(multidrop(list(self.slaves.values())), checksum=settings.checksum)
+        self.line = VirtualLine(self.master.machine, self.far, baud=baud, chunk=1000)
+        self._tns = 0x0100
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.line.now
+
+    def __getitem__(self, number: int) -> Slave:
+        """Return a station."""
+        return self.slaves[number]
+
+    def ask(self, number: int, master: int = 5, cmd: int = 0x0F) -> Errand:
+        """Queue a command of the master."""
+        self._tns += 1
+        errand = self.master.add(Packet(number, master, cmd, 0, self._tns, b'\x68'))
+        self.line.wake(self.master.machine)
+        return errand
+
+    def message(self, src: int, dst: int) -> Packet:
+        """Let a slave send a command of its own."""
+        self._tns += 1
+        command = Packet(dst, src, 0x0F, 0, self._tns, b'\x67')
+        self.slaves[src].outbox.append(command)
+        return command
+
+    def start(self, *inactive: int) -> None:
+        """Start both ends; the master knows some stations as inactive."""
+        for number in inactive:
+            self.master.stations.lost(number, 0.0)
+        self.master.changes.clear()
+        self.line.start()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.line.run_for(seconds)
+
+    def forget(self) -> None:
+        """Forget what the master has said."""
+        self.master.machine.log.clear()
+        self.master.machine.sent.clear()
+
+
+class SlaveNode(Errands):
+    """A slave that is a driver of its own, on a machine of its own."""
+
+    def __init__(self, settings: SlaveSettings, clock: Callable[[], float], *,
+                 cmd_timeout: float = 1.0, poll_timeout: float = 60.0,
+                 patience: float = float('inf'), serve: Serve = Packet.reply,
+                 timing: LineTiming | None = None) -> None:
+        super().__init__(clock, patience)
+        self.number = settings.station
+        self.settings = settings
+        self.events: list[Event] = []
+        self.served: list[Packet] = []
+        self.executed: Counter[tuple[int, int]] = Counter()
+        self.replies: dict[tuple[int, int], Packet] = {}
+        self._execute = serve
+        self.stations = ActiveStationList()
+        self.machine = Machine(lambda machine: self.link.run(self), checksum=settings.checksum,
+                               timing=timing)
+        self.link = SlaveLink(
+            self.machine, settings, self.stations, self._serve, cmd_timeout=cmd_timeout,
+            poll_timeout=poll_timeout, report=self.events.append)
+
+    def _serve(self, command: Packet) -> Packet:
+        reply = self._execute(command)
+        self.served.append(command)
+        self.executed[command.src, command.tns] += 1
+        self.replies[command.src, command.tns] = reply
+        return reply
+
+    def numbers(self) -> list[tuple[int, ...]]:
+        """Return number and arguments of every event so far."""
+        return [(event.message.number, *event.args) for event in self.events]
+
+    def counts(self) -> dict[str, int]:
+        """Return the counters that are not zero, without the characters."""
+        return {name: count for name, count in asdict(self.machine.counters).items()
+                if count and not name.startswith('chars_')}
+
+
+class SlaveBench(SlaveNode):
+    """A slave whose line says what the test tells it."""
+
+    def __init__(self, settings: SlaveSettings, *, cmd_timeout: float = 1.0,
+                 poll_timeout: float = 60.0, patience: float = float('inf'),
+                 serve: Serve = Packet.reply, timing: LineTiming | None = None) -> None:
+        self.now = 100.0
+        super().__init__(settings, lambda: self.now, cmd_timeout=cmd_timeout,
+                         poll_timeout=poll_timeout, patience=patience, serve=serve,
+                         timing=timing)
+        self.machine.start(self.now)
+
+    def hear(self, *data: bytes) -> bytes:
+        """Return what the slave says to these."""
+        answer = b''
+        for part in data:
+            self.machine.receive_data(part, self.now)
+            self.machine.handle_timeout(self.now)
+            answer += self.machine.data_to_send()
+        return answer
+
+    def poll(self) -> bytes:
+        """Poll it."""
+        return self.hear(frames.poll_frame(self.number))
+
+    def frame(self, packet: Packet, station: int | None = None) -> bytes:
+        """Return a message of the master to it."""
+        number = self.number if station is None else station
+        return frames.master_frame(number, packet.encode(), self.settings.checksum)
+
+    def own(self, packet: Packet) -> bytes:
+        """Return a message of its own as it stands on the line."""
+        return frames.message_frame(packet.encode(), self.settings.checksum)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass in silence; the slave says nothing by itself."""
+        end = self.now + seconds
+        while self.machine.deadline is not None and self.machine.deadline <= end:
+            self.now = max(self.now, self.machine.deadline)
+            self.machine.handle_timeout(self.now)
+            assert self.machine.data_to_send() == b''
+        self.now = end
+
+    def listen(self, seconds: float, data: bytes, pause: float) -> None:
+        """Let it hear the same again and again, as on a line where others talk."""
+        end = self.now + seconds
+        while self.now < end:
+            self.now += pause
+            assert self.hear(data) == b''

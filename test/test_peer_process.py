@@ -1,0 +1,361 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator as a process on a full-duplex line, and a client made from the manual alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import re
+import select
+import socket
+import subprocess
+import sys
+import threading
+import time
+import tty
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PATIENCE = 20.0
+US = 9
+
+DATA = """\
+Station,PLC_Type,Address,Length,Values,Motion,Period
+1,PLC5,N7:0,100,1200 4099 -2 16,,
+1,PLC5,F8:0,4,1.5,,
+2,SLC,N7:0,100,7 4112,,
+"""
+
+ACK, NAK, ENQ = b'\x10\x06', b'\x10\x15', b'\x10\x05'
+
+
+def crc(data: bytes) -> bytes:
+    """Return the check of M 5-6: every data byte and ETX, low byte first."""
+    value = 0
+    for byte in data + b'\x03':
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ 0xA001 if value & 1 else value >> 1
+    return bytes((value & 0xFF, value >> 8))
+
+
+def bcc(data: bytes) -> bytes:
+    """Return the check of M 5-2: two's complement of the sum of the data bytes."""
+    return bytes((-sum(data) & 0xFF,))
+
+
+class Client:
+    """The other end of the line, which knows the manual and nothing of the package."""
+
+    def __init__(self, line: int | socket.socket, check: str) -> None:
+        self._line = line if isinstance(line, int) else line.fileno()
+        self._check = crc if check == 'CRC' else bcc
+        self._tns = 0x0F0E
+        self._heard = b''
+
+    def say(self, data: bytes, is_slow: bool = False) -> None:
+        """Put bytes on the line, at once or each by itself."""
+        for part in ([data[at:at + 1] for at in range(len(data))] if is_slow else [data]):
+            os.write(self._line, part)
+
+    def frame(self, data: bytes) -> bytes:
+        """Return the frame of a message."""
+        return b'\x10\x02' + data.replace(b'\x10', b'\x10\x10') + b'\x10\x03' + self._check(data)
+
+    def _byte(self) -> int:
+        while not self._heard:
+            assert select.select([self._line], [], [], PATIENCE)[0], 'nothing comes'
+            self._heard = os.read(self._line, 1000)
+        byte, self._heard = self._heard[0], self._heard[1:]
+        return byte
+
+    def hear(self) -> bytes:
+        """Return the next symbol: a response as it is, of a message the data."""
+        assert self._byte() == 0x10
+        code = self._byte()
+        if code != 0x02:
+            return bytes((0x10, code))
+        data = bytearray()
+        while True:
+            byte = self._byte()
+            if byte == 0x10 and (byte := self._byte()) == 0x03:
+                break
+            data.append(byte)
+        size = len(self._check(b''))
+        assert bytes(self._byte() for _ in range(size)) == self._check(bytes(data))
+        return bytes(data)
+
+    def is_silent(self) -> bool:
+        """Tell whether nothing has come so far."""
+        return not self._heard and not select.select([self._line], [], [], 0)[0]
+
+    def ask(self, station: int, cmd: int, data: bytes, is_slow: bool = False) -> bytes:
+        """Return STS and data of the reply to a command."""
+        self._tns += 1
+        tns = self._tns.to_bytes(2, 'little')
+        self.say(self.frame(bytes((station, US, cmd, 0)) + tns + data), is_slow)
+        assert self.hear() == ACK
+        reply = self.hear()
+        self.say(ACK)
+        assert reply[:3] + reply[4:6] == bytes((US, station, cmd | 0x40)) + tns
+        return reply[3:4] + reply[6:]
+
+
+class Simulator:
+    """The process and what it says."""
+
+    def __init__(self, folder: Path, *args: str) -> None:
+        data = folder / 'data.csv'
+        data.write_text(DATA, encoding='utf-8')
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros.simulator', '--data', str(data), *args], cwd=ROOT,
+            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        self.lines: list[str] = []
+        self._news = threading.Condition()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout
+        for line in self._process.stdout:
+            with self._news:
+                self.lines.append(line.strip())
+                self._news.notify()
+
+    def tell(self, command: str) -> None:
+        """Give it a command on its standard input."""
+        assert self._process.stdin
+        self._process.stdin.write(command + '\n')
+        self._process.stdin.flush()
+
+    def until(self, pattern: str) -> re.Match[str]:
+        """Wait for a line that it says, and return the match."""
+        end = time.monotonic() + PATIENCE
+        with self._news:
+            while True:
+                for line in self.lines:
+                    if match := re.search(pattern, line):
+                        return match
+                left = end - time.monotonic()
+                assert left > 0 and self._news.wait(left), f'no {pattern} in {self.lines}'
+
+    def close(self) -> int:
+        """End it and return its exit status."""
+        if self._process.poll() is None:
+            self.tell('quit')
+        status = self._process.wait(PATIENCE)
+        self._reader.join()
+        assert self._process.stdin and self._process.stdout
+        self._process.stdin.close()
+        self._process.stdout.close()
+        return status
+
+
+class Line:
+    """A simulator and a client on one pseudo-terminal."""
+
+    def __init__(self, folder: Path, check: str, station: int = 1) -> None:
+        name = folder / 'line'
+        self.simulator = Simulator(folder, '--full-duplex', str(station), '--pty', str(name),
+                                   '--check', check)
+        self.simulator.until(f'stations {station} .* on {re.escape(str(name))}, {check}')
+        self._descriptor = os.open(name, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self._descriptor)
+        self.client = Client(self._descriptor, check)
+
+    def close(self) -> None:
+        """End all of it; nothing may be left unsaid."""
+        assert self.client.is_silent()
+        os.close(self._descriptor)
+        assert self.simulator.close() == 0
+        assert not any('Traceback' in line for line in self.simulator.lines)
+
+
+@pytest.fixture(params=['CRC', 'BCC'])
+def line(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Line]:
+    made = Line(tmp_path, request.param)
+    yield made
+    made.close()
+
+
+# Typed read and write of words of N7 (M 7-28, 7-30): offset, total, system address 07 00 07 n.
+def typed_read(element: int, words: int) -> bytes:
+    """Return FNC and parameters."""
+    return bytes((0x68, 0, 0, words, 0, 0x07, 0, 7, element, words, 0))
+
+
+def typed_write(element: int, *values: int) -> bytes:
+    """Return FNC and parameters: an array of integers."""
+    words = b''.join(value.to_bytes(2, 'little', signed=True) for value in values)
+    return bytes((0x67, 0, 0, len(values), 0, 0x07, 0, 7, element,
+                  0x99, 0x09, 1 + len(words), 0x42)) + words
+
+
+@pytest.mark.parametrize('is_slow', [False, True])
+def test_commands(line: Line, is_slow: bool) -> None:
+    client = line.client
+    for _ in range(3):
+        assert client.ask(1, 0x0F, typed_read(0, 4), is_slow) == bytes.fromhex(
+            '00 99 09 09 42 B0 04 03 10 FE FF 10 00')
+    assert client.ask(1, 0x0F, typed_write(20, 5, -6, 0x1010, 0x0310), is_slow) == b'\0'
+    assert client.ask(1, 0x0F, typed_read(20, 4), is_slow) == bytes.fromhex(
+        '00 99 09 09 42 05 00 FA FF 10 10 10 03')
+    assert client.ask(1, 0x0F, typed_read(200, 1), is_slow) == b'\xF0\x07'
+    assert client.ask(1, 0x06, b'\0\x10\x10\x02', is_slow) == b'\0\x10\x10\x02'
+    assert client.ask(1, 0x06, b'\3', is_slow)[:4] == b'\0\x06\xEB\x15'
+    assert client.ask(0, 0x0F, typed_read(0, 1), is_slow)[-2:] == b'\xB0\x04'
+    assert client.ask(1, 0x0B, b'\2', is_slow) == b'\x10'
+
+
+def test_responses(line: Line) -> None:
+    client = line.client
+    client.say(ENQ)
+    assert client.hear() == NAK
+    command = client.frame(bytes((1, US, 0x0F, 0, 0x10, 0x10)) + typed_read(0, 1))
+    client.say(command[:-1] + bytes((command[-1] ^ 1,)))
+    assert client.hear() == NAK
+    client.say(ENQ)
+    assert client.hear() == NAK
+    client.say(command)
+    assert client.hear() == ACK
+    reply = client.hear()
+    client.say(ENQ)
+    assert client.hear() == ACK
+    client.say(NAK)
+    assert client.hear() == reply
+    client.say(ACK + command)
+    assert client.hear() == ACK  # a duplicate: no second reply
+    assert client.ask(1, 0x06, b'\0still there') == b'\0still there'
+    client.say(command[:12] + b'\x10\x0F')
+    assert client.hear() == NAK
+    client.say(command[:12] + ENQ)
+    assert client.hear() == NAK
+    # A message that begins anew, and an embedded response in it.
+    client.say(command[:10] + client.frame(bytes((1, US, 0x06, 0, 1, 1, 0)))[:7] + ACK
+               + client.frame(bytes((1, US, 0x06, 0, 1, 1, 0)))[7:])
+    assert client.hear() == ACK
+    assert client.hear() == bytes((US, 1, 0x46, 0, 1, 1))
+    client.say(ACK)
+
+
+def test_message_of_the_plc(line: Line) -> None:
+    client = line.client
+    line.simulator.tell('msg 1 N7:50 11 22')
+    command = client.hear()
+    assert command[:4] == bytes((5, 1, 0x0F, 0))
+    # Total 2, memory area 0, file 7, element 50, then an array of integers (M 7-30, 13-10).
+    assert command[6:] == bytes.fromhex('67 00 00 02 00 07 00 07 32 95 09 42 0B 00 16 00')
+    client.say(NAK)
+    assert client.hear() == command
+    client.say(ACK)
+    reply = bytes((1, 5, 0x4F, 0)) + command[4:6]
+    client.say(client.frame(reply))
+    assert client.hear() == ACK
+    line.simulator.until('station 1: msg N7:50 confirmed')
+
+
+def test_message_that_is_refused_or_never_answered(line: Line) -> None:
+    client = line.client
+    line.simulator.tell('msg 1 N7:51 -5')
+    command = client.hear()
+    assert command[-2:] == b'\xFB\xFF'
+    client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0xF0)) + command[4:6] + b'\x06'))
+    assert client.hear() == ACK
+    line.simulator.until('msg N7:51 STS F0 EXT STS 06')
+    line.simulator.tell('msg 1 N7:52 1')
+    following = client.hear()
+    assert following[4:6] != command[4:6]
+    client.say(ACK)
+    # Its own command waits; ours do not.
+    assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
+    line.simulator.until('msg N7:52 2508')
+
+
+def test_message_that_nobody_acknowledges(line: Line) -> None:
+    client = line.client
+    line.simulator.tell('msg 1 N7:52 1')
+    command = client.hear()
+    assert client.hear() == ENQ
+    client.say(NAK)
+    assert client.hear() == command
+    client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0)) + command[4:6]))
+    assert client.hear() == ACK
+    line.simulator.until('msg N7:52 confirmed')
+
+
+def test_faults_of_the_simulator(line: Line) -> None:
+    client = line.client
+    line.simulator.tell('error 1 F0 0B')
+    line.simulator.until('station 1: error F0 0B')
+    assert client.ask(1, 0x0F, typed_read(0, 1)) == b'\xF0\x0B'
+    line.simulator.tell('normal 1')
+    line.simulator.until('station 1: normal')
+    assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
+    line.simulator.tell('slow 1 3')
+    line.simulator.until('"slow 1 3" is no command')
+
+
+def test_slow_port_is_given_the_time_that_a_message_takes(tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    simulator = Simulator(tmp_path, '--full-duplex', '1', '--port', os.ttyname(theirs), '--baud',
+                          '1200')
+    simulator.until('stations 1')
+    client = Client(ours, 'CRC')
+    simulator.tell('msg 1 N7:0 ' + ' '.join(map(str, range(100))))
+    command = client.hear()  # a pseudo-terminal is fast; a port would take almost 2 s for it
+    assert not select.select([ours], [], [], 1.4)[0], 'an ENQ before the message has left'
+    client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0)) + command[4:6]))
+    assert client.hear() == ACK
+    assert simulator.close() == 0
+    os.close(ours)
+    os.close(theirs)
+
+
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+def test_slc(tmp_path: Path, check: str) -> None:
+    made = Line(tmp_path, check, 2)
+    read = bytes.fromhex('A2 04 07 89 00 00')
+    assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 10')
+    assert made.client.ask(2, 0x0F, bytes.fromhex('AA 02 07 89 01 00 10 03')) == b'\0'
+    assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 03')
+    assert made.client.ask(2, 0x0F, bytes.fromhex('A2 02 07 89 64 00')) == b'\x50'
+    assert made.client.ask(2, 0x06, b'\3')[:4] == b'\0\0\xEE\x34'
+    made.simulator.tell('msg 2 N7:50 11')
+    command = made.client.hear()
+    assert command[6:] == bytes.fromhex('AA 02 07 89 32 00 0B 00')
+    made.client.say(ACK + made.client.frame(bytes((2, 5, 0x4F, 0)) + command[4:6]))
+    assert made.client.hear() == ACK
+    made.simulator.until('station 2: msg N7:50 confirmed')
+    made.close()
+
+
+def test_tcp(tmp_path: Path) -> None:
+    simulator = Simulator(tmp_path, '--full-duplex', '1', '--tcp', '127.0.0.1:0')
+    port = int(simulator.until(r'socket://127\.0\.0\.1:(\d+)')[1])
+    for _ in range(2):  # one client after the other
+        with socket.create_connection(('127.0.0.1', port), PATIENCE) as connection:
+            client = Client(connection, 'CRC')
+            assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
+    assert simulator.close() == 0
+
+
+def test_station_that_is_not_there(tmp_path: Path) -> None:
+    simulator = Simulator(tmp_path, '--full-duplex', '7')
+    assert simulator.close() == 2
+    assert simulator.lines == ['simulator: --full-duplex: name a station (1, 2)']
