@@ -39,7 +39,7 @@ import tty
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
@@ -234,7 +234,9 @@ def main(args: Sequence[str] | None = None) -> int:
     machine = Machine(multidrop(plcs), checksum=checksum)
     open_line = line.open
     if options.full_duplex is not None:
-        machine = _full_duplex(plcs[0], checksum)
+        # Only a port has a speed of its own, for which the timers have to wait.
+        timing = Network(baud=options.baud).timing if options.port else LineTiming()
+        machine = _full_duplex(plcs[0], checksum, timing)
         open_line = lambda: _FaultyPort(line.open(), plcs[0])  # noqa: E731
     link = LinkThread(machine, open_line, on_fault=_print_fault, last_back_off=0.5)
     names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
@@ -285,13 +287,13 @@ def _open_line(options: argparse.Namespace) -> PtyLine | TcpLine | SerialLine:
     return PtyLine(options.pty)
 
 
-def _full_duplex(plc: SimulatedPlc, checksum: Checksum) -> Machine:
+def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> Machine:
     """Return a machine that is ``plc`` at the other end of a full-duplex line."""
     def run(machine: Machine) -> Procedure:
         peer = FullDuplexPeer(
             machine, PeerSettings(checksum), ActiveStationList(), plc.serve)
         return peer.run(plc)
-    return Machine(run, checksum=checksum, duplex=Duplex.FULL)
+    return Machine(run, checksum=checksum, duplex=Duplex.FULL, timing=timing)
 
 
 def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]], link: LinkThread,

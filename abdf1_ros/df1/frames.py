@@ -22,6 +22,7 @@ DLE is doubled (M 2-7); check bytes are never doubled (M 3-5, 5-5).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
@@ -136,14 +137,7 @@ class Duplex(Enum):
     FULL = 'full duplex'
 
 
-class _State(Enum):
-    IDLE = 'between symbols'
-    SOH_STATION = 'STN of a master frame'
-    SOH_STX = 'DLE STX behind STN'
-    POLL_STATION = 'STN of a poll'
-    POLL_CHECK = 'BCC of a poll'
-    DATA = 'link data'
-    CHECK = 'check bytes'
+_Step = Callable[[], Symbol | None]
 
 
 class FrameDecoder:
@@ -153,6 +147,7 @@ class FrameDecoder:
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
     everything heard. Bytes outside of any symbol are noise: they are skipped and counted in
     ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
+    ``in_message`` tells whether a message has begun and not ended.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
@@ -160,21 +155,18 @@ class FrameDecoder:
         self._duplex = duplex
         self._buffer = bytearray()
         self._data = bytearray()
-        self._state = _State.IDLE
+        self._step: _Step = self._idle
         self._station: int | None = None
         self.last_byte = 0
         self.noise = 0
-
-    @property
-    def in_message(self) -> bool:
-        """Tell whether a message has begun and not ended."""
-        return self._state in (_State.DATA, _State.CHECK)
+        self.in_message = False
 
     def reset(self) -> None:
         """Forget everything heard so far."""
         self.noise += len(self._buffer) + self.in_message
         self._buffer.clear()
-        self._state = _State.IDLE
+        self._step = self._idle
+        self.in_message = False
         self.last_byte = 0
 
     def feed(self, data: bytes) -> None:
@@ -186,11 +178,11 @@ class FrameDecoder:
     def next_symbol(self) -> Symbol | None:
         """Return the next whole symbol, or None when more bytes are needed."""
         while self._buffer:
-            before = self._state, len(self._buffer)
-            symbol = self._STEPS[self._state](self)
+            step, length = self._step, len(self._buffer)
+            symbol = step()
             if symbol is not None:
                 return symbol
-            if before == (self._state, len(self._buffer)):
+            if len(self._buffer) == length and self._step == step:
                 return None  # a step that neither moved nor ate needs more bytes
         return None
 
@@ -213,9 +205,9 @@ class FrameDecoder:
         if code == Code.STX:
             self._begin_data(None)
         elif code == Code.SOH and half:
-            self._state = _State.SOH_STATION
+            self._step = self._soh_station
         elif code == Code.ENQ and half:
-            self._state = _State.POLL_STATION
+            self._step = self._poll_station
         elif code in (Code.ACK, Code.NAK, Code.EOT, Code.ENQ):
             return Control(Code(code))
         else:
@@ -223,11 +215,12 @@ class FrameDecoder:
         return None
 
     def _begin_data(self, station: int | None) -> None:
-        self._state = _State.DATA
+        self._step = self._link_data
+        self.in_message = True
         self._station = station
         self._data.clear()
 
-    def _take_station(self, following: _State) -> None:
+    def _take_station(self, following: _Step) -> None:
         """Read STN, which is stuffed like data (M 3-4), and go on to ``following``."""
         if self._buffer[0] != Code.DLE:
             self._station = self._buffer[0]
@@ -238,12 +231,12 @@ class FrameDecoder:
             self._station = int(Code.DLE)
             del self._buffer[:2]
         else:  # another symbol broke in
-            self._state = _State.IDLE
+            self._step = self._idle
             return
-        self._state = following
+        self._step = following
 
     def _soh_station(self) -> Symbol | None:
-        self._take_station(_State.SOH_STX)
+        self._take_station(self._soh_stx)
         return None
 
     def _poll_station(self) -> Symbol | None:
@@ -251,26 +244,26 @@ class FrameDecoder:
         if self._buffer[:2] == bytes((Code.DLE, bcc(DLE))):
             del self._buffer[:1]
             self._station = int(Code.DLE)
-            self._state = _State.POLL_CHECK
+            self._step = self._poll_check
         else:
-            self._take_station(_State.POLL_CHECK)
+            self._take_station(self._poll_check)
         return None
 
     def _poll_check(self) -> Symbol | None:
         check = self._buffer.pop(0)
-        self._state = _State.IDLE
+        self._step = self._idle
         assert self._station is not None
         return Poll(self._station, check == bcc(b'', self._station))
 
     def _soh_stx(self) -> Symbol | None:
         if self._buffer[0] != Code.DLE:
-            self._state = _State.IDLE
+            self._step = self._idle
         elif len(self._buffer) > 1:
             if self._buffer[1] == Code.STX:
                 del self._buffer[:2]
                 self._begin_data(self._station)
             else:
-                self._state = _State.IDLE
+                self._step = self._idle
         return None
 
     def _link_data(self) -> Symbol | None:
@@ -287,12 +280,12 @@ class FrameDecoder:
             return self._store(1)
         if code == Code.ETX:
             del self._buffer[:2]
-            self._state = _State.CHECK
+            self._step = self._check
             return None
         if self._duplex is Duplex.FULL and code in (Code.ACK, Code.NAK):
             del self._buffer[:2]
             return Control(Code(code))  # an embedded response (M 4-3)
-        self._state = _State.IDLE  # the code that broke in is read again as a symbol
+        self._step = self._idle  # the code that broke in is read again as a symbol
         return self._frame(Fault.NO_ETX)
 
     def _store(self, count: int) -> Symbol | None:
@@ -301,7 +294,7 @@ class FrameDecoder:
         del self._buffer[:count]
         if len(self._data) <= MAX_LINK_DATA:
             return None
-        self._state = _State.IDLE
+        self._step = self._idle
         return self._frame(Fault.TOO_LONG)
 
     def _check(self) -> Symbol | None:
@@ -310,7 +303,7 @@ class FrameDecoder:
             return None
         received = int.from_bytes(self._buffer[:size], 'little')
         del self._buffer[:size]
-        self._state = _State.IDLE
+        self._step = self._idle
         expected = self._checksum.of_message(self._data, self._station)
         if received != expected:
             return self._frame(Fault.BAD_CHECK, received, expected)
@@ -318,14 +311,5 @@ class FrameDecoder:
         return self._frame(fault, received, expected)
 
     def _frame(self, fault: Fault | None, received: int = 0, expected: int = 0) -> Frame:
+        self.in_message = False
         return Frame(bytes(self._data), self._station, fault, received, expected)
-
-    _STEPS = {
-        _State.IDLE: _idle,
-        _State.SOH_STATION: _soh_station,
-        _State.SOH_STX: _soh_stx,
-        _State.POLL_STATION: _poll_station,
-        _State.POLL_CHECK: _poll_check,
-        _State.DATA: _link_data,
-        _State.CHECK: _check,
-    }

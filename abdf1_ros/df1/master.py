@@ -67,7 +67,7 @@ class HalfDuplexMaster:
         """Carry out the tasks of ``source``, one after the other, for ever."""
         self._line.forget_forwards()
         while True:
-            if self._line.has_forwards:
+            if self._line.has_forwards():
                 yield from self._forward()
                 continue
             now = self._machine.now

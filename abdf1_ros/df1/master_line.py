@@ -26,7 +26,7 @@ the whole line (M 2-7, 3-11).
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Container, Generator
 from dataclasses import dataclass
 from typing import NoReturn, TypeGuard
 
@@ -228,8 +228,9 @@ class MasterLine:
         packet = Packet.decode(frame.data)
         station = self.stations[number]
         is_new = packet.duplicate_key != station.last_key
-        if is_new and self._is_to_forward(packet) and self.is_full:
-            return None  # not acknowledged: the slave keeps it
+        is_command_to_forward = not packet.is_reply and self._is_to_forward(packet)
+        if is_new and is_command_to_forward and self.is_full:
+            return None  # not acknowledged: the slave keeps it; replies make room and go on
         self.counters.acks_sent += 1
         yield Step(frames.ACK, 0)
         if not station.accepts(packet):
@@ -267,14 +268,16 @@ class MasterLine:
             self.counters.invalid_messages += not is_ours
         self._report(wrong_message(packet, number))
 
-    def forward(self) -> Generator[Step, Symbol | None, Packet | None]:
+    def forward(self, busy: Container[int] = ()
+                ) -> Generator[Step, Symbol | None, Packet | None]:
         """
-        Deliver one message that waits to be passed on; return it when it was delivered.
+        Deliver one message to be passed on, not to a ``busy`` station; return it if delivered.
 
         The link data stay as they are (M 3-2, 3-8). The sender of a command that cannot be
         delivered gets an error reply.
         """
-        packet = self._forwards.popleft()
+        packet = next(packet for packet in self._forwards if packet.dst not in busy)
+        self._forwards.remove(packet)
         try:
             if packet.dst != BROADCAST and not self.stations[packet.dst].active:
                 yield from self.revive(packet.dst)
@@ -285,10 +288,9 @@ class MasterLine:
             return None
         return packet
 
-    @property
-    def has_forwards(self) -> bool:
-        """Tell whether messages wait to be passed on."""
-        return bool(self._forwards)
+    def has_forwards(self, busy: Container[int] = ()) -> bool:
+        """Tell whether messages wait to be passed on, but not to ``busy`` stations."""
+        return any(packet.dst not in busy for packet in self._forwards)
 
     @property
     def is_full(self) -> bool:

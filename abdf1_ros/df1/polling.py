@@ -145,13 +145,12 @@ class StandardPollingMaster:
         self._priority = _PollList(polling.priority)
         self._normal = _PollList(polling.normal)
         self._outstanding: dict[int, _Outstanding] = {}
+        self._listed = frozenset((*polling.priority, *polling.normal))
+        # Stations that were passed a command and not polled since. There is no second one for
+        # them, or several senders would soon fill a sink that a poll empties by one message.
+        self._given: set[int] = set()
         self._next_inactive_poll = 0.0
         self._last_probed: _PollList | None = None
-
-    @property
-    def _is_listed(self) -> bool:
-        own = self._settings.station
-        return own in self._priority.stations or own in self._normal.stations
 
     @property
     def priority_scan(self) -> ScanTimes:
@@ -167,6 +166,7 @@ class StandardPollingMaster:
         """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
         self._line.forget_forwards()
         self._outstanding.clear()
+        self._given.clear()
         self._priority.started = self._normal.started = None  # no scan lasts across a stop
         while True:
             begun = self._machine.now
@@ -186,7 +186,7 @@ class StandardPollingMaster:
                 yield from self._visit(number, source)
         yield from self._visit_inactive(self._priority, source)
         yield from self._visit_group(source)
-        if self._polling.in_sequence and not self._is_listed:
+        if self._polling.in_sequence and self._settings.station not in self._listed:
             yield from self._send_commands(source)
 
     def _visit_group(self, source: TaskSource) -> Talk:
@@ -253,6 +253,7 @@ class StandardPollingMaster:
 
     def _answered(self, number: int, answer: Control | Frame) -> Talk:
         """Take what a station has answered to a poll."""
+        self._given.discard(number)
         packet = None
         if isinstance(answer, Frame):
             packet = yield from self._line.receive(number, answer)
@@ -288,8 +289,11 @@ class StandardPollingMaster:
 
     def _send_commands(self, source: TaskSource) -> Talk:
         """Send messages to be passed on, and commands to stations that owe us no reply."""
-        while self._line.has_forwards:
-            yield from self._line.forward()
+        self._given = {number for number in self._given if self._is_active(number)}
+        while self._line.has_forwards(self._given):
+            packet = yield from self._line.forward(self._given)
+            if packet is not None and not packet.is_reply and packet.dst in self._listed:
+                self._given.add(packet.dst)
         for number in list(self._outstanding):
             if not self._stations[number].active:  # it did not take what was passed on
                 self._end(number, StationInactive(number))

@@ -44,7 +44,8 @@ class ReadPoint:
     What is known of one mapping that reads.
 
     ``period`` and ``stale_time`` are in seconds: a value is late when it is older than one and
-    a half periods and than half of ``stale_time``, stale when older than all of it. ``error`` says why the last read gave no value.
+    a half periods and than half of ``stale_time``, stale when older than all of it. ``error``
+    says why the last read gave no value.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
