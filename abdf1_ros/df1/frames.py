@@ -147,7 +147,7 @@ class FrameDecoder:
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
     everything heard. Bytes outside of any symbol are noise: they are skipped and counted in
     ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
-    ``in_message`` tells whether a message has begun and not ended.
+    ``in_message`` tells whether a message has begun and not ended, ``begun`` counts beginnings.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
@@ -160,6 +160,7 @@ class FrameDecoder:
         self.last_byte = 0
         self.noise = 0
         self.in_message = False
+        self.begun = 0
 
     def reset(self) -> None:
         """Forget everything heard so far."""
@@ -217,6 +218,7 @@ class FrameDecoder:
     def _begin_data(self, station: int | None) -> None:
         self._step = self._link_data
         self.in_message = True
+        self.begun += 1
         self._station = station
         self._data.clear()
 

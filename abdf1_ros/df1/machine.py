@@ -104,6 +104,8 @@ class Machine:
         self._last_heard = -math.inf
         self._echoes = False
         self._echo_due = 0
+        self._due = -math.inf  # the deadline, before a message was heard out
+        self._message = 0
 
     @property
     def char_time(self) -> float:
@@ -152,10 +154,15 @@ class Machine:
         self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
-        if self._listening and not self._resting and self.decoder.in_message \
-                and self.deadline is not None:
-            # An answer that has begun may take its time on the line, but not pause.
-            self.deadline = max(self.deadline, now + self._pause_limit)
+        if self._listening and not self._resting and self.deadline is not None:
+            self._hear_out(now, self.deadline)
+
+    def _hear_out(self, now: float, deadline: float) -> None:
+        """Let a message that has begun in time be heard to its end, unless it pauses."""
+        if now <= self._due:
+            self._message = self.decoder.begun
+        if self.decoder.in_message and self.decoder.begun == self._message:
+            self.deadline = max(deadline, now + self._pause_limit)
 
     def handle_timeout(self, now: float) -> None:
         """Take note that the clock reads ``now``; does nothing before the deadline."""
@@ -260,4 +267,5 @@ class Machine:
     def _set_deadline(self, timeout: float | None, start: float) -> None:
         if timeout == KEEP:
             return
-        self.deadline = None if timeout is None else start + timeout
+        self._due = start + (timeout or 0.0)
+        self.deadline = None if timeout is None else self._due

@@ -227,9 +227,8 @@ class MasterLine:
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
         station = self.stations[number]
-        is_new = packet.duplicate_key != station.last_key
         is_command_to_forward = not packet.is_reply and self._is_to_forward(packet)
-        if is_new and is_command_to_forward and self.is_full:
+        if is_command_to_forward and self.is_full and not station.repeats(packet):
             return None  # not acknowledged: the slave keeps it; replies make room and go on
         self.counters.acks_sent += 1
         yield Step(frames.ACK, 0)

@@ -27,7 +27,8 @@ an ENQ (M 4-7..4-9). That memory begins as NAK, and falls back to NAK with every
 that was no message: an old ACK must not stand for a new message that got lost.
 
 Responses name no message. A transfer that needed a retry is therefore followed by Timeout in
-which responses that come late are passed over; they would stand for the next message.
+which responses that come late are passed over; they would stand for the next message. Behind
+a reply that came before its ACK, a tenth of a second does.
 
 An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
 at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
@@ -61,6 +62,9 @@ _NAK_PAUSE = 0.25
 MAX_WAITING_REPLIES = 8
 
 _MIN_RESPONSE_TIME = 0.02
+
+# How long (s) an ACK may come behind the reply that overtook it.
+_LATE_ACK = 0.1
 
 Hearing = Generator[Step, Symbol | None, None]
 
@@ -207,8 +211,10 @@ class FullDuplexPeer:
                            station=station)
                 sending = frames.ENQ
         delivered = self._machine.now if response in (Code.ACK, Code.STX) else None
-        if naks or enqs or response is Code.STX:
+        if naks or enqs:
             yield from self._listen(self._timeout)
+        elif response is Code.STX:
+            yield from self._listen(_LATE_ACK)
         return delivered
 
     def _response(self, sending: bytes,

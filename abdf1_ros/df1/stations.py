@@ -30,13 +30,14 @@ class Station:
     One station: its place in the list and the last transaction received from it.
 
     ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
-    first. ``last_key`` is the duplicate key of the last message accepted.
+    first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
+    nodes that we pass on may have the same TNS.
     """
 
     number: int
     active: bool = True
     last_heard: float | None = None
-    last_key: tuple[int, int, int] | None = None
+    last_key: tuple[int, int, int, int] | None = None
     last_tns: int | None = None
     replies: int = 0
     failures: int = 0
@@ -45,10 +46,14 @@ class Station:
 
     def accepts(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""
-        if packet.duplicate_key == self.last_key:
+        if self.repeats(packet):
             return False
-        self.last_key = packet.duplicate_key
+        self.last_key = packet.dst, *packet.duplicate_key
         return True
+
+    def repeats(self, packet: Packet) -> bool:
+        """Tell whether ``packet`` is the last message once more."""
+        return (packet.dst, *packet.duplicate_key) == self.last_key
 
 
 class ActiveStationList:

@@ -71,7 +71,7 @@ class Reader:
         return self.take(len(self._data) - self._position)
 
     def end(self) -> None:
-        """Raise FormatError when anything is left."""
-        left = len(self.rest())
-        if left:
-            raise FormatError(f'{left} bytes too many')
+        """Raise FormatError when anything but padding is left: some devices append 00."""
+        left = self.rest()
+        if any(left):
+            raise FormatError(f'{len(left)} bytes too many')

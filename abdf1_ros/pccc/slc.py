@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import number, Reader, word
 
 CMD = 0x0F
@@ -122,7 +121,6 @@ class MaskedWrite:
 
 
 def _sized(reader: Reader, size: int) -> bytes:
-    data = reader.rest()
-    if len(data) != size:
-        raise FormatError(f'{len(data)} bytes of data, the size field says {size}')
+    data = reader.take(size)
+    reader.end()
     return data

@@ -20,8 +20,8 @@ from collections.abc import Callable
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Code, Control, EOT, message_frame, NAK, Symbol
-from abdf1_ros.df1.machine import LineTiming, LISTEN_ON, Machine, Procedure, Step
+from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, NAK, Symbol
+from abdf1_ros.df1.machine import KEEP, LineTiming, LISTEN_ON, Machine, Procedure, Step
 import pytest
 
 FRAME = b'0123456789'
@@ -221,10 +221,21 @@ def test_answer_that_has_begun_extends_the_deadline() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), forget_on_send=True)
     bench.machine.start(0.0)
     for number, byte in enumerate(MESSAGE):
-        bench.machine.receive_data(bytes((byte,)), 1.0 + 0.2 * number)
-        bench.machine.handle_timeout(1.0 + 0.2 * number)
+        bench.machine.receive_data(bytes((byte,)), 0.8 + 0.2 * number)
+        bench.machine.handle_timeout(0.8 + 0.2 * number)
     assert len(bench.got) == 1
     assert bench.got[0] is not None
+
+
+def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(b'', KEEP), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(MESSAGE[:5], 1.0)
+    bench.machine.receive_data(MESSAGE[5:], 1.2)  # heard out to its end
+    assert isinstance(bench.got[0], Frame)
+    deadline = bench.machine.deadline
+    bench.machine.receive_data(MESSAGE[:5], 1.4)
+    assert bench.machine.deadline == deadline
 
 
 def test_pause_ends_an_answer_that_has_begun() -> None:

@@ -671,3 +671,23 @@ def test_report_may_be_left_out() -> None:
     script.master = HalfDuplexMaster(script.machine, SETTINGS, script.stations)
     assert isinstance(script.run(COMMAND, *(SENT, TIMEOUT) * 3), LinkError)
     assert script.events == []
+
+
+def test_slaves_command_instead_of_the_reply_is_acknowledged_and_polling_goes_on() -> None:
+    script = MasterScript(SETTINGS)
+    foreign = Packet(MASTER, SLAVE, 0x0F, 0, 0x0777, b'\xAA')
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(foreign), ACKED, POLLED_AGAIN,
+                      SAYS_REPLY, ACKED) == REPLY
+    # Nobody serves here: it is told and dropped.
+    assert script.numbers() == [(2510, SLAVE, MASTER, 0x0777), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 2, 'commands_received': 1, 'replies_received': 1, 'polls_sent': 2,
+        'acks_sent': 2}
+
+
+def test_repetition_is_known_by_its_dst_too() -> None:
+    script = MasterScript(SETTINGS)
+    others = replace(REPLY, dst=9)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(others), ACKED, POLLED_AGAIN,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert 'duplicate_messages' not in script.counts()

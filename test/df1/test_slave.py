@@ -336,3 +336,76 @@ def test_multidrop_nak_resets_every_station() -> None:
         line.say(master_frame(number, COMMAND.encode(), Checksum.CRC))
     assert line.say(NAK) == b''
     assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (EOT, EOT)
+
+
+def test_duplicates_are_executed_when_nobody_looks_for_them() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, duplicate_detection=False))
+    assert bench.hear(sent(COMMAND), sent(COMMAND)) == [ACK, ACK]
+    assert bench.served == [COMMAND, COMMAND]
+    assert bench.slave.counters.duplicate_messages == 0
+
+
+def test_eot_suppression_leaves_messages_as_they_are() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, eot_suppression=True))
+    assert bench.hear(POLL, sent(COMMAND), POLL, HEARD_ACK, POLL) == [
+        b'', ACK, reply_frame(COMMAND), b'', b'']
+    assert bench.slave.counters.eots_sent == 0
+    assert bench.slave.counters.polls_received == 3
+
+
+def test_defaults_are_those_of_allen_bradley() -> None:
+    settings = SlaveSettings(STATION)
+    assert (settings.retries, settings.eot_suppression, settings.duplicate_detection) == (
+        3, False, True)
+
+
+def test_limit_counts_afresh_for_every_message() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, retries=1))
+    first, second = reply_frame(COMMAND), reply_frame(later(1))
+    assert bench.hear(sent(COMMAND), sent(later(1)), POLL, POLL, HEARD_ACK, POLL, POLL)[2:] == [
+        first, first, b'', second, second]
+
+
+def test_full_sink_does_not_forget_the_last_command() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
+    assert bench.hear(sent(COMMAND), sent(later(1)), sent(COMMAND)) == [ACK, b'', ACK]
+    assert bench.served == [COMMAND]
+
+
+def test_broadcast_and_reply_need_no_room() -> None:
+    bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
+    broadcast = replace(later(1), dst=BROADCAST)
+    assert bench.hear(sent(COMMAND), sent(broadcast, BROADCAST), sent(later(2).reply())) == [
+        ACK, b'', ACK]
+    assert bench.served == [COMMAND, broadcast]
+    assert bench.slave.counters.replies_received == 1
+
+
+def test_bad_broadcast_is_not_executed() -> None:
+    bench = Bench()
+    assert bench.hear(sent(COMMAND, BROADCAST, Fault.BAD_CHECK)) == [b'']
+    assert (bench.served, bench.counts()) == ([], {'crc_errors': 1})
+
+
+def test_echo_of_our_message_leaves_us_waiting_for_the_ack() -> None:
+    bench = Bench()
+    echo_of_ours = Frame(COMMAND.reply().encode())
+    assert bench.hear(sent(COMMAND), POLL, echo_of_ours, HEARD_ACK, POLL)[2:] == [b'', b'', EOT]
+    assert bench.slave.counters.acks_received == 1
+
+
+@pytest.mark.parametrize('heard', [
+    Frame(later(1).reply().encode()), Frame(COMMAND.reply().encode(), None, Fault.BAD_CHECK),
+    Frame(COMMAND.reply().encode(), STATION)])
+def test_what_only_looks_like_an_echo_takes_the_ack_away(heard: Frame) -> None:
+    bench = Bench()
+    bench.hear(sent(COMMAND), POLL, heard)
+    assert bench.hear(HEARD_ACK, POLL)[-1] == reply_frame(COMMAND)
+    assert bench.slave.counters.acks_received == 0
+
+
+def test_withdraw_does_not_touch_replies() -> None:
+    bench = Bench()
+    bench.hear(sent(COMMAND), POLL)
+    bench.slave.withdraw()
+    assert bench.hear(POLL) == [reply_frame(COMMAND)]

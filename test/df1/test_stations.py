@@ -80,7 +80,7 @@ def test_repeated_message_is_not_accepted() -> None:
     station = Station(7)
     assert station.accepts(REPLY)
     assert not station.accepts(REPLY)
-    assert not station.accepts(Packet(6, 7, 0x4F, 0x10, 0x0102, b'other'))
+    assert not station.accepts(Packet(5, 7, 0x4F, 0x10, 0x0102, b'other'))
 
 
 @pytest.mark.parametrize('other', [

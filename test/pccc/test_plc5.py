@@ -158,7 +158,12 @@ def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> Non
 
 def test_bytes_behind_a_typed_read_are_a_format_error() -> None:
     with pytest.raises(FormatError, match='too many'):
-        TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 00'))
+        TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 01'))
+
+
+def test_padding_behind_a_typed_read_is_passed_over() -> None:
+    padded = TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 00 00'))
+    assert padded == TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00'))
 
 
 def test_read_modify_write_of_nothing_is_a_format_error() -> None:

@@ -90,13 +90,21 @@ def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> Non
 
 
 @pytest.mark.parametrize(('fnc', 'encoded'), [
-    (0xA2, ''), (0xA2, '02 07 89 00'), (0xA2, '02 07 89 00 00 00'), (0xA2, '02 07 89 FF 2C'),
+    (0xA2, ''), (0xA2, '02 07 89 00'), (0xA2, '02 07 89 00 00 01'), (0xA2, '02 07 89 FF 2C'),
     (0xAA, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01'), (0xAA, '02 07 89 00 00 01 02 03'),
     (0xAB, '02 07 89 00 00 08 00 08'), (0xAB, '04 07 89 00 00 08 00 08 00'),
     (0xAB, '02 07 89 00 00 08')])
 def test_sizes_that_do_not_add_up(fnc: int, encoded: str) -> None:
     with pytest.raises(FormatError):
         COMMANDS[fnc].read(Reader(bytes.fromhex(encoded)))
+
+
+@pytest.mark.parametrize(('fnc', 'encoded'), [
+    (0xA2, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01 02'),
+    (0xAB, '02 07 89 00 00 08 00 08 00')])
+def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str) -> None:
+    padded = COMMANDS[fnc].read(Reader(bytes.fromhex(encoded + ' 00 00')))
+    assert padded == COMMANDS[fnc].read(Reader(bytes.fromhex(encoded)))
 
 
 def test_limits_of_the_manual() -> None:

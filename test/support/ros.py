@@ -82,9 +82,9 @@ class Process:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """End the process in any case."""
-        if self._process.poll() is None:
-            self._process.kill()
+        """End the process in any case, also one that a failed test has left."""
+        if self.is_running:
+            self.send(signal.SIGCONT, signal.SIGINT)
         self.result()
 
     @property

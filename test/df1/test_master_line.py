@@ -1,0 +1,296 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What both kinds of master share: messages of slaves served, passed on, dropped; broadcasts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import master_frame
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.polling import PollingSettings
+import pytest
+from support.multidrop import MasterBench
+from support.vectors import vector
+
+MASTER = 5
+SETTINGS = MasterSettings(
+    station=MASTER, nak_retries=1, enq_retries=1, timeout=0.1, cmd_timeout=0.5)
+BOTH = pytest.mark.parametrize('standard', [False, True], ids=['message', 'standard'])
+
+
+def bench(standard: bool, *numbers: int, dead: tuple[int, ...] = (),
+          settings: MasterSettings = SETTINGS, serves: bool = True) -> MasterBench:
+    """Return a master of either kind and its stations."""
+    polling = PollingSettings(numbers) if standard else None
+    return MasterBench(*numbers, settings=settings, polling=polling, dead=dead,
+                       serve=Packet.reply if serves else None)
+
+
+def poll(rig: MasterBench, *numbers: int, times: int = 1) -> None:
+    """Let the master poll stations, by commands of its own, so often."""
+    for _ in range(times):
+        for number in numbers:
+            rig.ask(number)
+            rig.run(0.1)
+
+
+@BOTH
+def test_command_for_us_is_served_and_its_reply_delivered(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    command = rig.message(7, MASTER)
+    rig.start()
+    poll(rig, 7, 8)
+    assert rig.master.served == [command]
+    assert rig[7].heard == [command.reply()]
+    assert rig.master.said.count('R7') == 1
+    assert 'C8' in rig.master.said and 'R8' not in rig.master.said
+    assert rig[7].slave.counters.acks_received == 2
+    counts = rig.master.counts()
+    assert (counts['commands_received'], counts['replies_sent']) == (1, 1)
+    assert not {'stale_messages', 'invalid_messages', 'enq_retries'} & counts.keys()
+    assert all(isinstance(errand.result, Packet) for errand in rig.master.all)
+
+
+@BOTH
+def test_repeated_command_for_us_is_acknowledged_and_served_once(standard: bool) -> None:
+    rig = bench(standard, 7)
+    command = rig.message(7, MASTER)
+    rig[7].outbox.append(command)  # as when it has not heard our ACK
+    rig[7].slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
+    rig.start()
+    rig.ask(7)
+    rig.run(0.2)
+    del rig[7].slave._next_packet
+    rig.run(0.4)
+    assert rig.master.served == [command]
+    assert rig[7].heard == [command.reply()]
+    assert rig.master.counts()['duplicate_messages'] == 1
+    assert (2524, 7) in rig.master.numbers()
+    assert rig[7].failed == []
+
+
+@BOTH
+@pytest.mark.parametrize('dst', [MASTER, 8, BROADCAST])
+def test_what_is_not_accepted_is_acknowledged_dropped_and_counted(standard: bool,
+                                                                 dst: int) -> None:
+    rig = bench(standard, 7, 8, settings=replace(SETTINGS, accept_slave_messages=False))
+    command = rig.message(7, dst)
+    rig.start()
+    poll(rig, 7, 8)
+    assert rig[7].slave.counters.nak_retries == 0  # it has its ACK
+    assert rig.master.served == rig[7].heard == []
+    assert [packet.src for packet in rig[8].served] == [MASTER]
+    assert rig.master.numbers().count((2510, 7, dst, command.tns)) == 1
+    assert rig.master.counts()['commands_received'] == 1
+    assert rig.master.counts().get('invalid_messages', 0) == (dst != MASTER)
+
+
+@BOTH
+def test_command_for_us_is_dropped_when_there_is_nobody_to_serve_it(standard: bool) -> None:
+    rig = bench(standard, 7, serves=False)
+    command = rig.message(7, MASTER)
+    rig.start()
+    poll(rig, 7)
+    assert rig[7].heard == []
+    assert (2510, 7, MASTER, command.tns) in rig.master.numbers()
+
+
+@BOTH
+def test_command_for_us_with_anothers_src_is_not_served(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig[7].outbox.append(Packet(MASTER, 9, 0x0F, 0, 1, b'\x67'))
+    rig.start()
+    poll(rig, 7)
+    assert rig.master.served == []
+    assert rig.master.counts()['invalid_messages'] == 1
+
+
+@BOTH
+def test_message_for_another_station_is_passed_on_unchanged(standard: bool) -> None:
+    passed_on = vector('hd_s2s_relayed_to_7')
+    # There, station 5 asks station 7; the master has another number.
+    rig = bench(standard, 5, 7, settings=replace(SETTINGS, station=0))
+    rig[5].outbox.append(passed_on.packet)
+    rig.start()
+    rig.ask(5, master=0)
+    rig.run(0.3)
+    assert passed_on.frame in b''.join(rig.master.machine.sent)
+    assert rig[7].served == [passed_on.packet]
+    assert rig[5].heard == [passed_on.packet.reply()]
+    assert master_frame(5, passed_on.packet.reply().encode(), Checksum.CRC) in b''.join(
+        rig.master.machine.sent)
+    assert rig.master.served == []
+    counts = rig.master.counts()
+    assert (counts['commands_sent'], counts['replies_sent']) == (2, 1)
+    assert not {'stale_messages', 'invalid_messages'} & counts.keys()
+
+
+def test_message_based_master_polls_for_the_reply_at_once() -> None:
+    rig = bench(False, 7, 8)
+    rig.message(7, 8)
+    rig.start()
+    poll(rig, 7)
+    assert rig.master.said == 'C7 P7 P7 C8 P8 R7'
+
+
+def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
+    rig = bench(False, 7, 8)
+    rig[8].delay = 1.0
+    command = rig.message(7, 8)
+    rig.start()
+    rig.ask(7)
+    rig.run(1.2)
+    assert 'NAK' not in rig.master.said
+    assert rig[7].heard == []
+    assert 'command_timeouts' not in rig.master.counts()
+    rig[8].delay = 0.0
+    poll(rig, 8)  # the late reply comes now, and is passed on all the same
+    assert rig[7].heard == [command.reply()]
+
+
+@BOTH
+@pytest.mark.parametrize('known', [False, True])
+def test_originator_learns_that_the_destination_is_dead(standard: bool, known: bool) -> None:
+    rig = bench(standard, 7, 8, dead=(8,))
+    command = rig.message(7, 8)
+    rig.start(*[8] * known)
+    rig.ask(7)
+    rig.run(1.0)
+    assert rig[7].heard == [Packet(7, 8, 0x4F, 2, command.tns)]
+    assert (2509, 8) in rig.master.numbers()
+    assert not rig.master.stations[8].active
+    assert rig.master.counts()['error_messages_sent'] == 1
+    assert len(rig.master.times('C8')) == (0 if known else 2)
+
+
+@BOTH
+def test_reply_that_cannot_be_passed_on_is_dropped(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig.message(7, 8)
+    rig.start()
+    rig.ask(7)
+    rig.line.run(lambda: bool(rig[8].served), 1.0)
+    rig[7].silent = True
+    rig.run(1.0)
+    assert not rig.master.stations[7].active
+    assert 'R8' not in rig.master.said
+    poll(rig, 8)
+    assert isinstance(rig.master.all[-1].result, Packet)
+
+
+@BOTH
+def test_broadcast_of_a_slave_is_acknowledged_and_sent_to_all(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    command = rig.message(7, BROADCAST)
+    rig.start()
+    poll(rig, 7)
+    assert rig.master.served == []
+    for number in (7, 8):
+        assert rig[number].served.count(command) == 1
+    assert rig[7].slave.counters.acks_received == 2
+    assert rig.master.said.count('C255') == 1
+    frame = master_frame(BROADCAST, command.encode(), Checksum.CRC)
+    assert b''.join(rig.master.machine.sent).count(frame) == 1
+
+
+@BOTH
+def test_broadcast_of_ours_goes_once_and_is_left_to_the_slaves(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    errand = rig.ask(BROADCAST)
+    other = rig.ask(8)
+    rig.start()
+    rig.run(0.2)
+    assert errand.result == errand.command.reply()
+    assert other.result == other.command.reply()
+    assert [packet.dst for packet in rig[7].served] == [BROADCAST]
+    log = rig.master.machine.log
+    assert log[0][1] == 'C255'
+    leaves = len(master_frame(BROADCAST, errand.command.encode(), Checksum.CRC)) * 10 / 19200
+    assert log[1][0] == pytest.approx(leaves + BROADCAST_PAUSE)
+    assert 'P255' not in rig.master.said
+    counts = rig.master.counts()
+    assert counts['commands_sent'] == counts['messages_sent'] == 2
+    assert 'nak_retries' not in counts
+
+
+@BOTH
+def test_broadcast_does_not_enter_the_list_of_stations(standard: bool) -> None:
+    rig = bench(standard, 7)
+    rig.ask(BROADCAST)
+    rig.message(7, BROADCAST)
+    rig.start()
+    poll(rig, 7)
+    assert [station.number for station in rig.master.stations] == [7]
+
+
+def test_no_ack_for_a_command_that_cannot_be_kept() -> None:
+    # Without the NAK, which would make the slave drop what it holds.
+    rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False))
+    rig[7].slave._settings = replace(rig[7].slave._settings, retries=200)
+    for _ in range(MAX_FORWARDS + 1):
+        rig.message(7, 8)
+    rig[7].delay = 0.0
+    rig.start()
+    slave = rig[7].slave
+    # The reply to the master's own command comes last, by taking away the turn of replies.
+    slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
+    errand = rig.ask(7)
+    rig.run(0.49)
+    assert slave.counters.acks_received == MAX_FORWARDS
+    assert slave.counters.nak_retries > 0
+    assert slave._held is not None
+    assert errand.result is None
+    assert 'duplicate_messages' not in rig.master.counts()
+    del slave._next_packet
+    rig.run(0.5)  # the transaction ends, and what waits is passed on
+    poll(rig, 7, times=3)
+    assert slave.counters.acks_received > MAX_FORWARDS
+    assert slave._held is None
+    rig.run(1.0)
+    assert len({packet.tns for packet in rig[8].served}) == MAX_FORWARDS + 1
+
+
+@BOTH
+def test_replies_to_two_nodes_with_one_number_are_no_repetition(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig.start()
+    first = rig.ask(8)
+    rig.run(0.1)
+    command = Packet(8, 7, 0x0F, 0, first.command.tns, b'\x67')
+    rig[7].outbox.append(command)
+    rig.ask(7)
+    rig.run(0.5)
+    assert isinstance(first.result, Packet)
+    assert rig[7].heard == [command.reply()]
+    assert 'duplicate_messages' not in rig.master.counts()
+
+
+@BOTH
+def test_start_forgets_what_waited_to_be_passed_on(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig.message(7, 8)
+    rig.start()
+    rig.ask(7)
+    rig.line.run(lambda: rig[7].slave.counters.acks_received > (not standard), 1.0)
+    rig.master.machine.stop()
+    rig.forget()
+    rig.run(1.0)
+    rig.master.machine.start(rig.clock())
+    rig.line.wake(rig.master.machine)
+    rig.run(0.3)
+    assert 'C8' not in rig.master.said

@@ -1,0 +1,260 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A master and three slaves on one noisy line where everybody hears everything and asks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from random import Random
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.master_line import MasterSettings
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.errors import CommandTimeout, StationInactive
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.server import Server
+import pytest
+from support.multidrop import Errands, MasterNode, SlaveNode
+from support.peers import Errand
+from support.virtual_line import char_time, Noise, QUIET, VirtualLine
+
+MASTER, SLAVES, ASKING = 5, (1, 2, 16), (1, 2)
+BAUD = 19200
+WORDS = 40
+FAMILY = PlcType.SLC
+DIALECT = DIALECTS[FAMILY]
+MODES = {
+    'message': None,
+    'single': PollingSettings(SLAVES),
+    'multiple': PollingSettings((2, 16), priority=(1,), group_size=1, multiple=True),
+    'in sequence': PollingSettings((1, MASTER, 2, 16), in_sequence=True),
+}
+
+
+class Rig:
+    """All nodes and their line; each has words of its own."""
+
+    def __init__(self, mode: str, *, noise: Noise = QUIET, seed: int = 1, chunk: int = 1,
+                 checksum: Checksum = Checksum.CRC) -> None:
+        self.random = Random(seed)
+        self.tables = {number: DataTable(FAMILY) for number in (MASTER, *SLAVES)}
+        for table in self.tables.values():
+            table.create(Address.parse('N7:0', FAMILY), WORDS)
+        self.executed: Counter[tuple[int, int, int]] = Counter()
+        self.replies: dict[tuple[int, int, int], Packet] = {}
+        self.commands: dict[tuple[int, int, int], Packet] = {}
+        timing = LineTiming(char_time(BAUD))
+        settings = MasterSettings(MASTER, checksum, timeout=0.1, cmd_timeout=0.5)
+        self.master = MasterNode(settings, self.clock, MODES[mode], numbers=SLAVES,
+                                 serve=lambda command: self.serve(MASTER, command),
+                                 timing=timing)
+        self.slaves = {number: SlaveNode(
+            SlaveSettings(number, checksum), self.clock, cmd_timeout=2.0, poll_timeout=5.0,
+            serve=lambda command, number=number: self.serve(number, command),
+            timing=timing) for number in SLAVES}
+        self.nodes: dict[int, MasterNode | SlaveNode] = {MASTER: self.master, **self.slaves}
+        self.tns = dict.fromkeys(self.nodes, 0x0F00)
+        self.line = VirtualLine(
+            *(node.machine for node in self.nodes.values()), baud=BAUD, propagation=0.0005,
+            chunk=chunk, noise=noise, seed=seed)
+        self.line.start()
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.line.now if hasattr(self, 'line') else 0.0
+
+    def serve(self, number: int, command: Packet) -> Packet:
+        """Execute a command at a node, and remember it."""
+        key = number, command.src, command.tns
+        self.executed[key] += 1
+        self.commands[key] = command
+        self.replies[key] = Server(self.tables[number]).serve(command)
+        return self.replies[key]
+
+    def ask(self, src: int, dst: int) -> Errand:
+        """Queue a random read or write from one node to another."""
+        address = Address.parse(f'N7:{self.random.randrange(WORDS - 12)}', FAMILY)
+        words = self.random.randint(1, 12)
+        body = DIALECT.read(address, words)
+        if self.random.random() < 0.5:
+            body = DIALECT.write(address, bytes(
+                self.random.choice((0x00, 0x10, 0x55, 0xFF)) for _ in range(2 * words)))
+        self.tns[src] = self.tns[src] + 1 & 0xFFFF
+        node: Errands = self.nodes[src]
+        errand = node.add(Packet(dst, src, DIALECT.cmd, 0, self.tns[src], body))
+        if src == MASTER:
+            self.line.wake(self.master.machine)
+        return errand
+
+    def run(self, count: int) -> None:
+        """Let the master and two slaves ask ``count`` times each, until all of it has ended."""
+        for _ in range(count):
+            for src in ASKING:
+                self.ask(src, self.random.choice([dst for dst in self.nodes if dst != src]))
+        for asked in range(10_000):
+            if asked >= count and self.is_done():
+                return
+            # Message-based polling polls a slave only when it has something for it.
+            errand = self.ask(MASTER, SLAVES[asked % 3])
+            self.line.run(lambda errand=errand: errand.result is not None, 100.0)
+        raise AssertionError('not everything ends')
+
+    def is_done(self) -> bool:
+        """Tell whether every command has its end."""
+        return all(errand.result is not None for node in self.nodes.values()
+                   for errand in node.all)
+
+    def results(self, src: int) -> list[Errand]:
+        """Return the errands of a node that have a good reply."""
+        return [errand for errand in self.nodes[src].all
+                if isinstance(errand.result, Packet) and errand.result.sts == 0]
+
+
+def noise_of(rate: float) -> Noise:
+    """Return noise of every kind."""
+    return Noise(rate / 4, rate / 4, rate / 4, rate / 4)
+
+
+def assert_exact(rig: Rig) -> None:
+    """Check that nothing was executed twice, altered, or answered by anybody else."""
+    assert set(rig.executed.values()) <= {1}
+    sent = {(errand.command.dst, src, errand.command.tns): errand.command
+            for src, node in rig.nodes.items() for errand in node.all}
+    for key, command in rig.commands.items():
+        assert sent[key] == command
+    for src, node in rig.nodes.items():
+        for errand in node.all:
+            key = errand.command.dst, src, errand.command.tns
+            if not isinstance(errand.result, Packet):
+                assert isinstance(errand.result, CommandTimeout | StationInactive)
+                assert src == MASTER or isinstance(errand.result, CommandTimeout)
+            elif errand.result.sts == 2:  # the master could not pass it on, as far as it knows
+                assert src in SLAVES and errand.command.dst in SLAVES
+                assert errand.result == errand.command.reply(sts=2)
+            else:
+                assert errand.result == rig.replies[key]
+
+
+def assert_recovers(rig: Rig) -> None:
+    """Check that everybody reaches everybody when the line is quiet."""
+    rig.line.noise = QUIET
+    rig.line.run_for(4.0)  # what was under way comes to its end
+    for number in SLAVES:  # message-based polling brings a station back by a command
+        rig.ask(MASTER, number)
+        rig.line.run_for(1.0)
+        assert rig.master.stations[number].active
+    for src in (MASTER, *ASKING):
+        for dst in rig.nodes:
+            if src != dst:
+                errand = rig.ask(src, dst)
+                for _ in range(20):
+                    if errand.result is None:
+                        rig.ask(MASTER, src if src != MASTER else dst)
+                        rig.line.run_for(0.1)
+                assert isinstance(errand.result, Packet), (src, dst)
+                assert errand.result == rig.replies[dst, src, errand.command.tns]
+    rig.line.run(rig.is_done, 60.0)
+
+
+@pytest.mark.parametrize('chunk', [1, 14])
+@pytest.mark.parametrize('mode', MODES)
+def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> None:
+    rig = Rig(mode, chunk=chunk)
+    rig.run(25)
+    rig.line.run_for(2.0)
+    assert_exact(rig)
+    for src, node in rig.nodes.items():
+        assert len(rig.results(src)) == len(node.all)
+    ours = rig.master.machine.counters
+    theirs = [slave.machine.counters for slave in rig.slaves.values()]
+    total = {name: sum(getattr(counters, name) for counters in theirs)
+             for name in type(ours).__slots__}
+    for sent in ('messages', 'commands', 'replies', 'acks', 'error_messages'):
+        assert getattr(ours, f'{sent}_sent') == total[f'{sent}_received'], sent
+        assert getattr(ours, f'{sent}_received') == total[f'{sent}_sent'], sent
+    # The last poll, and the EOT to it, may be on their way.
+    assert 0 <= total['eots_sent'] - ours.eots_received <= 1
+    assert 0 <= ours.polls_sent - total['polls_received'] <= 1
+    asked = sum(len(node.all) for node in rig.nodes.values())
+    passed_on = sum(errand.command.dst != MASTER for src in ASKING
+                    for errand in rig.nodes[src].all)
+    assert ours.commands_sent == len(rig.master.all) + passed_on
+    assert sum(rig.executed.values()) == asked
+    for counters in (ours, *theirs):
+        assert not any((
+            counters.naks_sent, counters.nak_retries, counters.enq_retries, counters.crc_errors,
+            counters.stale_messages, counters.duplicate_messages, counters.invalid_messages,
+            counters.command_timeouts, counters.nak_limit_exceeded,
+            counters.enq_limit_exceeded))
+    assert rig.master.changes == []
+    assert_recovers(rig)
+
+
+@pytest.mark.parametrize(('rate', 'chunk'), [(1e-4, 1), (1e-3, 14), (1e-2, 1), (1e-2, 14)])
+@pytest.mark.parametrize('mode', MODES)
+def test_noise(mode: str, rate: float, chunk: int) -> None:
+    rig = Rig(mode, noise=noise_of(rate), chunk=chunk, seed=int(rate * 1e4) + chunk)
+    rig.run(30)
+    assert_exact(rig)
+    least = {1e-4: 0.95, 1e-3: 0.9, 1e-2: 0.25}[rate]
+    for src in (MASTER, *ASKING):
+        assert len(rig.results(src)) >= least * len(rig.nodes[src].all)
+    assert rate < 1e-3 or rig.master.machine.counters.enq_retries > 0
+    assert_recovers(rig)
+    assert_exact(rig)
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_line_that_goes_and_comes_again(mode: str) -> None:
+    rig = Rig(mode)
+    for _ in range(2):
+        rig.run(5)
+        rig.line.noise = Noise(lost=1.0)
+        rig.ask(1, 2)
+        rig.ask(2, MASTER)
+        rig.line.run_for(8.0)
+        assert rig.is_done()  # by the poll timeout
+        rig.line.noise = QUIET
+        rig.line.run_for(4.0)
+        for number in SLAVES:
+            rig.ask(MASTER, number)
+        rig.line.run_for(1.0)
+    assert_exact(rig)
+    assert_recovers(rig)
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_noise_with_bcc(mode: str) -> None:
+    rig = Rig(mode, noise=noise_of(1e-3), seed=7, checksum=Checksum.BCC)
+    rig.run(20)
+    for src, node in rig.nodes.items():
+        for errand in node.all:  # what a BCC does not see may be executed, but never twice
+            assert rig.executed[errand.command.dst, src, errand.command.tns] <= 1
+    assert_recovers(rig)
+
+
+def test_same_seed_gives_the_same_line() -> None:
+    times = []
+    for _ in range(2):
+        rig = Rig('single', noise=noise_of(1e-2), seed=3)
+        rig.run(5)
+        times.append([errand.ended for node in rig.nodes.values() for errand in node.all])
+    assert times[0] == times[1]

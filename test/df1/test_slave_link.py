@@ -1,0 +1,397 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The slave that is a driver of its own: its commands, its polls, its time limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, EOT, message_frame, NAK, poll_frame
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.errors import CommandTimeout, PortLost, WrongCommandCode
+import pytest
+from support.multidrop import SlaveBench
+
+US, MASTER, OTHER = 7, 5, 8
+SETTINGS = SlaveSettings(US, retries=2)
+FROM_MASTER = Packet(US, MASTER, 0x0F, 0, 0x0102, b'\xA2\x01')
+OTHERS_TRAFFIC = poll_frame(OTHER) + EOT
+
+
+def own(tns: int = 1, dst: int = OTHER) -> Packet:
+    """Return a command of our own."""
+    return Packet(dst, US, 0x0F, 0, tns, b'\x67')
+
+
+def test_command_leaves_at_a_poll_and_its_reply_ends_it() -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    bench.wait(1.0)
+    assert bench.poll() == bench.own(own())
+    assert errand.sent and errand.result is None
+    assert bench.hear(ACK) == b''
+    assert bench.poll() == EOT
+    assert bench.hear(bench.frame(own().reply(b'\x01'))) == ACK
+    assert errand.result == own().reply(b'\x01')
+    assert bench.numbers() == [(2523, OTHER)]
+    assert bench.counts() == {
+        'polls_received': 2, 'messages_sent': 1, 'commands_sent': 1, 'acks_received': 1,
+        'eots_sent': 1, 'messages_received': 1, 'replies_received': 1, 'acks_sent': 1}
+    assert bench.stations[OTHER].replies == 1
+    assert bench.stations[OTHER].last_heard == bench.now
+    assert bench.events[0].station == OTHER
+
+
+def test_one_command_is_outstanding() -> None:
+    bench = SlaveBench(SETTINGS)
+    first, second = bench.add(own(1)), bench.add(own(2))
+    assert bench.poll() == bench.own(own(1))
+    assert bench.hear(ACK) + bench.poll() == EOT
+    assert not second.sent
+    bench.hear(bench.frame(own(1).reply()))
+    assert first.result == own(1).reply()
+    assert bench.poll() == bench.own(own(2))
+
+
+def test_commands_and_replies_take_turns() -> None:
+    bench = SlaveBench(SETTINGS)
+    errands = [bench.add(own(number)) for number in (1, 2)]
+    served = [replace(FROM_MASTER, tns=tns) for tns in (0x11, 0x12, 0x13)]
+    for command in served:
+        assert bench.hear(bench.frame(command)) == ACK
+    said = []
+    for number in (1, 2):
+        said += [bench.poll()]
+        bench.hear(ACK)
+        said += [bench.poll()]
+        bench.hear(ACK, bench.frame(own(number).reply()))
+    assert said == [bench.own(own(1)), bench.own(served[0].reply()),
+                    bench.own(own(2)), bench.own(served[1].reply())]
+    assert all(errand.result is not None for errand in errands)
+    assert bench.poll() == bench.own(served[2].reply())
+
+
+def test_held_command_is_sent_again_until_its_limit_and_then_returned_with_an_error() -> None:
+    bench = SlaveBench(SETTINGS)
+    first, second = bench.add(own(1)), bench.add(own(2))
+    assert [bench.poll() for _ in range(3)] == [bench.own(own(1))] * 3
+    assert first.result is None
+    assert bench.poll() == bench.own(own(2))
+    assert isinstance(first.result, CommandTimeout)
+    assert second.result is None
+    assert bench.numbers() == [(2519, 2), (2508,)]
+    assert bench.counts() == {
+        'polls_received': 4, 'messages_sent': 4, 'commands_sent': 2, 'nak_retries': 2,
+        'nak_limit_exceeded': 1, 'command_timeouts': 1}
+
+
+def test_nak_fails_the_command_that_is_held() -> None:
+    bench = SlaveBench(SETTINGS)
+    first, second = bench.add(own(1)), bench.add(own(2))
+    bench.hear(bench.frame(FROM_MASTER))
+    bench.poll()
+    assert bench.hear(NAK) == b''
+    assert isinstance(first.result, CommandTimeout)
+    assert bench.poll() == bench.own(own(2))  # the reply is gone with the reset
+    assert second.result is None
+    assert bench.counts()['naks_received'] == 1
+
+
+def test_nak_leaves_a_command_that_the_master_has_taken() -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK, NAK)
+    assert errand.result is None
+    bench.hear(bench.frame(own().reply()))
+    assert errand.result == own().reply()
+
+
+@pytest.mark.parametrize('traffic', [poll_frame(OTHER), EOT, message_frame(
+    FROM_MASTER.reply().encode(), Checksum.CRC), poll_frame(US)[:-1] + b'\x01'])
+def test_ack_after_any_other_traffic_is_another_stations(traffic: bytes) -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(traffic, ACK)
+    assert bench.poll() == bench.own(own())
+    assert bench.counts()['nak_retries'] == 1
+    assert errand.result is None
+
+
+def test_our_own_voice_on_a_two_wire_adapter_is_no_other_traffic() -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    said = bench.poll()
+    assert bench.hear(said) == b''
+    bench.hear(ACK)
+    assert bench.poll() == EOT
+    assert bench.hear(EOT) == b''
+    assert bench.hear(bench.frame(own().reply())) == ACK
+    assert bench.hear(ACK) == b''  # that was us, too
+    assert errand.result == own().reply()
+    assert bench.counts()['acks_received'] == 1
+
+
+def test_reply_with_a_wrong_command_code() -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    assert bench.hear(bench.frame(replace(own().reply(), cmd=0x46))) == ACK
+    assert isinstance(errand.result, WrongCommandCode)
+    assert errand.result.args == (OTHER, 0x46, 0x4F)
+    assert bench.numbers() == [(2505, OTHER, 0x46, 0x4F)]
+    assert bench.counts()['invalid_messages'] == 1
+
+
+@pytest.mark.parametrize('reply', [
+    own(2).reply(), replace(own().reply(), src=9), replace(own().reply(), dst=9)])
+def test_reply_that_fits_nothing_is_stale(reply: Packet) -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    assert bench.hear(bench.frame(reply)) == ACK
+    assert errand.result is None
+    assert bench.numbers() == [(2510, reply.src, reply.dst, reply.tns)]
+    assert bench.counts()['stale_messages'] == 1
+
+
+def test_reply_without_any_command_is_stale() -> None:
+    bench = SlaveBench(SETTINGS)
+    assert bench.hear(bench.frame(own().reply())) == ACK
+    assert bench.counts()['stale_messages'] == 1
+
+
+def test_repeated_reply_is_acknowledged_and_passed_over() -> None:
+    bench = SlaveBench(SETTINGS)
+    bench.add(own())
+    bench.poll()
+    assert bench.hear(ACK, *[bench.frame(own().reply())] * 2) == ACK + ACK
+    assert bench.counts()['duplicate_messages'] == 1
+    assert 'stale_messages' not in bench.counts()
+
+
+def test_reply_is_taken_by_a_sink_that_is_full_of_others() -> None:
+    bench = SlaveBench(replace(SETTINGS, queue_size=1))
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    assert bench.hear(bench.frame(FROM_MASTER)) == ACK
+    assert bench.hear(bench.frame(replace(FROM_MASTER, tns=9))) == b''
+    assert bench.hear(bench.frame(own().reply())) == ACK
+    assert errand.result == own().reply()
+
+
+def test_reply_with_an_error_is_counted_and_handed_on() -> None:
+    bench = SlaveBench(SETTINGS)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK, bench.frame(own().reply(sts=2)))
+    assert errand.result == own().reply(sts=2)
+    assert bench.counts()['error_messages_received'] == 1
+
+
+@pytest.mark.parametrize('busy', [False, True])
+def test_command_timeout_runs_from_the_masters_ack(busy: bool) -> None:
+    bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
+    errand = bench.add(own())
+    bench.wait(3.0)
+    bench.poll()
+    bench.wait(3.0)  # it is still held, and waits for its ACK as long as that takes
+    assert errand.result is None
+    bench.poll()
+    bench.hear(ACK)
+    begun = bench.now
+    if busy:
+        bench.listen(2.0, OTHERS_TRAFFIC, 0.01)
+    else:
+        bench.wait(2.0)
+    assert isinstance(errand.result, CommandTimeout)
+    assert errand.ended is not None
+    assert 1.0 <= errand.ended - begun <= 1.26
+    assert bench.numbers() == [(2508,)]
+    assert bench.counts()['command_timeouts'] == 1
+
+
+def test_reply_that_comes_after_its_time_is_stale() -> None:
+    bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    bench.wait(2.0)
+    bench.hear(bench.frame(own().reply()))
+    assert isinstance(errand.result, CommandTimeout)
+    assert bench.numbers() == [(2508,), (2510, OTHER, US, 1)]
+
+
+@pytest.mark.parametrize('busy', [False, True])
+def test_poll_timeout_fails_what_waits(busy: bool) -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
+    bench.wait(1.0)
+    assert bench.poll() == EOT
+    errands = [bench.add(own(number)) for number in range(3)]
+    polled = bench.now
+    if busy:
+        bench.listen(1.9, OTHERS_TRAFFIC, 0.01)
+    else:
+        bench.wait(1.9)
+    assert [errand.result for errand in errands] == [None] * 3
+    if busy:
+        bench.listen(0.5, OTHERS_TRAFFIC, 0.01)
+    else:
+        bench.wait(0.5)
+    for errand in errands:
+        assert isinstance(errand.result, CommandTimeout)
+        assert not errand.sent
+        assert errand.ended is not None and 2.0 <= errand.ended - polled <= 2.26
+    assert bench.poll() == EOT
+
+
+def test_poll_timeout_begins_at_the_start() -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
+    errand = bench.add(own())
+    bench.wait(1.9)
+    assert errand.result is None
+    bench.wait(0.5)
+    assert isinstance(errand.result, CommandTimeout)
+
+
+def test_poll_timeout_zero_is_never() -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=0.0)
+    errand = bench.add(own())
+    bench.wait(10_000.0)
+    assert errand.result is None
+    assert bench.poll() == bench.own(own())
+
+
+def test_held_command_is_not_sent_any_more_after_the_poll_timeout() -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
+    errand = bench.add(own())
+    bench.poll()
+    bench.wait(3.0)
+    assert isinstance(errand.result, CommandTimeout)
+    assert errand.sent
+    assert bench.poll() == EOT
+
+
+def test_held_reply_survives_the_poll_timeout() -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
+    bench.hear(bench.frame(FROM_MASTER))
+    bench.poll()
+    bench.wait(10.0)
+    assert bench.poll() == bench.own(FROM_MASTER.reply())
+
+
+def test_poll_timeout_fails_a_command_that_waits_for_its_reply() -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=2.0, cmd_timeout=100.0)
+    errand = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    bench.wait(3.0)
+    assert isinstance(errand.result, CommandTimeout)
+
+
+@pytest.mark.parametrize('busy', [False, True])
+def test_waiting_commands_expire_although_we_are_never_polled(busy: bool) -> None:
+    bench = SlaveBench(SETTINGS, poll_timeout=60.0, patience=1.0)
+    errand = bench.add(own())
+    if busy:
+        bench.listen(1.5, OTHERS_TRAFFIC, 0.01)
+    else:
+        bench.wait(1.5)
+    assert isinstance(errand.result, CommandTimeout)
+    assert not errand.sent
+
+
+def test_broadcast_of_ours_is_done_when_the_master_has_it() -> None:
+    bench = SlaveBench(SETTINGS)
+    command = own(dst=BROADCAST)
+    errand, later = bench.add(command), bench.add(own(2))
+    assert bench.poll() == bench.own(command)
+    assert errand.result is None
+    bench.hear(ACK)
+    assert errand.result == command.reply()
+    # The master sends it to all, and we are one of them.
+    assert bench.hear(bench.frame(command, BROADCAST)) == b''
+    assert bench.served == [command]
+    assert bench.poll() == bench.own(own(2))
+    assert later.result is None
+
+
+def test_broadcast_is_executed_by_a_sink_that_is_full() -> None:
+    bench = SlaveBench(replace(SETTINGS, queue_size=1))
+    bench.hear(bench.frame(FROM_MASTER))
+    command = Packet(BROADCAST, MASTER, 0x0F, 0, 0x33, b'\xAA')
+    assert bench.hear(bench.frame(command, BROADCAST)) == b''
+    assert bench.served == [FROM_MASTER, command]
+
+
+def test_start_is_a_clean_one() -> None:
+    bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
+    errand = bench.add(own(1))
+    bench.hear(bench.frame(FROM_MASTER))
+    bench.poll()
+    bench.machine.stop(PortLost('unplugged'))
+    bench.wait(5.0)
+    bench.machine.start(bench.now)
+    assert errand.result is None  # whoever has the tasks ends them
+    later = bench.add(own(2))
+    assert bench.poll() == bench.own(own(2))
+    assert bench.hear(ACK, bench.frame(own(2).reply())) == ACK
+    assert later.result == own(2).reply()
+
+
+def test_tx_delay_passes_before_each_answer() -> None:
+    bench = SlaveBench(SETTINGS, timing=LineTiming(tx_delay=0.02))
+    assert bench.hear(poll_frame(US)) == b''
+    assert bench.machine.deadline == pytest.approx(bench.now + 0.02)
+    bench.now += 0.02
+    bench.machine.handle_timeout(bench.now)
+    assert bench.machine.data_to_send() == EOT
+    bench.now += 0.01
+    assert bench.hear(bench.frame(FROM_MASTER)) == b''
+    bench.now += 0.02
+    bench.machine.handle_timeout(bench.now)
+    assert bench.machine.data_to_send() == ACK
+
+
+def test_frame_that_breaks_off_does_not_swallow_the_next_one() -> None:
+    bench = SlaveBench(SETTINGS)
+    assert bench.hear(bench.frame(FROM_MASTER)[:-4]) == b''
+    bench.wait(0.5)
+    assert bench.hear(bench.frame(FROM_MASTER)) == ACK
+    assert bench.hear(bench.frame(FROM_MASTER)[:-4], poll_frame(US)) != b''
+
+
+def test_bytes_come_one_by_one() -> None:
+    bench = SlaveBench(SETTINGS)
+    assert bench.hear(*(bytes((byte,)) for byte in bench.frame(FROM_MASTER))) == ACK
+    assert bench.served == [FROM_MASTER]
+
+
+def test_eot_suppression() -> None:
+    bench = SlaveBench(replace(SETTINGS, eot_suppression=True))
+    errand = bench.add(own())
+    assert bench.poll() == bench.own(own())
+    bench.hear(ACK)
+    assert bench.poll() == b''
+    assert errand.result is None
+    assert bench.counts()['polls_received'] == 2
+    assert 'eots_sent' not in bench.counts()
