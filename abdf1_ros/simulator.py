@@ -48,10 +48,13 @@ from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port
+from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState
 from abdf1_ros.simulated_plc import Faults, load_plcs, numbers, SimulatedPlc
 
+EXIT_FAULT = 1
 EXIT_CONFIGURATION = 2
+
+WAITING = 'waiting for a client'
 
 # Where a simulated PLC sends its messages: the default Station of a net CSV.
 BRIDGE_STATION = Network().station
@@ -190,7 +193,7 @@ class TcpLine:
         try:
             client, _ = self._listener.accept()
         except TimeoutError:
-            raise OSError('waiting for a client') from None
+            raise OSError(WAITING) from None
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return DescriptorPort(client.fileno(), client.close)
 
@@ -215,37 +218,72 @@ class SerialLine:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run until SIGINT, SIGTERM, "quit" or the end of --seconds; return the exit status."""
+    """
+    Run until SIGINT, SIGTERM, "quit" or the end of --seconds.
+
+    Returns 0, 2 for faulty files or options, 1 after internal errors.
+    """
     options = _parse(args)
-    checksum = Checksum(options.check)
     try:
         script = sorted(map(_scheduled, options.at))
-        plcs = load_plcs(options.data or str(config_file('simulator.csv')), checksum,
-                         time.monotonic)
-        if options.full_duplex is not None:
-            plcs = [_station([options.full_duplex], plcs)[0]]
+        plcs = _load(options)
         line = _open_line(options)
-    except CommandError as error:
-        print(f'simulator: --full-duplex: {str(error).splitlines()[0]}', file=sys.stderr)
-        return EXIT_CONFIGURATION
-    except (ConfigurationError, OSError, ValueError) as error:
+    except (CommandError, ConfigurationError, OSError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return EXIT_CONFIGURATION
-    machine = Machine(multidrop(plcs), checksum=checksum)
-    open_line = line.open
-    if options.full_duplex is not None:
-        # Only a port has a speed of its own, for which the timers have to wait.
-        timing = Network(baud=options.baud).timing if options.port else LineTiming()
-        machine = _full_duplex(plcs[0], checksum, timing)
-        open_line = lambda: _FaultyPort(line.open(), plcs[0])  # noqa: E731
-    link = LinkThread(machine, open_line, on_fault=_print_fault, last_back_off=0.5)
+    link = _make_link(plcs, line, options)
     names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
     _say(f'stations {names} on {line.name}, {options.check}')
     link.start()
     _converse(plcs, script, link, options)
     link.stop()
     line.close()
-    return 0
+    return EXIT_FAULT if link.has_failed else 0
+
+
+def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
+    """Return the PLCs of the data file, or the one that has a line for itself."""
+    plcs = load_plcs(options.data or str(config_file('simulator.csv')),
+                     Checksum(options.check), time.monotonic)
+    if options.full_duplex is None:
+        return plcs
+    for plc in plcs:
+        if options.full_duplex == str(plc.station):
+            return [plc]
+    known = ', '.join(str(plc.station) for plc in plcs)
+    raise CommandError(f'--full-duplex: name a station ({known})')
+
+
+def _make_link(plcs: Sequence[SimulatedPlc], line: PtyLine | TcpLine | SerialLine,
+               options: argparse.Namespace) -> LinkThread:
+    """Return the thread that plays ``plcs`` on ``line``."""
+    checksum = Checksum(options.check)
+    machine = Machine(multidrop(plcs), checksum=checksum)
+    open_line = line.open
+    if options.full_duplex is not None:
+        # Only a port has a speed of its own, for which the timers have to wait.
+        timing = Network(baud=options.baud).timing if options.port else LineTiming()
+        machine = _full_duplex(plcs[0], checksum, timing)
+
+        def open_line() -> Port:
+            return _FaultyPort(line.open(), plcs[0])
+
+    return LinkThread(machine, open_line, on_state=_Announcer().announce,
+                      on_fault=_print_fault, last_back_off=0.5)
+
+
+class _Announcer:
+    """Say what has become of the line, each state once."""
+
+    def __init__(self) -> None:
+        self._last = ''
+
+    def announce(self, state: PortState) -> None:
+        """Say it, unless it is what was said last or what is normal."""
+        is_news = state.text != self._last and not state.is_open
+        self._last = state.text
+        if is_news and WAITING not in state.text:
+            _say(state.text)
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:

@@ -285,3 +285,27 @@ def test_noise_is_the_same_in_every_run(clock: Clock) -> None:
         plc.faults = Faults(noise=0.5)
         heard.append(plc.damaged(bytes(100)))
     assert heard[0] == heard[1] != bytes(100)
+
+
+def test_delay(plc: SimulatedPlc, clock: Clock) -> None:
+    plc.faults = Faults(delay=0.05)
+    master = Master(plc)
+    for _ in range(2):
+        assert master.deliver(READ) == frames.ACK
+        assert [master.poll() for _ in range(3)] == [frames.EOT] * 3
+        clock.now += 0.049
+        assert master.poll() == frames.EOT
+        clock.now += 0.002
+        assert master.poll().startswith(frames.STX)
+        plc.handle(ACKNOWLEDGED)
+        assert master.poll() == frames.EOT
+
+
+def test_delay_ends_with_the_fault(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(delay=0.05)
+    master = Master(plc)
+    master.deliver(READ)
+    plc.faults = Faults()
+    assert master.poll() == frames.EOT  # this reply was late already
+    master.deliver(READ)
+    assert master.poll().startswith(frames.STX)

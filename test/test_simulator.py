@@ -55,6 +55,7 @@ def plcs() -> list[SimulatedPlc]:
 @pytest.mark.parametrize('line, faults, text', [
     ('silent 12', Faults(silent=True), 'station 12: silent'),
     ('  slow   12  3 \n', Faults(slow=3), 'station 12: slow 3'),
+    ('delay 12 50', Faults(delay=0.05), 'station 12: delay 50'),
     ('noise 12 0.01', Faults(noise=0.01), 'station 12: noise 0.01'),
     ('error 12 50', Faults(status=(0x50,)), 'station 12: error 50'),
     ('error 12 F0 0b', Faults(status=(0xF0, 0x0B)), 'station 12: error F0 0b'),
@@ -71,6 +72,8 @@ def test_command(plcs: list[SimulatedPlc], line: str, faults: Faults, text: str)
     ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is no command'),
     ('silent 1 2', '"silent 1 2" is no command'), ('slow 1', '"slow 1" is no command'),
     ('slow 1 few', '"slow 1 few" has a number that is none'),
+    ('delay 1', '"delay 1" is no command'),
+    ('delay 1 long', '"delay 1 long" has a number that is none'),
     ('noise 1 much', '"noise 1 much" has a number that is none'),
     ('error 1 zz', '"error 1 zz" has a number that is none'),
     ('error 1 5', '"error 1 5" has a number that is none'),

@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver as a master with standard polling, and broadcast rows with either polling."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
+from abdf1_ros.driver.driver import DriverSettings
+from abdf1_ros.driver.network import Network, POLLING_MODES
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.simulated_plc import Faults
+import pytest
+from support.driver_bench import DriverBench, store, stored
+from support.mappings import load_rows, make_mapping
+
+STANDARD = Network(baud=115200, timeout=200, polling='Standard')
+FILES = tuple((f'N{number}:0', 20) for number in range(7, 15) if number != 8)
+NUMBERS = [int(text[1:].split(':')[0]) for text, _ in FILES]
+BOTH = pytest.mark.parametrize('polling', POLLING_MODES)
+
+
+def network(polling: str) -> Network:
+    """Return a fast line."""
+    return Network(baud=115200, timeout=200, polling=polling)
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.05])
+def test_many_blocks_of_several_stations(delay: float) -> None:
+    mappings = [make_mapping(f'N{number}:0', station=station, length=10, period=0)
+                for station in (1, 2, 3) for number in NUMBERS]
+    bench = DriverBench(mappings, network=STANDARD)
+    assert isinstance(bench.driver.link, StandardPollingMaster)
+    for station in (1, 2, 3):
+        plc = bench.plc(station, 'PLC5', *FILES)
+        plc.faults.delay = delay
+        for number in NUMBERS:
+            store(plc, f'N{number}:0', [100 * station + number] * 10)
+    bench.run(3.0)
+    for mapping in mappings:
+        file = int(str(mapping.address).split(':')[0][1:])
+        values = bench.listener.values(mapping)
+        assert {tuple(entry) for entry in values} == {(100 * mapping.station + file,) * 10}
+        # A station thinks about one command at a time, all of them do so at once.
+        assert len(values) >= (3.0 / (len(NUMBERS) * (0.06 if delay else 0.03))) - 2
+    counts = [len(bench.listener.values(mapping)) for mapping in mappings]
+    assert max(counts) - min(counts) <= 1
+    assert bench.listener.numbers() == {2523}
+    assert bench.listener.changes == []
+
+
+def test_read_that_takes_several_commands() -> None:
+    long, other = make_mapping('N7:0', length=300), make_mapping('N7:0', station=2)
+    bench = DriverBench([long, other], network=STANDARD)
+    plc = bench.plc(1, 'PLC5', ('N7:0', 300))
+    bench.plc(2, 'PLC5', ('N7:0', 1))
+    store(plc, 'N7:0', list(range(300)))
+    bench.run(2.0)
+    assert {tuple(entry) for entry in bench.listener.values(long)} == {tuple(range(300))}
+
+
+def test_writes() -> None:
+    words = make_mapping('N7:0', 'ReadWrite', length=2)
+    bench = DriverBench([words], network=STANDARD)
+    plc = bench.plc(1, 'PLC5', ('N7:0', 2))
+    bench.run(0.5)
+    bench.write(words, [7, 8])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert stored(plc, 'N7:0', 2) == b'\7\0\x08\0'
+    assert bench.listener.values(words)[-1] == [7, 8]
+
+
+def test_station_that_goes_and_comes_again_has_its_reads_released_at_once() -> None:
+    mappings = [make_mapping(f'N{number}:0', station=station)
+                for station in (1, 2) for number in (7, 9)]
+    bench = DriverBench(mappings, network=STANDARD)
+    bench.plc(1, 'PLC5', *FILES)
+    plc = bench.plc(2, 'PLC5', *FILES)
+    bench.run(1.0)
+    plc.faults = Faults(silent=True)
+    bench.run(5.0)
+    assert bench.listener.changes == [(2, False)]
+    assert [bench.driver.points[mapping].error is None for mapping in mappings] == [
+        True, True, False, False]
+    plc.faults = Faults()
+    bench.run_until(lambda: (2, True) in bench.listener.changes, 5.0)
+    back = bench.clock()
+    bench.run(0.1)
+    for mapping in mappings[2:]:
+        assert back <= bench.listener.times(mapping)[-1]
+
+
+def test_write_to_a_dead_station_is_not_sent() -> None:
+    words = make_mapping('N7:0', 'ReadWrite')
+    bench = DriverBench([words], network=STANDARD)
+    bench.run(2.0)
+    bench.write(words, [7])
+    bench.run(1.0)
+    assert bench.listener.outcomes() == [Outcome.NOT_SENT]
+
+
+def test_mapped_station_that_is_in_no_list_is_polled_all_the_same() -> None:
+    read = make_mapping('N7:0', station=2, period=0)
+    settings = DriverSettings(polling=PollingSettings((1,), priority=(3,)))
+    bench = DriverBench([make_mapping(), read], network=STANDARD, settings=settings)
+    for station in (1, 2):
+        bench.plc(station, 'PLC5', *FILES)
+    bench.run(2.0)
+    assert len(bench.listener.values(read)) > 20
+
+
+@BOTH
+def test_lost_port_leaves_nothing_without_a_result(polling: str) -> None:
+    words = make_mapping('N7:0', 'ReadWrite')
+    bench = DriverBench([words], network=network(polling))
+    plc = bench.plc(1, 'PLC5', *FILES)
+    plc.faults.delay = 0.3
+    bench.run(0.5)
+    bench.write(words, [7])
+    bench.run(0.2)
+    bench.lose_port()
+    assert len(bench.listener.results) == 1
+    plc.faults = Faults()
+    bench.open()
+    bench.run(1.0)
+    assert bench.driver.points[words].error is None
+
+
+@BOTH
+def test_broadcast_row(polling: str) -> None:
+    everybody = make_mapping('N7:0', 'Write', station=BROADCAST)
+    read = make_mapping('N7:0', station=1)
+    bench = DriverBench([everybody, read], network=network(polling))
+    plcs = [bench.plc(station, 'PLC5', *FILES) for station in (1, 2)]
+    bench.run(0.5)
+    bench.write(everybody, [7])
+    bench.run(0.5)
+    result, = bench.listener.results
+    assert result.outcome is Outcome.BROADCAST
+    assert str(result) == 'sent to all stations; nobody confirms a broadcast'
+    assert [stored(plc, 'N7:0') for plc in plcs] == [b'\7\0'] * 2
+    assert bench.listener.values(read)[-1] == [7]
+    assert [station.number for station in bench.driver.stations] == [1]
+    assert bench.listener.numbers() == {2523}
+
+
+@BOTH
+def test_broadcast_row_alone(polling: str) -> None:
+    everybody = make_mapping('N7:0', 'Write', station=BROADCAST)
+    bench = DriverBench([everybody], network=network(polling))
+    plc = bench.plc(1, 'PLC5', *FILES)
+    bench.run(0.5)
+    bench.write(everybody, [7])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.BROADCAST]
+    assert stored(plc, 'N7:0') == b'\7\0'
+
+
+@pytest.mark.parametrize(('command', 'good'), [
+    ('Write', True), ('Read', False), ('ReadWrite', False), ('Serve', False)])
+def test_only_a_write_row_may_name_station_255(command: str, good: bool) -> None:
+    mappings, problems = load_rows(f'a,{command},N7:0,255,SLC,,,,,,,')
+    assert len(mappings) == good
+    assert [problem.message.number for problem in problems if problem.message] == (
+        [] if good else [2501])

@@ -1,0 +1,210 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver in Mode Slave: served words, and reads and writes by way of the master."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from abdf1_ros.df1.machine import LineTiming, Machine
+from abdf1_ros.df1.master_line import MasterSettings
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.file_types import PlcType
+import pytest
+from support.driver_bench import Recorder, simulated_plc, store, stored
+from support.mappings import make_mapping
+from support.multidrop import MasterNode
+from support.peers import Errand
+from support.virtual_line import char_time, Noise, QUIET, VirtualLine
+
+MASTER, US, PLC = 9, 3, 1
+SLC = PlcType.SLC
+DIALECT = DIALECTS[SLC]
+BAUD = 19200
+
+
+class Bench:
+    """A master that polls our driver and a PLC; each of the three is a node of its own."""
+
+    def __init__(self, mappings: Sequence[Mapping], settings: DriverSettings | None = None,
+                 polled: tuple[int, ...] = (US, PLC), check: str = 'CRC') -> None:
+        self.network = Network(mode='Slave', plc_type='SLC', station=US, baud=BAUD,
+                               error_code=check, cmd_timeout=500)
+        self.listener = Recorder(self.clock)
+        self.driver = Driver(
+            self.network, mappings, settings or DriverSettings(), self.listener)
+        self.plc = simulated_plc(PLC, 'SLC', self.clock, ('N7:0', 100), checksum=check)
+        self.master = MasterNode(
+            MasterSettings(MASTER, self.network.checksum, timeout=0.1), self.clock,
+            PollingSettings(polled), numbers=polled, timing=LineTiming(char_time(BAUD)))
+        self.far = Machine(multidrop([self.plc]), checksum=self.network.checksum)
+        self.line = VirtualLine(
+            self.driver.machine, self.master.machine, self.far, baud=BAUD)
+        self.line.start()
+        self._tns = 0
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.line.now
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.line.run_for(seconds)
+
+    def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
+        """Ask for a write, as the node does."""
+        self.driver.write(mapping, values, self.line.now)
+        self.line.wake(self.driver.machine)
+
+    def ask(self, body: bytes, station: int = US) -> Errand:
+        """Let the master send a command."""
+        self._tns += 1
+        return self.master.add(Packet(station, MASTER, DIALECT.cmd, 0, self._tns, body))
+
+    def master_reads(self, text: str, words: int) -> bytes:
+        """Return words that the master reads from us."""
+        place = Address.parse(text, SLC)
+        errand = self.ask(DIALECT.read(place, words))
+        self.line.run(lambda: errand.result is not None, 5.0)
+        assert isinstance(errand.result, Packet)
+        assert errand.result.sts == 0
+        return DIALECT.read_data(place, words, errand.result.data)
+
+
+def serve_row(text: str, length: int = 1) -> Mapping:
+    """Return a Serve row."""
+    return make_mapping(text, 'Serve', station=US, plc='SLC', length=length)
+
+
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+def test_words_are_served_in_both_directions(check: str) -> None:
+    words = serve_row('N7:50', 3)
+    bench = Bench([words], check=check)
+    bench.write(words, [1, -2, 0x1010])
+    bench.run(0.1)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.master_reads('N7:50', 3) == b'\1\0\xfe\xff\x10\x10'
+    bench.ask(DIALECT.write(Address.parse('N7:51', SLC), b'\7\0'))
+    bench.run(0.2)
+    assert bench.listener.values(words)[-1] == [1, 7, 0x1010]
+    assert bench.driver.counters.commands_received == 2
+    assert bench.driver.counters.replies_sent == 2
+    assert [station.number for station in bench.driver.stations] == []
+
+
+def test_served_words_are_stored_although_the_line_is_never_still() -> None:
+    words = serve_row('N7:50')
+    bench = Bench([words], polled=(PLC,))
+    bench.run(1.0)
+    bench.driver.write(words, [5], bench.clock())  # nobody wakes the machine
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+
+
+def test_reads_and_writes_go_by_way_of_the_master() -> None:
+    read = make_mapping('N7:0', station=PLC, plc='SLC', length=4)
+    write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC', length=2)
+    bench = Bench([read, write, serve_row('N7:50')])
+    store(bench.plc, 'N7:0', [1, -2, 3, 0x1010])
+    bench.run(1.0)
+    assert bench.listener.values(read)[-1] == [1, -2, 3, 0x1010]
+    assert len(bench.listener.values(read)) > 4
+    bench.write(write, [7, 8])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert stored(bench.plc, 'N7:10', 2) == b'\7\0\x08\0'
+    assert bench.listener.numbers() == {2523}
+    assert bench.driver.stations[PLC].active
+    counters = bench.driver.counters
+    assert 0 <= counters.commands_sent - counters.replies_received <= 1
+    assert counters.nak_retries == counters.stale_messages == 0
+
+
+def test_word_written_to_the_master_itself() -> None:
+    write = make_mapping('N7:10', 'Write', station=MASTER, plc='SLC')
+    bench = Bench([write])
+    bench.write(write, [7])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert [packet.src for packet in bench.master.served] == [US]
+
+
+def test_broadcast_of_ours() -> None:
+    write = make_mapping('N7:10', 'Write', station=BROADCAST, plc='SLC')
+    words = serve_row('N7:10')
+    bench = Bench([write, words])
+    bench.write(write, [7])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.BROADCAST]
+    assert stored(bench.plc, 'N7:10') == b'\7\0'
+    assert bench.listener.values(words) == [[7]]  # we hear it like everybody else
+
+
+def test_write_that_is_never_polled_for_expires() -> None:
+    write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC')
+    bench = Bench([write], DriverSettings(write_timeout=1.0), polled=(PLC,))
+    bench.write(write, [7])
+    bench.run(0.9)
+    assert bench.listener.outcomes() == []
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.NOT_SENT]
+    assert stored(bench.plc, 'N7:10') == b'\0\0'
+
+
+@pytest.mark.parametrize('period', [0, 100])
+def test_reads_fail_when_the_polls_stay_away_and_come_back_with_them(period: int) -> None:
+    read = make_mapping('N7:0', station=PLC, plc='SLC', period=period)
+    write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC')
+    bench = Bench([read, write], DriverSettings(poll_timeout=2.0, write_timeout=10.0))
+    bench.run(1.0)
+    before = len(bench.listener.values(read))
+    assert before > 5
+    bench.line.noise = Noise(lost=1.0)
+    bench.run(0.1)
+    bench.write(write, [7])
+    bench.run(3.0)
+    assert bench.driver.points[read].error is not None
+    assert bench.listener.outcomes() == [Outcome.NOT_SENT]
+    bench.line.noise = QUIET
+    bench.run(3.0)
+    assert len(bench.listener.values(read)) > before + 5
+    assert stored(bench.plc, 'N7:10') == b'\0\0'  # no old command comes out of a drawer
+
+
+def test_command_to_a_dead_station_is_known_by_the_masters_error_reply() -> None:
+    write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC')
+    bench = Bench([write])
+    bench.plc.faults.silent = True
+    bench.write(write, [7])
+    bench.run(2.0)
+    result, = bench.listener.results
+    assert result.outcome is not Outcome.WRITTEN
+    assert bench.driver.stations[PLC].remote_errors == 1
+
+
+def test_settings_reach_the_slave() -> None:
+    bench = Bench([], DriverSettings(eot_suppression=True))
+    bench.run(1.0)
+    assert bench.driver.counters.polls_received > 0
+    assert bench.driver.counters.eots_sent == 0
+    assert bench.master.changes == [(US, False)]
