@@ -112,6 +112,7 @@ class BridgeNode(Node):
         self.create_timer(_LEVEL_CHECK_PERIOD, self._check_diagnostics,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._port = configuration.port
+        self._port_text = ''
         self.link = LinkThread(
             self.driver.machine, lambda: open_port(configuration.network, configuration.port),
             on_state=self._port_changed, on_fault=self._fault)
@@ -119,7 +120,6 @@ class BridgeNode(Node):
 
     def start(self) -> None:
         """Open the port and begin to read."""
-        self._publish_active()
         self.link.start()
 
     def stop(self) -> None:
@@ -212,13 +212,17 @@ class BridgeNode(Node):
             self.get_logger().error(Message.ERR_INACTIVE_STATION.line(station.number))
 
     def _publish_active(self) -> None:
-        self._active.publish(UInt16MultiArray(data=self.driver.stations.words()))
+        """Publish the Active Node Table; nobody is active behind a closed port."""
+        words = self.driver.stations.words() if self.link.state.is_open else [0] * 16
+        self._active.publish(UInt16MultiArray(data=words))
 
     def _port_changed(self, state: PortState) -> None:
+        self._publish_active()
         if state.is_open:
             self.get_logger().info(f'{self._port}: {state.text}')
-        else:
+        elif state.text != self._port_text:
             self.get_logger().error(f'{self._port}: {state.text}')
+        self._port_text = state.text
 
     def _fault(self, error: Exception) -> None:
         self.get_logger().error(f'internal error: {error!r}; please report it')

@@ -125,7 +125,8 @@ class Diagnostics:
             return ERROR, f'port open, but none of {total} stations answers'
         if active < total:
             return WARN, f'port open, {total - active} of {total} stations do not answer'
-        return OK, f'port open, {total} stations answer'
+        heard = sum(station.last_heard is not None for station in self._driver.stations)
+        return OK, f'port open, {heard} of {total} stations have answered'
 
     def _link_values(self, now: float) -> dict[str, str]:
         state = self._link.state if self._link else None
@@ -158,8 +159,18 @@ class Diagnostics:
     def _station_section(self, station: Station, port: str) -> Section:
         return Section(
             f'station {station.number}', f'{port} station {station.number}',
-            lambda now: _judge_station(station, now),
+            lambda now: self._judge_station(station, now),
             lambda now: self._station_values(station, now))
+
+    def _judge_station(self, station: Station, now: float) -> Verdict:
+        if self._link is None or not self._link.state.is_open:
+            return ERROR, f'station {station.number} unknown: the port is not open'
+        if not station.active:
+            since = now - (station.silent_since or now)
+            return ERROR, f'station {station.number} inactive since {since:.1f} s'
+        if station.last_heard is None:
+            return OK, f'station {station.number} not heard yet'
+        return OK, f'station {station.number} active'
 
     def _station_values(self, station: Station, now: float) -> dict[str, str]:
         heard = station.last_heard
@@ -262,15 +273,6 @@ def _poll_scans(driver: Driver) -> dict[str, str]:
         f'{name} poll scan': f'last {times.last * 1000:.0f} ms, '
                              f'longest {(times.longest or 0.0) * 1000:.0f} ms'
         for name, times in scans.items() if times.last is not None}
-
-
-def _judge_station(station: Station, now: float) -> Verdict:
-    if not station.active:
-        since = now - (station.silent_since or now)
-        return ERROR, f'station {station.number} inactive since {since:.1f} s'
-    if station.last_heard is None:
-        return OK, f'station {station.number} not heard yet'
-    return OK, f'station {station.number} active'
 
 
 def _describe(point: ReadPoint, now: float) -> str:

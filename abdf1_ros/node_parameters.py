@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+import difflib
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -103,7 +104,7 @@ def configure(node: Node) -> Configuration:
 
     Raises ConfigurationError with every fault that keeps the node from running.
     """
-    problems: list[Problem] = []
+    problems = _unknown_overrides(node)
     parameters = _declare_own(node, problems)
     network = Network()
     mappings: list[Mapping] = []
@@ -130,6 +131,25 @@ def configure(node: Node) -> Configuration:
         _declare_map(node, mappings)
     port = parameters.port or network.port
     return Configuration(parameters, network, port, mappings, map_problems, polling)
+
+
+def _unknown_overrides(node: Node) -> list[Problem]:
+    """
+    Return the parameters of ours that a user has given and that do not exist.
+
+    rclpy drops them silently. Others may belong to other nodes of a shared parameter file, so
+    only those are found whose names begin or look like ours. ``map.*`` may come back from a
+    dump of our parameters; it has no effect.
+    """
+    known = [entry.name for entry in fields(Parameters)]
+    known += [entry.parameter for entry in FIELDS.values()]
+    problems = []
+    for name in getattr(node, '_parameter_overrides', ()):
+        close = difflib.get_close_matches(name, known, 1, 0.75)
+        if name not in known and (close or name.startswith('net.')):
+            hint = f'did you mean {close[0]}?' if close else 'net.* are its columns'
+            problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
+    return problems
 
 
 def _polling(parameters: Parameters, mappings: list[Mapping],

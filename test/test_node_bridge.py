@@ -449,7 +449,7 @@ def test_link_status_tells_of_port_and_load(bridge: Bridge) -> None:
     status = until_status(bridge.diagnostics, 'link', OK,
                           lambda status: details(status)['scan time'] != 'unknown')
     said = details(status)
-    assert status.message == 'OK: port open, 2 stations answer'
+    assert status.message == 'OK: port open, 2 of 2 stations have answered'
     assert said['port'] == 'open'
     assert said['settings'] == '115200 baud, CRC'
     assert float(said['transactions per second']) > 1

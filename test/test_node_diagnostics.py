@@ -134,7 +134,7 @@ def test_link_without_a_port(bench: Bench) -> None:
 
 
 def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
-    assert bench.says('link') == (OK, 'OK: port open, 2 stations answer')
+    assert bench.says('link') == (OK, 'OK: port open, 0 of 2 stations have answered')
     bench.driver.stations.lost(2, NOW)
     assert bench.says('link') == (WARN, 'WARN: port open, 1 of 2 stations do not answer')
     bench.driver.stations.lost(1, NOW)

@@ -253,3 +253,21 @@ def test_parameter_file(make_node: Nodes, files: dict[str, str], tmp_path: Path)
     assert configuration.parameters.stale_after == 4.0
     assert configuration.network == Network(
         baud=38400, com_port='3', handshake='Yes', parity='Odd')
+
+
+@pytest.mark.parametrize(('name', 'right'), [
+    ('net.buad', 'did you mean net.baud?'), ('net.speed', 'net.* are its columns'),
+    ('prot', 'did you mean port?'), ('map_fil', 'did you mean map_file?')])
+def test_misspelt_parameter_is_an_error(
+        make_node: Nodes, files: dict[str, str], name: str, right: str) -> None:
+    node = make_node({**files, name: '9600'})
+    with pytest.raises(ConfigurationError) as caught:
+        configure(node)
+    (problem,) = caught.value.problems
+    assert str(problem).startswith(f'parameter {name}: there is no such parameter; ')
+    assert right in str(problem)
+
+
+def test_parameter_of_another_node_is_none_of_our_business(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    assert configure(make_node({**files, 'camera.gain': 3})).mappings

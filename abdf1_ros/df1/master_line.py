@@ -52,6 +52,9 @@ BROADCAST_PAUSE = 0.05
 # Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
 MAX_FORWARDS = 16
 
+# Times as long as for one poll of the dead is left to the living.
+LIVING_SHARE = 7
+
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
 Talk = Generator[Step, Symbol | None, None]
@@ -92,11 +95,13 @@ class MasterLine:
         self.machine = machine
         self.settings = settings
         self.stations = stations
+        self.polled: Container[int] = ()  # stations that somebody else polls all the time
         self._report = report
         self._serve = serve
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
         self._forwards: deque[Packet] = deque()
+        self._next_revival = 0.0
 
     @property
     def counters(self) -> Counters:
@@ -279,13 +284,24 @@ class MasterLine:
         self._forwards.remove(packet)
         try:
             if packet.dst != BROADCAST and not self.stations[packet.dst].active:
-                yield from self.revive(packet.dst)
+                yield from self._revive_for_others(packet.dst)
             yield from self.deliver(packet.dst, packet)
         except StationInactive:
             if not packet.is_reply and packet.src != self.settings.station:
                 self._forwards.append(packet.reply(sts=_NOT_DELIVERED))
             return None
         return packet
+
+    def _revive_for_others(self, number: int) -> Talk:
+        """Poll an inactive station, but not where it has its turn, nor beyond an eighth."""
+        begun = self.machine.now
+        if number in self.polled or begun < self._next_revival:
+            raise StationInactive(number)
+        try:
+            yield from self.revive(number)
+        finally:
+            now = self.machine.now
+            self._next_revival = now + LIVING_SHARE * (now - begun)
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""

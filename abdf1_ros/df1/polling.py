@@ -41,7 +41,7 @@ from dataclasses import dataclass, field
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.machine import Machine, Procedure, Step
-from abdf1_ros.df1.master_line import is_good, MasterLine, MasterSettings, Talk
+from abdf1_ros.df1.master_line import is_good, LIVING_SHARE, MasterLine, MasterSettings, Talk
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -50,8 +50,6 @@ from abdf1_ros.messages import Event, Message
 
 # "At least four" may leave between two polls (1766-RM001).
 COMMANDS_BETWEEN_POLLS = 4
-
-_LIVING_SHARE = 7
 
 # A poll and the EOT that answers it.
 _POLL_CHARACTERS = 6
@@ -146,6 +144,7 @@ class StandardPollingMaster:
         self._normal = _PollList(polling.normal)
         self._outstanding: dict[int, _Outstanding] = {}
         self._listed = frozenset((*polling.priority, *polling.normal))
+        self._line.polled = self._listed
         # Stations that were passed a command and not polled since. There is no second one for
         # them, or several senders would soon fill a sink that a poll empties by one message.
         self._given: set[int] = set()
@@ -224,7 +223,7 @@ class StandardPollingMaster:
             yield from self._answered(number, answer)
         spent = self._machine.now - begun
         if any(station.active for station in self._stations):
-            self._next_inactive_poll = self._machine.now + _LIVING_SHARE * spent
+            self._next_inactive_poll = self._machine.now + LIVING_SHARE * spent
 
     def _visit(self, number: int, source: TaskSource) -> Talk:
         """Send what waits, then poll one active station; our own place is for commands."""

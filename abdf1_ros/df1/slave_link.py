@@ -78,13 +78,15 @@ class SlaveLink:
         self._last_poll = self._machine.now
         next_look = self._machine.now + _TICK
         while True:
+            # Not afresh after each symbol: the line may never be still.
             symbol = yield Step(None, max(0.0, next_look - self._machine.now))
-            answer = b'' if symbol is None else slave.handle(symbol)
-            if answer:
-                yield Step(answer, 0)
-            if symbol is None or self._machine.now >= next_look:  # the line may never be still
+            if symbol is None:
                 self._look_after(source)
                 next_look = self._machine.now + _TICK
+                continue
+            answer = slave.handle(symbol)
+            if answer:
+                yield Step(answer, 0)
 
     def polled(self) -> None:
         """Take note that the master has polled us."""

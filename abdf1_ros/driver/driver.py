@@ -151,9 +151,9 @@ class Driver:
     def _point(self, mapping: Mapping) -> ReadPoint:
         if mapping.serves:
             # Without a Period nobody expects the other end to write.
-            expected = math.inf if mapping.period is None else mapping.period / 1000
+            expected = mapping.period / 1000 if mapping.period else math.inf
             point = ReadPoint(mapping, expected, self._settings.stale_after * expected)
-            point.last_good = 0.0 if mapping.period is None else None
+            point.last_good = None if mapping.period else 0.0
             return point
         period = self._settings.default_period if mapping.period is None \
             else mapping.period / 1000
@@ -308,13 +308,14 @@ class Driver:
                 done += 1
         except RemoteError as error:
             self.stations[station].remote_errors += 1
-            is_refused = not done and not is_local(error)
-            outcome = Outcome.FAILED if is_refused else Outcome.UNKNOWN
+            outcome = Outcome.UNKNOWN if is_local(error) else Outcome.FAILED
             self._finish_write(write, outcome, str(error), done)
         except LinkError as error:
-            outcome = Outcome.UNKNOWN if error.sent or done else Outcome.NOT_SENT
+            outcome = Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
             self._finish_write(write, outcome, str(error), done)
             self._link_failed(station, (), error)
+            if station != BROADCAST and not self.stations[station].active:
+                self._scheduler.unanswered(self.machine.now)
         else:
             is_broadcast = station == BROADCAST
             outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN

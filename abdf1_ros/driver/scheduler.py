@@ -18,7 +18,8 @@ The scheduler: which job has the line next.
 Writes go first, but after four in a row a read that is due has its turn. Reads go by their due
 time, so that on a saturated line all of one period fall behind alike and a slow one is still
 never left out. The reads of an inactive station are set aside; every now and then one of them
-goes out as a probe, at a pace that leaves seven eighths of the line to the living.
+goes out as a probe, at a pace that leaves seven eighths of the line to the living. A write to
+such a station is a probe as well; those that follow it too soon end unsent.
 """
 
 from __future__ import annotations
@@ -28,9 +29,11 @@ from collections.abc import Callable, Container, Iterable, Sequence
 import heapq
 import itertools
 
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
+from abdf1_ros.messages import Message
 
 MAX_WRITES_IN_A_ROW = 4
 MAX_WAITING_WRITES = 1000
@@ -97,6 +100,7 @@ class Scheduler:
         self._tickets = itertools.count(1)
         self._parked: dict[int, deque[ReadJob]] = {}
         self._next_probe = 0.0
+        self._next_write_probe = 0.0
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
@@ -156,6 +160,16 @@ class Scheduler:
         while self._writes and now - self._writes[0].requested > self._write_timeout:
             detail = f'waited longer than {self._write_timeout:g} s for the line'
             self._report(self._writes.popleft().result(Outcome.NOT_SENT, detail, now))
+        for write in [write for write in self._writes if self._is_hopeless(write, now)]:
+            self._writes.remove(write)
+            detail = Message.ERR_INACTIVE_STATION.line(write.mapping.station)
+            self._report(write.result(Outcome.NOT_SENT, detail, now))
+
+    def _is_hopeless(self, write: Write, now: float) -> bool:
+        """Tell whether a write has just found the station inactive, and others want the line."""
+        station = write.mapping.station
+        return (station != BROADCAST and not self._stations[station].active
+                and now < self._next_write_probe)
 
     def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
         """Return the next read or probe of a station not in ``busy``, None for nothing due."""
@@ -173,12 +187,15 @@ class Scheduler:
         if job not in self._jobs:
             return
         if not self._stations[job.station].active:
-            nobody_else = not self._heap
-            self._next_probe = now + (job.block.period if nobody_else else self._probe_interval)
+            self._next_probe = now + (self._probe_interval if self._heap else job.block.period)
             self._park(job)
             return
         self.release(job.station, now)
         self._push(job, max(job.due + job.block.period, started))
+
+    def unanswered(self, now: float) -> None:
+        """Take note that a write has found its station inactive: the next ones do not try."""
+        self._next_write_probe = now + (self._probe_interval if self._heap else 0.0)
 
     def hasten(self, write: Write, now: float) -> None:
         """Make the reads that show what ``write`` changed due at once."""

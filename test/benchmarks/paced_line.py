@@ -26,29 +26,26 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 import math
 import os
-from pathlib import Path
 import select
-import sys
 import threading
 import time
 import tty
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
-
-from abdf1_ros.df1.machine import Machine  # noqa: E402
-from abdf1_ros.df1.slave import multidrop  # noqa: E402
-from abdf1_ros.df1.stations import Station  # noqa: E402
-from abdf1_ros.driver.driver import Driver, DriverSettings  # noqa: E402
-from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
-from abdf1_ros.driver.network import Network  # noqa: E402
-from abdf1_ros.driver.points import WriteResult  # noqa: E402
-from abdf1_ros.driver.values import Values, ValueType  # noqa: E402
-from abdf1_ros.messages import Event, Severity  # noqa: E402
-from abdf1_ros.pccc.address import Address  # noqa: E402
-from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
-from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
-from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
-from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import Station
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.mapping import Command, Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import WriteResult
+from abdf1_ros.driver.values import Values, ValueType
+from abdf1_ros.messages import Event, Severity
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.port import DescriptorPort, LinkThread
+from abdf1_ros.simulated_plc import SimulatedPlc
 
 BITS = 10
 WORDS = 10

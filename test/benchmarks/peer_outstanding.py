@@ -36,7 +36,6 @@ from contextlib import ExitStack
 import math
 import os
 from pathlib import Path
-import select
 import sys
 import threading
 import time
@@ -47,45 +46,21 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 from abdf1_ros.df1.frames import Duplex, STX  # noqa: E402
 from abdf1_ros.df1.machine import LineTiming, Machine  # noqa: E402
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings  # noqa: E402
-from abdf1_ros.df1.stations import ActiveStationList, Station  # noqa: E402
+from abdf1_ros.df1.stations import ActiveStationList  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.driver.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.driver.points import WriteResult  # noqa: E402
-from abdf1_ros.driver.values import Values, ValueType  # noqa: E402
-from abdf1_ros.messages import Event, Severity  # noqa: E402
+from abdf1_ros.driver.values import ValueType  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
 from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
+from paced_line import BITS, Listener, Wire  # noqa: E402
 
-BITS = 10
 BLOCKS = range(20, 30)  # file numbers
 WORDS = 10
-
-
-class Wire(threading.Thread):
-    """One direction of the line: hands on bytes at the speed of a port."""
-
-    def __init__(self, source: int, target: int, char_time: float) -> None:
-        super().__init__(daemon=True)
-        self._source, self._target, self._char_time = source, target, char_time
-        self.stopping = False
-
-    def run(self) -> None:
-        """Hand on bytes, each when it has left."""
-        free = time.monotonic()
-        while not self.stopping:
-            if not select.select([self._source], [], [], 0.1)[0]:
-                continue
-            data = os.read(self._source, 4096)
-            free = max(free, time.monotonic())
-            for byte in data:
-                free += self._char_time
-                time.sleep(max(0.0, free - time.monotonic()))
-                os.write(self._target, bytes((byte,)))
 
 
 class ThinkingPort:
@@ -130,28 +105,6 @@ class ThinkingPort:
             self._closed = True
             self._news.notify()
         self._port.close()
-
-
-class Listener:
-    """Counts what should not happen."""
-
-    def __init__(self) -> None:
-        self.troubles = 0
-
-    def read(self, mapping: Mapping, values: Values) -> None:
-        """Take values."""
-
-    def written(self, result: WriteResult) -> None:
-        """Take the result of a write."""
-
-    def happened(self, event: Event) -> None:
-        """Count errors and retries."""
-        self.troubles += event.message.severity is Severity.ERROR or event.message.number in (
-            2519, 2520, 2521, 2522)
-
-    def station_changed(self, station: Station) -> None:
-        """Count a lost station."""
-        self.troubles += not station.active
 
 
 def mappings() -> list[Mapping]:

@@ -23,6 +23,7 @@ from abdf1_ros.df1.frames import master_frame
 from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.df1.slave import multidrop
 import pytest
 from support.multidrop import MasterBench
 from support.vectors import vector
@@ -172,7 +173,8 @@ def test_originator_learns_that_the_destination_is_dead(standard: bool, known: b
     rig.ask(7)
     rig.run(1.0)
     assert rig[7].heard == [Packet(7, 8, 0x4F, 2, command.tns)]
-    assert (2509, 8) in rig.master.numbers()
+    # A station that the standard polling knows as dead is polled in its turn only.
+    assert ((2509, 8) in rig.master.numbers()) is not (standard and known)
     assert not rig.master.stations[8].active
     assert rig.master.counts()['error_messages_sent'] == 1
     assert len(rig.master.times('C8')) == (0 if known else 2)
@@ -294,3 +296,31 @@ def test_start_forgets_what_waited_to_be_passed_on(standard: bool) -> None:
     rig.line.wake(rig.master.machine)
     rig.run(0.3)
     assert 'C8' not in rig.master.said
+
+
+@BOTH
+@pytest.mark.parametrize('listed', [True, False])
+def test_messages_for_the_dead_do_not_slow_the_living(standard: bool, listed: bool) -> None:
+    rig = bench(standard, 7, *[8] * listed, dead=(8,) if listed else ())
+    for _ in range(2000):
+        rig.message(7, 8)
+    rig.start(8)
+    while rig.clock() < 20.0:
+        rig.ask(7)
+        rig.run(0.05)
+    wasted = len(rig.master.times('P8')) * SETTINGS.timeout / 20.0
+    assert 0.02 < wasted <= 1 / 8 + 0.01
+    assert len(rig[7].heard) > 200
+    assert all(reply.sts == 2 for reply in rig[7].heard)
+
+
+@BOTH
+def test_station_is_brought_back_by_a_message_for_it(standard: bool) -> None:
+    rig = bench(standard, 7)
+    rig.slaves[8] = type(rig[7])(8, rig.clock)  # on the line, and in no list
+    rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+    command = rig.message(7, 8)
+    rig.start(8)
+    poll(rig, 7)
+    assert rig[8].served == [command]
+    assert rig.master.changes == [(8, True)]

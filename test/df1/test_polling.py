@@ -226,6 +226,15 @@ def test_in_sequence_commands_leave_at_our_own_place(normal: tuple[int, ...],
     assert rig.master.said.startswith(expected)
 
 
+def test_in_sequence_commands_leave_at_no_other_place() -> None:
+    rig = bench(PollingSettings((1, 5, 2), in_sequence=True))
+    rig.start()
+    rig.line.run(lambda: rig.master.said.endswith('P1 P2'), 1.0)
+    errand = rig.ask(1)
+    rig.line.run(lambda: ended(errand), 1.0)
+    assert rig.master.said.startswith('P1 P2 P1 C1 P2 P1')
+
+
 def test_our_own_place_may_be_in_the_priority_list() -> None:
     rig = bench(PollingSettings((1, 2), priority=(5,), in_sequence=True))
     errand = rig.ask(2)

@@ -609,6 +609,24 @@ def test_write_brings_a_station_back() -> None:
     assert bench.driver.points[mapping].error == 'STS 70: processor is in program mode'
 
 
+def test_writes_to_an_inactive_station_do_not_hold_up_the_others() -> None:
+    living, dead = make_mapping('N7:0', period=0), make_mapping('N7:0', 'ReadWrite', station=2)
+    bench, _ = make_bench(living, dead)
+    bench.plc(2, 'PLC5', ('N7:0', 4)).faults.silent = True
+    bench.open()
+    bench.run_until(lambda: bench.listener.changes == [(2, False)])
+    best = _rates(bench, living, 5.0)
+    before = len(bench.listener.values(living))
+    for number in range(100):
+        bench.write(dead, [number])
+        bench.run(0.05)
+    rate = (len(bench.listener.values(living)) - before) / 5.0
+    assert rate > 0.8 * best
+    bench.run(5.0)
+    assert set(bench.listener.outcomes()) <= {Outcome.NOT_SENT, Outcome.SUPERSEDED}
+    assert len(bench.listener.results) == 100
+
+
 def test_transaction_number_never_repeats_the_last_of_a_station() -> None:
     mappings = [make_mapping('N7:0', station=1), make_mapping('N7:0', station=2)]
     bench = DriverBench(mappings, settings=DriverSettings(first_tns=0xFFFD), start=False)

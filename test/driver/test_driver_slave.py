@@ -23,7 +23,8 @@ from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.driver.driver import Driver, DriverSettings
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome
