@@ -130,15 +130,15 @@ class Diagnostics:
 
     def _link_values(self, now: float) -> dict[str, str]:
         state = self._link.state if self._link else None
-        scan_time = self._driver.scan_time
         network = self._driver.network
         values = {
             'port': f'{"open" if state and state.is_open else "closed"}',
             'settings': f'{network.baud} baud, {network.error_code}',
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
-            'scan time': 'unknown' if scan_time is None else f'{scan_time * 1000:.0f} ms',
-            'expected scan time': f'{self._driver.expected_scan_time * 1000:.0f} ms',
+            'scan time': _milliseconds(self._driver.scan_time),
+            'longest scan time': _milliseconds(self._driver.longest_scan_time),
+            'expected scan time': _milliseconds(self._driver.expected_scan_time),
             **_poll_scans(self._driver),
             'last error': 'none',
         }
@@ -270,9 +270,13 @@ def _poll_scans(driver: Driver) -> dict[str, str]:
         return {}
     scans = {'normal': driver.link.normal_scan, 'priority': driver.link.priority_scan}
     return {
-        f'{name} poll scan': f'last {times.last * 1000:.0f} ms, '
-                             f'longest {(times.longest or 0.0) * 1000:.0f} ms'
+        f'{name} poll scan': f'last {_milliseconds(times.last)}, '
+                             f'longest {_milliseconds(times.longest)}'
         for name, times in scans.items() if times.last is not None}
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return 'unknown' if seconds is None else f'{seconds * 1000:.0f} ms'
 
 
 def _describe(point: ReadPoint, now: float) -> str:

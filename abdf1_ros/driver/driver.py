@@ -118,6 +118,11 @@ class Driver:
         return self._scheduler.scan_time
 
     @property
+    def longest_scan_time(self) -> float | None:
+        """Return the longest ``scan_time`` (s) there has been, outages not counted."""
+        return self._scheduler.longest_scan_time
+
+    @property
     def blocks(self) -> list[Block]:
         """Return what is read together."""
         return [job.block for job in self._scheduler.jobs]
@@ -281,6 +286,7 @@ class Driver:
 
     def _read_failed(self, job: ReadJob, reason: str, divisible: bool) -> None:
         """Fail the points; a block with a bad address is divided until that one is alone."""
+        job.interrupted()
         for point in job.points:
             point.fail(reason)
         if divisible and len(job.points) > 1:

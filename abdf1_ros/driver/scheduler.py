@@ -45,7 +45,8 @@ class ReadJob:
     A block to be read again and again, and the points it serves.
 
     ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
-    between its last two good reads. ``ticket`` is the scheduler's: the queue entry that counts.
+    between its last two good reads and ``longest`` the greatest of these; an outage of the
+    station does not count. ``ticket`` is the scheduler's: the queue entry that counts.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint]) -> None:
@@ -53,6 +54,7 @@ class ReadJob:
         self.points = tuple(points)
         self.due = 0.0
         self.interval: float | None = None
+        self.longest: float | None = None
         self.ticket = 0
         self._last_done: float | None = None
 
@@ -65,7 +67,12 @@ class ReadJob:
         """Take note of a good read."""
         if self._last_done is not None:
             self.interval = now - self._last_done
+            self.longest = max(self.interval, self.longest or 0.0)
         self._last_done = now
+
+    def interrupted(self) -> None:
+        """Take note that there are no good reads for the time being."""
+        self.interval = self._last_done = None
 
     def covers(self, write: Write) -> bool:
         """Tell whether the block shows what ``write`` has changed."""
@@ -117,6 +124,11 @@ class Scheduler:
         """Return the longest time (s) between the last two good reads of any job."""
         return max((job.interval for job in self.jobs if job.interval is not None),
                    default=None)
+
+    @property
+    def longest_scan_time(self) -> float | None:
+        """Return the longest time (s) there has ever been between two good reads of a job."""
+        return max((job.longest for job in self.jobs if job.longest is not None), default=None)
 
     def add_reads(self, jobs: Iterable[ReadJob], now: float) -> None:
         """Take new jobs, all due at once."""
@@ -267,4 +279,5 @@ class Scheduler:
             self._push(job, now)
 
     def _park(self, job: ReadJob) -> None:
+        job.interrupted()
         self._parked.setdefault(job.station, deque()).append(job)

@@ -404,6 +404,20 @@ def test_scan_time_is_that_of_the_slowest_job() -> None:
     assert bench.scheduler.scan_time == 2.0
     other.done(3.1)
     assert bench.scheduler.scan_time == 0.5
+    assert bench.scheduler.longest_scan_time == 2.0
+
+
+def test_scan_time_does_not_count_an_outage() -> None:
+    job = make_job()
+    bench = Bench(job)
+    assert bench.scheduler.longest_scan_time is None
+    job.done(1.0)
+    job.done(1.5)
+    job.interrupted()
+    assert bench.scheduler.scan_time is None
+    job.done(60.0)
+    job.done(60.25)
+    assert (bench.scheduler.scan_time, bench.scheduler.longest_scan_time) == (0.25, 0.5)
 
 
 class AnyOrder(RuleBasedStateMachine):
