@@ -270,12 +270,19 @@ def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) ->
     # That is what the link thread does when a PLC refuses an address.
     scheduler = bench.driver._scheduler
 
+    class Part:
+        """A job that has not been done yet."""
+
+        interval = longest = None
+
     class Divided:
         """A job that gives way to two others while it is looked at."""
 
+        longest = None
+
         @property
         def interval(self) -> float:
-            scheduler._jobs.add(object())
+            scheduler._jobs.add(Part())
             return 0.25
 
     scheduler._jobs.clear()
