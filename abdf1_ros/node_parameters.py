@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 import difflib
 from typing import Any
 
@@ -129,7 +129,7 @@ def configure(node: Node) -> Configuration:
         raise ConfigurationError(problems)
     if parameters.expose_map_parameters:
         _declare_map(node, mappings)
-    port = parameters.port or network.port
+    port = replace(network, com_port=parameters.port or network.com_port).port
     return Configuration(parameters, network, port, mappings, map_problems, polling)
 
 

@@ -140,7 +140,7 @@ def test_link_parameters_are_read_as_the_file_is(
     ({}, '/dev/ttyS2'), ({'net.com_port': 1}, '/dev/ttyS0'),
     ({'net.com_port': 'socket://plc:4001'}, 'socket://plc:4001'),
     ({'port': '/dev/ttyUSB7', 'net.com_port': 1}, '/dev/ttyUSB7'),
-    ({'port': 7}, '7')])
+    ({'port': 7}, '/dev/ttyS6')])
 def test_port(configured: Callable[..., Configuration], values: dict[str, Any],
               port: str) -> None:
     assert configured(**values).port == port
