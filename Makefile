@@ -69,6 +69,12 @@ lint: $(INSTALLED) ## Check style and types
 	$(PY) -m ruff check .
 	$(PY) -m mypy
 
+.PHONY: bench
+bench: $(INSTALLED) ## Measure polling modes, dead stations and outstanding commands (4 minutes)
+	@for name in polling_modes dead_stations peer_outstanding; do \
+	    $(PY) test/benchmarks/$$name.py || exit; echo; \
+	done
+
 # A ROS that is sourced may bring its own colcon.
 .PHONY: build
 build: $(INSTALLED) ## Build with colcon into build/ and install/
