@@ -15,7 +15,7 @@
 """
 The status counters of the driver, in one table.
 
-Source: spec/abdf1-driver.txt, tables "Status Counters" and "Hardware Status Counters". Which
+Source: S0 (see ``abdf1_ros.df1``), tables "Status Counters" and "Hardware Status Counters". Which
 event feeds which counter is our reading of the names and stands with each of them.
 """
 

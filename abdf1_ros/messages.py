@@ -15,7 +15,7 @@
 """
 The numbered errors and notices of the driver, in one table.
 
-Source: spec/abdf1-driver.txt, tables "Critical Error Messages", "Error Messages" and "Notice
+Source: S0 (see ``abdf1_ros.df1``), tables "Critical Error Messages", "Error Messages" and "Notice
 Messages". The texts are an interface: people search their logs for them.
 """
 

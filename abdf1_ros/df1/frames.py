@@ -30,7 +30,7 @@ from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
 
 # Bytes of unstuffed link data that we take: the largest reply is 244 bytes behind a header
-# (M 7-33), and no known device sends more than this.
+# (M 7-30..7-40), and no known device sends more than this.
 MAX_LINK_DATA = 261
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The full-duplex peer: both ends send commands and replies whenever they like (M 4-1..4-13).
+The full-duplex peer: both ends send commands and replies whenever they like (M 4-3..4-13).
 
 Theory of operation. The transmitter sends one message at a time and waits for its response
 (M 4-5)::

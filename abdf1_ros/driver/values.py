@@ -171,7 +171,7 @@ def _from_bcd(word: int) -> int:
 
 
 def _swap(data: bytes) -> bytes:
-    """Exchange the bytes of each word: the first character is the high byte (P5A)."""
+    """Exchange the bytes of each word: the first character is the high byte."""
     swapped = bytearray(data)
     swapped[0::2], swapped[1::2] = data[1::2], data[0::2]
     return bytes(swapped)

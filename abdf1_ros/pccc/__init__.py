@@ -16,5 +16,5 @@
 The application layer: commands (PCCC), addresses and data tables, without clock or port.
 
 Sources are cited as in ``abdf1_ros.df1``; besides, "P5A" is publication 5000-6.4.4 (PLC-5
-addressing reference) and "S0" the specification of the driver, spec/abdf1-driver.txt.
+addressing reference).
 """

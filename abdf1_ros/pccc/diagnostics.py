@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The diagnostic commands that every node answers: echo and diagnostic status (M 7-6, 7-9)."""
+"""The diagnostic commands that every node answers: echo and diagnostic status (M 7-6..7-27)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CMD = 0x06
 ECHO = 0x00
 STATUS = 0x03
 
-# Remote run, type extender and processor as M 10-3 to 10-6 lay them out. What does not exist
+# Remote run, type extender and processor as M 10-3..10-6 (SLC) and M chapter 10 (PLC-5) lay them out. What does not exist
 # here (memory, faults, programs) is 0.
 _SLC_5_03 = bytes((0x00, 0xEE, 0x34, 0x49, 0x00)) + b'5/03'.ljust(11) + bytes((
     0, 0, 0x06, 0, 0, 0, 0, 0xFC))

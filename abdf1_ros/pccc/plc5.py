@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands of a PLC-5: typed read, typed write, read-modify-write (M 7-20, 7-28..7-31)."""
+"""The commands of a PLC-5: typed read, typed write, read-modify-write (M 7-20, 7-28..7-30)."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ from hypothesis import strategies as st
 import pytest
 from support.properties import PROPERTY
 
-# Column, field, default, good values, bad values (spec/abdf1-driver.txt, network table).
+# Column, field, default, good values, bad values (S0, network table).
 NUMBERS = [
     ('Station', 'station', 5, ('0', '1', '254'), ('-1', '255', '1.5', 'x')),
     ('NAK_Retries', 'nak_retries', 3, ('0', '10'), ('-1', '11', 'x')),
