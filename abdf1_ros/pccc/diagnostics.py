@@ -22,8 +22,8 @@ CMD = 0x06
 ECHO = 0x00
 STATUS = 0x03
 
-# Remote run, type extender and processor as M 10-3..10-6 (SLC) and M chapter 10 (PLC-5) lay them out. What does not exist
-# here (memory, faults, programs) is 0.
+# Remote run, type extender and processor as M 10-3..10-6 (SLC) and M chapter 10 (PLC-5) lay
+# them out. What does not exist here (memory, faults, programs) is 0.
 _SLC_5_03 = bytes((0x00, 0xEE, 0x34, 0x49, 0x00)) + b'5/03'.ljust(11) + bytes((
     0, 0, 0x06, 0, 0, 0, 0, 0xFC))
 _PLC_5_40 = bytes((0x06, 0xEB, 0x15)) + bytes(33)
