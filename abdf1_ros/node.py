@@ -81,8 +81,8 @@ class BridgeNode(Node):
     """
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
-    It implements ``Listener``: the driver calls ``read``, ``written``, ``happened`` and
-    ``station_changed``.
+    It implements ``Listener``: the driver calls ``read``, ``unreadable``, ``written``,
+    ``happened`` and ``station_changed``.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -182,6 +182,11 @@ class BridgeNode(Node):
         publisher, message = self._read_publishers[mapping.topic]
         message.data = values
         publisher.publish(message)
+
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Log why a station that answers gives no value."""
+        self.get_logger().error(
+            f'{mapping.tag} ({mapping.address} at station {mapping.station}): {reason}')
 
     def written(self, result: WriteResult) -> None:
         """Publish the result of a write."""

@@ -50,6 +50,9 @@ class Listener:
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take values."""
 
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Take a reason."""
+
     def written(self, result: WriteResult) -> None:
         """Take a result."""
 

@@ -63,6 +63,9 @@ class Listener(Protocol):
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a good read that are to be published."""
 
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Take note that a station answers, but not with a value; once for each reason."""
+
     def written(self, result: WriteResult) -> None:
         """Take the one result of a write."""
 
@@ -279,17 +282,25 @@ class Driver:
         try:
             values = point.update(words, self.machine.now)
         except FormatError as error:
-            point.fail(str(error))
+            self._unreadable(point, str(error))
         else:
             if values is not None:
                 self._listener.read(point.mapping, values)
 
+    def _unreadable(self, point: ReadPoint, reason: str) -> None:
+        if point.fail(reason):
+            self._listener.unreadable(point.mapping, reason)
+
     def _read_failed(self, job: ReadJob, reason: str, divisible: bool) -> None:
         """Fail the points; a block with a bad address is divided until that one is alone."""
         job.interrupted()
+        is_divided = divisible and len(job.points) > 1
         for point in job.points:
-            point.fail(reason)
-        if divisible and len(job.points) > 1:
+            if is_divided:
+                point.fail(f'{reason} (or another address read with it has this fault)')
+            else:
+                self._unreadable(point, reason)
+        if is_divided:
             parts = map(self._job, self._planner.split(job.block))
             self._scheduler.replace(job, parts, self.machine.now)
 

@@ -74,10 +74,12 @@ class ReadPoint:
             return None
         return values
 
-    def fail(self, error: str) -> None:
-        """Take note that a read gave no value."""
+    def fail(self, error: str) -> bool:
+        """Take note that a read gave no value; return whether the reason is a new one."""
+        is_news = error != self.error
         self.error = error
         self.failures += 1
+        return is_news
 
     def age(self, now: float) -> float | None:
         """Return the seconds since the last good read, None before the first."""

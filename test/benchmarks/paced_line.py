@@ -82,6 +82,10 @@ class Listener:
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take values."""
 
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Count a read without a value."""
+        self.troubles += 1
+
     def written(self, result: WriteResult) -> None:
         """Take the result of a write."""
 

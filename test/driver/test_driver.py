@@ -498,6 +498,7 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     point = bench.driver.points[bad]
     assert point.freshness(bench.clock()) is Freshness.FAILED
     assert point.error == 'STS F0 EXT STS 07: file has the wrong size'
+    assert bench.listener.reasons == [('N9:12', point.error)]
     assert all(bench.driver.points[mapping].error is None for mapping in good)
     assert any(block.mappings == (bad,) for block in bench.driver.blocks)
     assert len(bench.driver.blocks) <= 4
@@ -521,6 +522,7 @@ def test_plc_in_trouble_fails_the_points_and_divides_nothing() -> None:
     assert len(bench.driver.blocks) == 1
     assert [bench.driver.points[mapping].error for mapping in mappings] == [
         'STS 70: processor is in program mode'] * 2
+    assert [address for address, _ in bench.listener.reasons] == ['N7:0', 'N7:1']
     plc.faults.status = ()
     bench.run(1.0)
     assert all(bench.driver.points[mapping].error is None for mapping in mappings)

@@ -48,6 +48,7 @@ class Recorder:
         self._clock = clock
         self.reads: list[tuple[float, Mapping, Values]] = []
         self.results: list[WriteResult] = []
+        self.reasons: list[tuple[str, str]] = []
         self.events: list[Event] = []
         self.changes: list[tuple[int, bool]] = []
 
@@ -55,6 +56,10 @@ class Recorder:
         """Keep a value."""
         kept = values if isinstance(values, str) else list(values)
         self.reads.append((self._clock(), mapping, kept))
+
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Keep why a mapping has no value."""
+        self.reasons.append((str(mapping.address), reason))
 
     def written(self, result: WriteResult) -> None:
         """Keep the result of a write."""
