@@ -303,20 +303,20 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
                        'missing,Read,N99:0,1,PLC5,1,', SPEED)
     speed = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed')
     assert values_in(speed.first()) == [0, 0]
-    lines = [line for line in ''.join(capfd.readouterr()).splitlines() if '[ERROR]' in line]
-    assert len(lines) == 2
+    # What only the PLC can know shows in the diagnostics, mapping by mapping, and in the log.
+    status = until_status(bench.diagnostics, 'mappings', ERROR)
+    assert status.message == 'ERROR: of 2 mappings 1 failed, 1 fresh'
+    reason = 'STS F0 EXT STS 06: address does not point to something usable'
+    assert details(status)['missing'] == f'failed: N99:0 at station 1, never read; {reason}'
+    errors = [line for line in ''.join(capfd.readouterr()).splitlines() if '[ERROR]' in line]
+    lines, (told,) = errors[:2], errors[2:]
+    assert told.endswith(f'missing (N99:0 at station 1): {reason}')
     assert ':2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, ' in lines[0]
     assert ':3:5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 2, ' in lines[1]
     assert all(line.endswith(' (row left out)') for line in lines)
     read_topics = {name for name, _ in bench.node.get_topic_names_and_types()
                    if name.startswith('/abdf1/read/')}
     assert read_topics == {'/abdf1/read/missing', '/abdf1/read/speed'}
-    # What only the PLC can know shows in the diagnostics, mapping by mapping.
-    status = until_status(bench.diagnostics, 'mappings', ERROR)
-    assert status.message == 'ERROR: of 2 mappings 1 failed, 1 fresh'
-    assert details(status)['missing'] == (
-        'failed: N99:0 at station 1, never read; STS F0 EXT STS 06: address does not point to '
-        'something usable')
 
 
 # Ends
