@@ -22,7 +22,8 @@ stations at the other, and counts what it does in a time.
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
 import math
 import os
@@ -44,7 +45,7 @@ from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.port import DescriptorPort, LinkThread
+from abdf1_ros.port import DescriptorPort, LinkThread, Port
 from abdf1_ros.simulated_plc import SimulatedPlc
 
 BITS = 10
@@ -127,12 +128,10 @@ class Measured:
     polls: float
 
 
-def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedPlc],
-            settle: float, seconds: float) -> Measured:
-    """Run a master with ``mappings`` against ``stations``; the time to settle does not count."""
-    listener = Listener()
-    driver = Driver(network, mappings, DriverSettings(), listener)
-    far = Machine(multidrop(stations), checksum=network.checksum)
+@contextmanager
+def paced_line(near: Machine, far: Machine, baud: int,
+               far_end: Callable[[Port], Port] = lambda port: port) -> Iterator[None]:
+    """Run two machines at the ends of a paced line; ``far_end`` may wrap the far port."""
     with ExitStack() as stack:
         pairs = [os.openpty(), os.openpty()]
         for pair in pairs:
@@ -144,12 +143,27 @@ def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedP
             descriptor = os.dup(pairs[side][1])
             return DescriptorPort(descriptor, lambda: os.close(descriptor))
 
-        wires = [Wire(pairs[0][0], pairs[1][0], BITS / network.baud),
-                 Wire(pairs[1][0], pairs[0][0], BITS / network.baud)]
-        links = [LinkThread(far, lambda: open_port(1)),
-                 LinkThread(driver.machine, lambda: open_port(0))]
+        wires = [Wire(pairs[0][0], pairs[1][0], BITS / baud),
+                 Wire(pairs[1][0], pairs[0][0], BITS / baud)]
+        links = [LinkThread(far, lambda: far_end(open_port(1))),
+                 LinkThread(near, lambda: open_port(0))]
         for thread in [*wires, *links]:
             thread.start()
+        yield
+        for link in links:
+            link.stop()
+        for wire in wires:
+            wire.stopping = True
+            wire.join()
+
+
+def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedPlc],
+            settle: float, seconds: float) -> Measured:
+    """Run a master with ``mappings`` against ``stations``; the time to settle does not count."""
+    listener = Listener()
+    driver = Driver(network, mappings, DriverSettings(), listener)
+    far = Machine(multidrop(stations), checksum=network.checksum)
+    with paced_line(driver.machine, far, network.baud):
         time.sleep(settle)
         troubles = listener.troubles
         began, before, polls = time.monotonic(), driver.transactions, driver.counters.polls_sent
@@ -160,11 +174,6 @@ def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedP
                 scans.append(scan)
         passed = time.monotonic() - began
         done, polled = driver.transactions - before, driver.counters.polls_sent - polls
-        for link in links:
-            link.stop()
-        for wire in wires:
-            wire.stopping = True
-            wire.join()
     mean = sum(scans) / len(scans) if scans else math.nan
     return Measured(done / passed, mean, max(scans, default=math.nan),
                     listener.troubles - troubles, polled / passed)

@@ -32,14 +32,11 @@ from __future__ import annotations
 
 import argparse
 from collections import deque
-from contextlib import ExitStack
 import math
-import os
 from pathlib import Path
 import sys
 import threading
 import time
-import tty
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
@@ -55,9 +52,9 @@ from abdf1_ros.driver.values import ValueType  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
-from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
+from abdf1_ros.port import Port  # noqa: E402
 from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
-from paced_line import BITS, Listener, Wire  # noqa: E402
+from paced_line import BITS, Listener, paced_line  # noqa: E402
 
 BLOCKS = range(20, 30)  # file numbers
 WORDS = 10
@@ -66,7 +63,7 @@ WORDS = 10
 class ThinkingPort:
     """A port on which messages leave later than responses."""
 
-    def __init__(self, port: DescriptorPort, think: float) -> None:
+    def __init__(self, port: Port, think: float) -> None:
         self._port = port
         self._think = think
         self._waiting: deque[bytes] = deque()
@@ -129,34 +126,13 @@ def measure(outstanding: int, baud: int, think: float,
         lambda machine: FullDuplexPeer(
             machine, PeerSettings(network.checksum), ActiveStationList(), plc.serve).run(plc),
         checksum=network.checksum, duplex=Duplex.FULL, timing=LineTiming(BITS / baud))
-    with ExitStack() as stack:
-        pairs = [os.openpty(), os.openpty()]
-        for pair in pairs:
-            tty.setraw(pair[1])
-            for descriptor in pair:
-                stack.callback(os.close, descriptor)
-
-        def open_port(side: int) -> DescriptorPort:
-            descriptor = os.dup(pairs[side][1])
-            return DescriptorPort(descriptor, lambda: os.close(descriptor))
-
-        wires = [Wire(pairs[0][0], pairs[1][0], BITS / baud),
-                 Wire(pairs[1][0], pairs[0][0], BITS / baud)]
-        links = [LinkThread(driver.machine, lambda: open_port(0)),
-                 LinkThread(far, lambda: ThinkingPort(open_port(1), think))]
-        for thread in [*wires, *links]:
-            thread.start()
+    with paced_line(driver.machine, far, baud, lambda port: ThinkingPort(port, think)):
         time.sleep(1.0)
         began, before, scans = time.monotonic(), driver.transactions, []
         while time.monotonic() - began < seconds:
             time.sleep(0.1)
             scans.append(driver.scan_time or math.nan)
         passed, done = time.monotonic() - began, driver.transactions - before
-        for link in links:
-            link.stop()
-        for wire in wires:
-            wire.stopping = True
-            wire.join()
     line_time = driver.blocks[0].line_time
     return done / passed, sum(scans) / len(scans), listener.troubles, line_time
 
