@@ -2,6 +2,9 @@
 
 PYTHON ?= python3
 DEMO_SECONDS ?= 20
+FUZZ_SECONDS ?= 60
+SOAK_HOURS ?= 24
+LONG_RUN_MINUTES ?= 60
 PYTEST_ARGS ?=
 
 VENV := .venv
@@ -28,7 +31,8 @@ endif
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo
-	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test).'
+	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
+	@echo 'FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run).'
 
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
@@ -69,11 +73,41 @@ lint: $(INSTALLED) ## Check style and types
 	$(PY) -m ruff check .
 	$(PY) -m mypy
 
+.PHONY: docs
+docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code
+	$(PY) -m tools.reference
+
 .PHONY: bench
-bench: $(INSTALLED) ## Measure polling modes, dead stations and outstanding commands (4 minutes)
-	@for name in polling_modes dead_stations peer_outstanding; do \
-	    $(PY) test/benchmarks/$$name.py || exit; echo; \
+bench: $(INSTALLED) ## Measure plan, line, scheduling, processor time, latency, scale (11 minutes)
+	@for name in planning cpu_time wire_efficiency scan_time scheduling node_cpu node_latency \
+	        node_scale polling_modes dead_stations peer_outstanding; do \
+	    echo "$$name:"; timeout 300 $(PY) test/benchmarks/$$name.py || exit; echo; \
 	done
+
+.PHONY: fuzz
+fuzz: $(INSTALLED) ## Fuzz what reads bytes and text for FUZZ_SECONDS (60), from the stored corpus
+	@$(PY) -c 'import atheris' 2>/dev/null \
+	    || $(PY) -m pip install --quiet -r requirements/fuzz.txt \
+	    || { echo 'make fuzz: no atheris here; it has wheels for Linux on x86-64' >&2; exit 1; }
+	$(PY) test/fuzz/run.py --seconds $(FUZZ_SECONDS)
+
+.PHONY: soak
+soak: $(INSTALLED) ## Run a line full of faults for SOAK_HOURS (24) of its time, in every mode
+	$(PY) test/soak/day.py --hours $(SOAK_HOURS)
+
+.PHONY: noise
+noise: $(INSTALLED) ## Run every mode on a noisy line
+	$(PY) test/noise/run.py
+
+.PHONY: long-run
+long-run: $(INSTALLED) ## Run node and simulator with faults for LONG_RUN_MINUTES (60)
+	$(PY) test/soak/long_run.py --minutes $(LONG_RUN_MINUTES)
+
+.PHONY: audit
+audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
+	@test -d $(VENV)/audit || $(PYTHON) -m venv $(VENV)/audit
+	$(VENV)/audit/bin/python -m pip install --quiet -r requirements/audit.txt
+	$(VENV)/audit/bin/pip-audit --strict $(addprefix -r requirements/,test.txt tools.txt fuzz.txt)
 
 # A ROS that is sourced may bring its own colcon.
 .PHONY: build
@@ -81,8 +115,10 @@ build: $(INSTALLED) ## Build with colcon into build/ and install/
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" colcon build --packages-select abdf1_ros
 
 .PHONY: check-install
-check-install: build ## Build, then see that the installed node starts and refuses a bad file
-	@set -e; for file in package.xml config/net.csv config/map.csv launch/bridge.launch.py; do \
+check-install: build ## Build, then see that what is installed starts
+	@set -e; for file in package.xml config/net.csv config/map.csv config/three_lines.yaml \
+	        launch/bridge.launch.py launch/three_lines.launch.py 'deploy/abdf1@.service' \
+	        examples/command_writer.py; do \
 	    test -e $(SHARE)/$$file || { echo "$(SHARE)/$$file is missing" >&2; exit 1; }; \
 	done
 	@source install/setup.bash; cd /; \
@@ -91,6 +127,11 @@ check-install: build ## Build, then see that the installed node starts and refus
 	    echo "the node ended with status $$status, expected was 2" >&2; exit 1; \
 	fi; \
 	echo 'check-install: the installed node refused a missing net file with status 2'
+	@source install/setup.bash; cd /; set -e; commands="$(CURDIR)/$(dir $(NODE))"; \
+	"$$commands/check" "$(CURDIR)/$(SHARE)/config/net.csv" "$(CURDIR)/$(SHARE)/config/map.csv" \
+	    > /dev/null; \
+	for name in plc sniff simulator; do "$$commands/$$name" --help > /dev/null; done; \
+	echo 'check-install: check passed the installed files; plc, sniff and simulator start'
 
 .PHONY: clean
 clean: ## Remove what build, lint and test have made

@@ -36,7 +36,10 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
-        (f'share/{PACKAGE}/config', sorted(glob('config/*'))),
+        (f'share/{PACKAGE}/config', sorted(glob('config/*.csv') + glob('config/*.yaml'))),
+        (f'share/{PACKAGE}/config/sros2', ['config/sros2/policy.xml']),
+        (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
+        (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
     ],
     zip_safe=False,
@@ -45,9 +48,13 @@ setup(
     extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={
         'console_scripts': [
-            f'node = {PACKAGE}.node:main',
+            f'node = {PACKAGE}.executables:node',
             f'simulator = {PACKAGE}.simulator:main',
-            f'demo = {PACKAGE}.demo:main',
+            f'sniff = {PACKAGE}.sniff:main',
+            f'check = {PACKAGE}.check:main',
+            f'plc = {PACKAGE}.plc:main',
+            f'monitor = {PACKAGE}.executables:monitor',
+            f'demo = {PACKAGE}.executables:demo',
         ],
     },
 )

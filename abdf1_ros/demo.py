@@ -33,12 +33,12 @@ import tempfile
 import time
 from typing import Any
 
-from abdf1_ros.driver.mapping import load_mappings, Mapping
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.node_messages import MESSAGES
 from abdf1_ros.paths import config_file
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
-from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -89,22 +89,26 @@ class Watcher(Node):
         for mapping in mappings:
             if mapping.reads:
                 self.create_subscription(
-                    MESSAGES[mapping.type], f'/abdf1/read/{mapping.topic}',
+                    MESSAGES[mapping.message_type], f'/abdf1/read/{mapping.topic}',
                     self._taker(mapping), QoSProfile(
                         depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         self.create_subscription(
             DiagnosticStatus, '/abdf1/write_results', self.results.append, 10)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
-    def expect(self, mapping: Mapping, deadline: float) -> None:
-        """Ask to be told when values of ``mapping`` stop for ``deadline`` seconds."""
+    def expect(self, mapping: Mapping) -> float:
+        """Ask to be told when values stop for as long as the bridge promises; return that (s)."""
+        topic = f'/abdf1/read/{mapping.topic}'
+        deadline = self.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
+
         def missed(event: Any) -> None:
             self.missed += event.total_count_change
 
         self.create_subscription(
-            MESSAGES[mapping.type], f'/abdf1/read/{mapping.topic}', lambda message: None,
-            QoSProfile(depth=1, deadline=Duration(seconds=deadline)),
+            MESSAGES[mapping.message_type], topic, lambda message: None,
+            QoSProfile(depth=1, deadline=deadline),
             event_callbacks=SubscriptionEventCallbacks(deadline=missed))
+        return float(deadline.nanoseconds / 1e9)
 
     def _taker(self, mapping: Mapping) -> Callable[[Any], None]:
         def take(message: Any) -> None:
@@ -135,7 +139,7 @@ class Demo:
         self._title(self._scene.title)
         domain = os.environ['ROS_DOMAIN_ID']
         self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} '
-                  'ros2 topic echo /diagnostics')
+                  'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor')
         self._show_reads()
         self._show_writes()
         if self._scene.push:
@@ -184,10 +188,10 @@ class Demo:
     def _write(self, tag: str, values: Sequence[int]) -> None:
         mapping = self._mappings[tag]
         publisher = self._watcher.create_publisher(
-            MESSAGES[mapping.type], f'/abdf1/write/{mapping.topic}', 10)
+            MESSAGES[mapping.message_type], f'/abdf1/write/{mapping.topic}', 10)
         self._wait('the bridge to listen', lambda: publisher.get_subscription_count() > 0)
         self._watcher.results.clear()
-        publisher.publish(MESSAGES[mapping.type](data=values))
+        publisher.publish(MESSAGES[mapping.message_type](data=values))
         self._say(f'publish {list(values)} to /abdf1/write/{mapping.topic}')
         self._wait('the result', lambda: bool(self._watcher.results))
         result = self._watcher.results[0]
@@ -204,13 +208,13 @@ class Demo:
     def _show_failure(self, station: str) -> None:
         self._title(f'3. {station.capitalize()} loses its power')
         watched = self._mappings[self._scene.watched]
-        self._watcher.expect(watched, 2.0)
+        deadline = self._watcher.expect(watched)
         self._pause(1.0)
         self._watcher.missed = 0
         self._command(f'silent {self._scene.failing_station}')
         self._wait('the loss to be noticed', lambda: self._watcher.missed > 0)
-        self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of 2 s is told: '
-                  'no more values')
+        self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of {deadline:g} s '
+                  'is told: no more values')
         self._wait('the station to be inactive', lambda: self._level(station) != _OK)
         self._print_statuses('link', station, 'mappings')
         if self._scene.surviving:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from abdf1_ros.messages import Message
+from abdf1_ros.text import printable
 
 
 class Abdf1Error(Exception):
@@ -88,12 +89,13 @@ class Problem(Abdf1Error):
 
     ``where`` is "file:line:column" (or the parameter's name), ``text`` what is wrong and what
     would be right, ``message`` its numbered entry, or None where the specification has none.
+    What it shows is one visible line, whatever stands in the file.
     """
 
     def __init__(self, where: str, text: str, message: Message | None = None,
                  args: tuple[Any, ...] = ()) -> None:
         head = f'{message.line(*args)}; ' if message else ''
-        super().__init__(f'{where}: {head}{text}')
+        super().__init__(printable(f'{where}: {head}{text}'))
         self.where = where
         self.text = text
         self.message = message

@@ -41,20 +41,25 @@ from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import ConfigurationError, FormatError
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.node_diagnostics import Diagnostics
-from abdf1_ros.node_log import EventLog
+from abdf1_ros.node_health import LinkCounterService
+from abdf1_ros.node_log import EventLog, LineLog
 from abdf1_ros.node_messages import (
+    encoder,
     latched_qos,
     MESSAGES,
-    new_message,
     read_qos,
     values_of,
     write_qos,
 )
 from abdf1_ros.node_parameters import Configuration, configure
-from abdf1_ros.port import LinkThread, open_port, PortState
+from abdf1_ros.port import LinkThread, PortOptions, PortState
+from abdf1_ros.text import printable
+from abdf1_ros.trace import PortOpener
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
@@ -71,6 +76,9 @@ EXIT_FAULT = 1
 
 # How often (s) levels are compared, so that a change of one is published at once.
 _LEVEL_CHECK_PERIOD = 0.1
+
+# How long the end waits for its last diagnostics to arrive, where a subscriber is stuck.
+_LAST_WORDS = Duration(seconds=0.5)
 
 _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
@@ -95,6 +103,7 @@ class BridgeNode(Node):
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
         self._log = EventLog(self.get_logger(), time.monotonic)
+        self._lines = LineLog(self.get_logger(), time.monotonic)
         self._read_publishers: dict[str, Any] = {}
         self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
         self._active = self.create_publisher(
@@ -113,10 +122,23 @@ class BridgeNode(Node):
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._port = configuration.port
         self._port_text = ''
+        parameters = configuration.parameters
+        self._opener = PortOpener(
+            configuration.network, configuration.port,
+            PortOptions(parameters.low_latency, parameters.rs485),
+            lambda text: self.get_logger().debug(f'{printable(self._port)}: {text}'))
+        if configuration.parameters.trace_file:
+            self._opener.trace(
+                configuration.parameters.trace_file,
+                configuration.parameters.trace_limit * 1e6,
+                lambda text: self._lines.error('trace_file', f'trace_file: {text}'))
         self.link = LinkThread(
-            self.driver.machine, lambda: open_port(configuration.network, configuration.port),
-            on_state=self._port_changed, on_fault=self._fault)
+            self.driver.machine, self._opener.open, on_state=self._port_changed,
+            on_fault=self._fault)
         self._diagnostics.attach(self.link)
+        self._link_counters = LinkCounterService(self.driver, self.link)
+        self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
+                            callback_group=MutuallyExclusiveCallbackGroup())
 
     def start(self) -> None:
         """Open the port and begin to read."""
@@ -125,7 +147,10 @@ class BridgeNode(Node):
     def stop(self) -> None:
         """End the link thread, then tell the last state; the node may be destroyed after it."""
         self.link.stop()
+        self._opener.close()
         self._publish_diagnostics(time.monotonic())
+        # Without a publisher, what is still under way would not arrive.
+        self._diagnostics_publisher.wait_for_all_acked(_LAST_WORDS)
 
     def _make_driver(self, configuration: Configuration) -> Driver:
         parameters = configuration.parameters
@@ -139,6 +164,7 @@ class BridgeNode(Node):
             polling=configuration.polling, eot_suppression=parameters.eot_suppression,
             duplicate_detection=parameters.duplicate_detection,
             poll_timeout=parameters.poll_timeout,
+            processor_period=parameters.processor_period,
             first_tns=random.randrange(0x10000))
         return Driver(configuration.network, configuration.mappings, settings, self)
 
@@ -147,9 +173,9 @@ class BridgeNode(Node):
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         for mapping, point in self.driver.points.items():
             publisher = self.create_publisher(
-                MESSAGES[mapping.type], f'~/read/{mapping.topic}',
+                MESSAGES[mapping.message_type], f'~/read/{mapping.topic}',
                 read_qos(mapping, point.stale_time), event_callbacks=quiet)
-            self._read_publishers[mapping.topic] = publisher, new_message(mapping)
+            self._read_publishers[mapping.topic] = publisher, encoder(mapping)
 
     def _create_writes(self) -> None:
         topics = defaultdict(list)
@@ -158,8 +184,8 @@ class BridgeNode(Node):
                 topics[mapping.topic].append(mapping)
         for topic, mappings in topics.items():
             self.create_subscription(
-                MESSAGES[mappings[0].type], f'~/write/{topic}', self._writer(mappings),
-                write_qos())
+                MESSAGES[mappings[0].message_type], f'~/write/{topic}',
+                self._writer(mappings), write_qos())
 
     def _writer(self, mappings: Sequence[Mapping]) -> Any:
         """Return the callback that writes a message to every mapping of its topic."""
@@ -179,14 +205,13 @@ class BridgeNode(Node):
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read."""
-        publisher, message = self._read_publishers[mapping.topic]
-        message.data = values
-        publisher.publish(message)
+        publisher, encode = self._read_publishers[mapping.topic]
+        publisher.publish(encode(values))
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Log why a station that answers gives no value."""
-        self.get_logger().error(
-            f'{mapping.tag} ({mapping.address} at station {mapping.station}): {reason}')
+        self._lines.error(mapping.tag, f'{mapping.tag} ({mapping.address} at station '
+                                       f'{mapping.station}): {reason}')
 
     def written(self, result: WriteResult) -> None:
         """Publish the result of a write."""
@@ -194,11 +219,13 @@ class BridgeNode(Node):
         mapping = result.mapping
         level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
         if level == DiagnosticStatus.ERROR:
-            self.get_logger().warning(f'write to {mapping.tag} {result.value}: {result}')
+            self._lines.warning(f'writes to {mapping.tag}',
+                                f'write to {mapping.tag} {result.value}: {result}')
         values = {'address': str(mapping.address), 'station': str(mapping.station),
                   'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}'}
         self._results.publish(DiagnosticStatus(
-            level=level, name=mapping.tag, message=str(result), hardware_id=self._port,
+            level=level, name=printable(mapping.tag), message=printable(str(result)),
+            hardware_id=printable(self._port),
             values=[KeyValue(key=key, value=value) for key, value in values.items()]))
 
     def happened(self, event: Event) -> None:
@@ -211,10 +238,11 @@ class BridgeNode(Node):
         """Publish the Active Node Table and log the change."""
         self._publish_active()
         self._log.forget(station.number)
+        about = f'station {station.number}'
         if station.active:
-            self.get_logger().info(f'station {station.number} answers again')
+            self._lines.info(about, f'{about} answers again')
         else:
-            self.get_logger().error(Message.ERR_INACTIVE_STATION.line(station.number))
+            self._lines.error(about, Message.ERR_INACTIVE_STATION.line(station.number))
 
     def _publish_active(self) -> None:
         """Publish the Active Node Table; nobody is active behind a closed port."""
@@ -222,18 +250,19 @@ class BridgeNode(Node):
         self._active.publish(UInt16MultiArray(data=words))
 
     def _port_changed(self, state: PortState) -> None:
-        self._publish_active()
-        if state.is_open:
-            self.get_logger().info(f'{self._port}: {state.text}')
-        elif state.text != self._port_text:
-            self.get_logger().error(f'{self._port}: {state.text}')
+        if state.text == self._port_text:
+            return  # one more attempt that failed as the one before it
         self._port_text = state.text
+        self._publish_active()
+        tell = self._lines.info if state.is_open else self._lines.error
+        tell('the port', f'{self._port}: {state.text}')
 
     def _fault(self, error: Exception) -> None:
         self.get_logger().error(f'internal error: {error!r}; please report it')
 
     def _check_diagnostics(self) -> None:
         now = time.monotonic()
+        self._link_counters.check(now)
         levels = self._diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
@@ -276,7 +305,8 @@ def main(args: Sequence[str] | None = None) -> int:
         return EXIT_CONFIGURATION
     except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
         # rclpy's own words for arguments and names that it does not take
-        print(f'{NODE_NAME}: bad arguments: {" ".join(str(error).split())}', file=sys.stderr)
+        text = printable(' '.join(str(error).split()))
+        print(f'{NODE_NAME}: bad arguments: {text}', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
     try:

@@ -17,11 +17,13 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable
 import math
 from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from std_msgs.msg import (
     Float32MultiArray, Int16MultiArray, Int32MultiArray, MultiArrayDimension, MultiArrayLayout,
     String, UInt16MultiArray, UInt32MultiArray, UInt8MultiArray)
@@ -46,13 +48,33 @@ _WRITE_DEPTH = 1000
 
 
 def new_message(mapping: Mapping) -> Any:
-    """Return a message for the values of ``mapping``, its layout filled in."""
-    message = MESSAGES[mapping.type]()
-    if mapping.type is not ValueType.STRING:
+    """
+    Return a message for the values of ``mapping``, its layout filled in.
+
+    Characters of a string go to the topic as they are, except that it ends at the first NUL:
+    ROS passes strings on as C does.
+    """
+    message = MESSAGES[mapping.message_type]()
+    if mapping.message_type is not ValueType.STRING:
         dimension = MultiArrayDimension(
             label=str(mapping.address), size=mapping.length, stride=mapping.length)
         message.layout = MultiArrayLayout(dim=[dimension])
     return message
+
+
+def encoder(mapping: Mapping) -> Callable[[Values], Any]:
+    """
+    Return what makes values of ``mapping`` into what its publisher takes.
+
+    Only the numbers of an array ever change, and they stand last: all before them is encoded
+    once. That spares a fifth of what publishing costs (test/benchmarks/node_cpu.py).
+    """
+    message = new_message(mapping)
+    if mapping.message_type is ValueType.STRING:
+        return lambda values: MESSAGES[ValueType.STRING](data=values)
+    message.data = example = array(message.data.typecode, [1] * mapping.length)
+    before, _, after = serialize_message(message).rpartition(example.tobytes())
+    return lambda values: before + values.tobytes() + after
 
 
 def values_of(message: Any) -> Values:

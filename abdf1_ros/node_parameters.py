@@ -16,17 +16,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 import difflib
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings
-from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.driver.csv_table import whole_number
-from abdf1_ros.driver.mapping import COLUMNS, load_mappings, Mapping
+from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
 from abdf1_ros.driver.served import served_problems
+from abdf1_ros.driver.station_lists import parse_stations
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -47,6 +48,10 @@ class Parameters:
     net_file: str = _parameter('', 'path of the net CSV; empty: the one of this package')
     map_file: str = _parameter('', 'path of the map CSV; empty: the one of this package')
     port: str = _parameter('', 'device path or pyserial URL to use instead of Com_Port')
+    low_latency: bool = _parameter(
+        True, 'ask the driver of the port to hand on bytes at once, where it can')
+    rs485: bool = _parameter(
+        False, 'let the kernel switch an RS-485 transmitter with RTS, where it can')
     strict_map: bool = _parameter(False, 'a bad row in the map ends the process')
     read_only: bool = _parameter(False, 'refuse every write')
     default_period: int = _parameter(
@@ -55,6 +60,9 @@ class Parameters:
     diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
     stale_after: float = _parameter(
         3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
+    processor_period: float = _parameter(
+        10.0, 's between questions for type, mode and faults of each processor; 0: never',
+        0.0, 3600.0)
     write_timeout: float = _parameter(
         2.0, 's that a write may wait for the line', 0.05, 60.0)
     nak_on_command_timeout: bool = _parameter(
@@ -81,6 +89,10 @@ class Parameters:
         3600.0)
     expose_map_parameters: bool = _parameter(
         True, 'show every mapping as read-only parameters map.<tag>.<column>')
+    trace_file: str = _parameter(
+        '', 'path of a capture of all that passes the port, for sniff; empty: none')
+    trace_limit: float = _parameter(
+        10.0, 'MB that the capture takes on the disk at most', 0.01, 10_000.0)
 
 
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
@@ -125,11 +137,16 @@ def configure(node: Node) -> Configuration:
     if parameters.strict_map:
         problems += map_problems
     polling = _polling(parameters, mappings, problems)
+    port = network.port
+    if parameters.port:
+        try:
+            port = make_network({'com_port': (parameters.port, 'parameter port')}).port
+        except ConfigurationError as error:
+            problems += error.problems
     if problems:
         raise ConfigurationError(problems)
     if parameters.expose_map_parameters:
         _declare_map(node, mappings)
-    port = replace(network, com_port=parameters.port or network.com_port).port
     return Configuration(parameters, network, port, mappings, map_problems, polling)
 
 
@@ -166,17 +183,9 @@ def _polling(parameters: Parameters, mappings: list[Mapping],
 
 def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
     """Return the stations of a list such as "1,3-5", in its order."""
-    stations: list[int] = []
-    for part in filter(None, text.replace(' ', '').split(',')):
-        first, _, last = part.partition('-')
-        low, high = whole_number(first), whole_number(last or first)
-        if low is None or high is None or not 0 <= low <= high <= MAX_STATION:
-            problems.append(Problem(
-                f'parameter {name}', f'"{part}" should be a station from 0 to {MAX_STATION}, '
-                'or a range such as 3-5'))
-        else:
-            stations += range(low, high + 1)
-    return tuple(dict.fromkeys(stations))
+    stations, faults = parse_stations(text)
+    problems += [Problem(f'parameter {name}', fault) for fault in faults]
+    return stations
 
 
 def _declare(node: Node, name: str, default: Any, description: str, low: float | None = None,

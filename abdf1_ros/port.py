@@ -16,7 +16,8 @@
 Ports and the thread that runs a machine on one: the only operating system code.
 
 A port that has a file descriptor is read with poll(2) and read(2), which costs a half to a
-tenth of pyserial's own read; a port without one (rfc2217) is read through pyserial.
+tenth of pyserial's own read; a port without one (rfc2217) is read through pyserial. What
+adapters can do, and what it is worth, is in docs/adapters.md.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from dataclasses import dataclass
 import math
 import os
 import select
+import socket
 import termios
 import threading
 import time
@@ -37,11 +39,19 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
 import serial
+import serial.rs485
 
 _READ_SIZE = 4096
 _WRITE_TIMEOUT = 2.0
-_FIRST_BACK_OFF = 0.5
-_LAST_BACK_OFF = 30.0
+
+# Between attempts to open a port (s). They cost next to nothing, and whoever has plugged a
+# cable in again is waiting.
+_RETRY_PERIOD = 0.5
+
+# After so long (s) without an answer from the far host a TCP connection is lost. The system's
+# own limit is a quarter of an hour, in which it asks less and less often.
+_SILENCE_LIMIT = 5
+
 _MAX_FAULTS = 3
 _FAULT_WINDOW = 60.0
 
@@ -67,15 +77,15 @@ class DescriptorPort:
     def __init__(self, descriptor: int, close: Callable[[], None]) -> None:
         self._descriptor = descriptor
         self._close = close
+        self._poll = select.poll()
+        self._poll.register(descriptor, select.POLLIN)
         os.set_blocking(descriptor, False)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
-        poll = select.poll()
-        poll.register(self._descriptor, select.POLLIN)
-        poll.register(wake, select.POLLIN)
-        ready = dict(poll.poll(None if timeout is None else math.ceil(timeout * 1000)))
-        if self._descriptor not in ready:
+        self._poll.register(wake, select.POLLIN)  # changes nothing from the second time on
+        ready = self._poll.poll(None if timeout is None else math.ceil(timeout * 1000))
+        if all(descriptor != self._descriptor for descriptor, _ in ready):
             return b''
         try:
             data = os.read(self._descriptor, _READ_SIZE)
@@ -84,6 +94,10 @@ class DescriptorPort:
         if not data:
             raise OSError('the other end has closed the connection')
         return data
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        return self._descriptor
 
     def write(self, data: bytes) -> None:
         """Hand all of ``data`` to the operating system."""
@@ -132,11 +146,29 @@ class SerialPort:
         self._port.close()
 
 
-def open_port(network: Network, name: str | None = None) -> Port:
+@dataclass(frozen=True, slots=True)
+class PortOptions:
+    """
+    What is asked of an adapter, if it can do it.
+
+    ``low_latency`` hands on bytes as they come, where USB adapters gather them for up to
+    16 ms; ``rs485`` switches the transmitter of an RS-485 port on and off with RTS.
+    """
+
+    low_latency: bool = True
+    rs485: bool = False
+
+
+USUAL_OPTIONS = PortOptions()
+
+
+def open_port(network: Network, name: str | None = None, options: PortOptions = USUAL_OPTIONS,
+              tell: Callable[[str], None] = lambda text: None) -> Port:
     """
     Open the port of a net CSV exclusively; ``name`` is used instead of its Com_Port.
 
-    Raises OSError, also where pyserial has another exception for it.
+    ``tell`` is called with what of ``options`` the port cannot do, which is no error. Raises
+    OSError, also where pyserial has another exception for it.
     """
     try:
         port = serial.serial_for_url(
@@ -145,10 +177,41 @@ def open_port(network: Network, name: str | None = None) -> Port:
             rtscts=network.handshake == 'Yes', timeout=0, exclusive=True)
     except (ValueError, termios.error) as error:  # the second: not every device has parity
         raise OSError(*error.args) from error
+    if isinstance(port, serial.Serial):
+        _set_options(port, options, tell)
+    connection = getattr(port, '_socket', None)
+    if isinstance(connection, socket.socket):
+        _set_connection(connection)
     try:
         return DescriptorPort(port.fileno(), port.close)
     except (OSError, AttributeError):
         return SerialPort(port)
+
+
+def _set_options(port: serial.Serial, options: PortOptions, tell: Callable[[str], None]) -> None:
+    """Ask the driver of a device for what goes beyond speed and character."""
+    if options.low_latency:
+        try:
+            port.set_low_latency_mode(True)
+        except (AttributeError, ValueError, OSError) as error:
+            tell(f'the port has no low-latency mode: {error}')
+    if options.rs485:
+        try:
+            port.rs485_mode = serial.rs485.RS485Settings()
+        except (ValueError, OSError) as error:
+            port.rs485_mode = None
+            tell(f'the port has no RS-485 mode: {error}')
+
+
+def _set_connection(connection: socket.socket) -> None:
+    """Send every frame at once, and find out soon that the far host is gone."""
+    # Without the first an ACK waits for the one before it. The last is for what we send, the
+    # others for a line on which we only listen.
+    for option, value in (
+            (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
+            (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
+        connection.setsockopt(socket.IPPROTO_TCP, option, value)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +227,7 @@ class LinkThread(threading.Thread):
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``last_back_off`` seconds apart at most.
+    attempts to open it are ``retry_period`` seconds apart.
     ``on_fault`` is called with an exception that is a bug; the machine starts afresh after it.
     Three within a minute end the thread, and ``has_failed`` tells so.
     """
@@ -172,7 +235,7 @@ class LinkThread(threading.Thread):
     def __init__(self, machine: Machine, open_port: Callable[[], Port], *,
                  on_state: Callable[[PortState], None] = lambda state: None,
                  on_fault: Callable[[Exception], None] = lambda error: None,
-                 last_back_off: float = _LAST_BACK_OFF,
+                 retry_period: float = _RETRY_PERIOD,
                  clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(name='df1 link')
         self.state = PortState(False, 'not opened yet')
@@ -181,7 +244,7 @@ class LinkThread(threading.Thread):
         self._open_port = open_port
         self._on_state = on_state
         self._on_fault = on_fault
-        self._last_back_off = last_back_off
+        self._retry_period = retry_period
         self._clock = clock
         self._stopping = False
         self._is_closed = False
@@ -217,18 +280,16 @@ class LinkThread(threading.Thread):
             self._on_fault(error)
 
     def _keep_open(self) -> None:
-        back_off = _FIRST_BACK_OFF
         while not self._stopping and not self.has_failed:
             try:
                 port = self._open_port()
             except OSError as error:
                 self._set_state(False, f'cannot open the port: {_reason(error)}')
-                self._pause(back_off)
-                back_off = min(2 * back_off, self._last_back_off)
-                continue
-            back_off = _FIRST_BACK_OFF
-            self._set_state(True, 'open')
-            self._run_on(port)
+            else:
+                self._set_state(True, 'open')
+                self._run_on(port)
+            if not self._stopping and not self.has_failed:
+                self._pause(self._retry_period)
         if self.state.is_open:
             self.state = PortState(False, 'closed')
 
@@ -246,8 +307,6 @@ class LinkThread(threading.Thread):
         finally:
             self._machine.stop(PortLost(end))
             port.close()
-        if not self._stopping and not self.has_failed:
-            self._pause(_FIRST_BACK_OFF)
 
     def _serve(self, port: Port) -> None:
         machine, clock = self._machine, self._clock

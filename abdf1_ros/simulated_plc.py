@@ -24,9 +24,10 @@ import math
 import random
 from typing import TypeVar
 
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Poll, Symbol
+from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
@@ -34,8 +35,11 @@ from abdf1_ros.driver.values import Codec, types_of, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
-from abdf1_ros.pccc.dialects import DIALECTS
-from abdf1_ros.pccc.server import SERVED_FAMILIES, Server
+from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.emulated import EmulatedProcessor
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.link_counters import served_counters
+from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')
@@ -81,12 +85,14 @@ class Faults:
     """
     What is wrong with a station at the moment.
 
-    ``silent``: it does not answer. ``slow``: so many polls get EOT before each reply. ``delay``:
-    polls get EOT until so many seconds after the command. ``noise``: the share of its
-    characters that is damaged. ``status``: STS and EXT STS of every reply.
+    ``silent``: it does not answer. ``full``: it has no room for commands, so it passes them
+    over (half duplex) or answers NAK (full duplex). ``slow``: so many polls get EOT before each
+    reply. ``delay``: polls get EOT until so many seconds after the command. ``noise``: the share
+    of its characters that is damaged. ``status``: STS and EXT STS of every reply.
     """
 
     silent: bool = False
+    full: bool = False
     slow: int = 0
     delay: float = 0.0
     noise: float = 0.0
@@ -123,9 +129,10 @@ class SimulatedPlc:
         self.station = station
         self.table = table
         self.faults = Faults()
+        self.processor = EmulatedProcessor(table.plc_type)
         self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self.serve)
         self.outbox: deque[Sending] = deque()
-        self._server = Server(table)
+        self._server = self._make_server()
         self._tns = random.Random(seed).randrange(0x10000)
         self._clock = clock
         self._movers: list[_Mover] = []
@@ -133,9 +140,24 @@ class SimulatedPlc:
         self._polls_to_refuse = 0
         self._ready = -math.inf  # clock value (s) from which the last command's reply is there
 
+    @property
+    def counters(self) -> Counters:
+        """Return the counters of our port."""
+        return self.slave.counters
+
+    def be_full_duplex(self) -> None:
+        """Say from now on that the port is a full-duplex one."""
+        self.processor.is_full_duplex = True
+        self._server = self._make_server()
+
+    def _make_server(self) -> Server:
+        processor = self.processor
+        return Server(self.table, processor, served_counters(
+            self.counters, processor.plc_type, is_full_duplex=processor.is_full_duplex))
+
     def handle(self, symbol: Symbol) -> bytes:
         """Answer a symbol, as well as the faults allow."""
-        if self.faults.silent:
+        if self.faults.silent or (self.faults.full and isinstance(symbol, Frame)):
             return b''
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
         if is_poll and (self._polls_to_refuse > 0 or self._clock() < self._ready):
@@ -158,15 +180,15 @@ class SimulatedPlc:
         """
         codec = _natural_codec(address, len(values))
         codec.check(values)
-        dialect = DIALECTS[address.plc_type]
+        dialect = dialect_of(address.plc_type)
         if codec.type is ValueType.BOOL:
-            bodies = [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
-                      for n, (mask, bits) in enumerate(codec.bit_changes(values))]
+            requests = [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
+                        for n, (mask, bits) in enumerate(codec.bit_changes(values))]
         else:
-            bodies = [dialect.write(address, codec.encode(values))]
-        for body in bodies:
+            requests = [dialect.write(address, codec.encode(values))]
+        for cmd, body in requests:
             self._tns = self._tns + 1 & 0xFFFF
-            command = Packet(station, self.station, dialect.cmd, 0, self._tns, body)
+            command = Packet(station, self.station, cmd, 0, self._tns, body)
             self.outbox.append(Sending(command, report))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Sending | None:
@@ -220,7 +242,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     station = _number(row, 'Station', 0, 254)
     length = _number(row, 'Length', 1, 1000) if row.get('Length') else 1
     motion = _choice(row, 'Motion', {entry.value: entry for entry in Motion})
-    plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in SERVED_FAMILIES})
+    plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in PlcType})
     if station not in plcs:
         plcs[station] = SimulatedPlc(station, DataTable(plc_type), checksum, clock)
     plc = plcs[station]
@@ -243,8 +265,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
 
 
 def _natural_codec(address: Address, length: int) -> Codec:
-    kind = ValueType.BOOL if address.bit is not None else types_of(address.file_type)[0]
-    return Codec(kind, length, address.bit or 0)
+    return Codec(types_of(address)[0], length, address.bit or 0)
 
 
 def _number(row: Row, column: str, low: int, high: int) -> int:

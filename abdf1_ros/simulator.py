@@ -38,7 +38,7 @@ import traceback
 import tty
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
@@ -48,8 +48,10 @@ from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState
 from abdf1_ros.simulated_plc import Faults, load_plcs, numbers, SimulatedPlc
+from abdf1_ros.terminal import drop_output, prepare_output
 
 EXIT_FAULT = 1
 EXIT_CONFIGURATION = 2
@@ -62,11 +64,15 @@ BRIDGE_STATION = Network().station
 _COMMANDS = """\
 commands, on standard input or with --at:
   silent STATION              it stops answering
+  full STATION                it has no room for commands
   slow STATION POLLS          so many polls get EOT before each reply
   delay STATION MS            polls get EOT until so many ms after each command
   noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
   error STATION STS [EXT]     every reply says this error (hexadecimal)
   normal STATION              it works again
+  mode STATION MODE           its processor is in mode run, program, remote (run), test, or
+                              has a fault
+  counters STATION            say what its port has counted
   msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
   quit                        end the simulator
 
@@ -88,10 +94,22 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
     plc, arguments = _station(words, plcs)
     if verb == 'msg' and is_full_duplex and len(arguments) > 1:
         return _send(plc, *arguments)
+    if verb == 'mode' and len(arguments) == 1:
+        return _set_mode(plc, arguments[0])
+    if verb == 'counters' and not arguments:
+        counts = plc.counters.by_mnemonic().items()
+        return f'station {plc.station}: {" ".join(f"{name}={count}" for name, count in counts)}'
+    plc.faults = _faults(line, verb, arguments, is_full_duplex)
+    return f'station {plc.station}: {" ".join([verb, *arguments])}'
+
+
+def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) -> Faults:
     faults = Faults()
     try:
         if verb == 'silent' and not arguments:
             faults.silent = True
+        elif verb == 'full' and not arguments:
+            faults.full = True
         elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
             faults.slow = int(arguments[0])
         elif verb == 'delay' and len(arguments) == 1 and not is_full_duplex:
@@ -104,8 +122,16 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
             raise CommandError(f'"{line.strip()}" is no command\n{_COMMANDS}')
     except ValueError:
         raise CommandError(f'"{line.strip()}" has a number that is none') from None
-    plc.faults = faults
-    return f'station {plc.station}: {" ".join([verb, *arguments])}'
+    return faults
+
+
+def _set_mode(plc: SimulatedPlc, text: str) -> str:
+    try:
+        plc.processor.setting = Setting(text)
+    except ValueError:
+        known = ', '.join(setting.value for setting in Setting)
+        raise CommandError(f'mode {plc.station} {text}: the modes are {known}') from None
+    return f'station {plc.station}: mode {text}'
 
 
 def _send(plc: SimulatedPlc, address: str, *values: str) -> str:
@@ -130,14 +156,24 @@ def _station(arguments: list[str],
 class _FaultyPort:
     """The port of the one PLC on a full-duplex line, as good as its faults allow."""
 
-    def __init__(self, port: Port, plc: SimulatedPlc) -> None:
+    def __init__(self, port: Port, plc: SimulatedPlc, checksum: Checksum) -> None:
         self._port = port
         self._plc = plc
+        self._decoder = FrameDecoder(checksum, Duplex.FULL)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes; a silent PLC hears none."""
+        """Wait for bytes; a silent PLC hears none, a full one only that there are messages."""
         data = self._port.read(timeout, wake)
-        return b'' if self._plc.faults.silent else data
+        if self._plc.faults.full:
+            self._refuse(data)
+        return b'' if self._plc.faults.silent or self._plc.faults.full else data
+
+    def _refuse(self, data: bytes) -> None:
+        """Answer NAK to every message and every enquiry."""
+        self._decoder.feed(data)
+        while (symbol := self._decoder.next_symbol()) is not None:
+            if isinstance(symbol, Frame) or symbol == Control(Code.ENQ):
+                self.write(NAK)
 
     def write(self, data: bytes) -> None:
         """Send bytes, damaged or not at all."""
@@ -223,6 +259,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
     Returns 0, 2 for faulty files or options, 1 after internal errors.
     """
+    prepare_output()
     options = _parse(args)
     try:
         script = sorted(map(_scheduled, options.at))
@@ -235,9 +272,11 @@ def main(args: Sequence[str] | None = None) -> int:
     names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
     _say(f'stations {names} on {line.name}, {options.check}')
     link.start()
-    _converse(plcs, script, link, options)
-    link.stop()
-    line.close()
+    try:
+        _converse(plcs, script, link, options)
+    finally:  # the thread would keep the process alive
+        link.stop()
+        line.close()
     return EXIT_FAULT if link.has_failed else 0
 
 
@@ -266,10 +305,10 @@ def _make_link(plcs: Sequence[SimulatedPlc], line: PtyLine | TcpLine | SerialLin
         machine = _full_duplex(plcs[0], checksum, timing)
 
         def open_line() -> Port:
-            return _FaultyPort(line.open(), plcs[0])
+            return _FaultyPort(line.open(), plcs[0], checksum)
 
     return LinkThread(machine, open_line, on_state=_Announcer().announce,
-                      on_fault=_print_fault, last_back_off=0.5)
+                      on_fault=_print_fault)
 
 
 class _Announcer:
@@ -331,7 +370,10 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
         peer = FullDuplexPeer(
             machine, PeerSettings(checksum), ActiveStationList(), plc.serve)
         return peer.run(plc)
-    return Machine(run, checksum=checksum, duplex=Duplex.FULL, timing=timing)
+
+    plc.be_full_duplex()
+    return Machine(run, checksum=checksum, duplex=Duplex.FULL, timing=timing,
+                   counters=plc.counters)
 
 
 def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]], link: LinkThread,
@@ -366,7 +408,10 @@ def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]], lin
 
 
 def _say(text: str) -> None:
-    print(f'simulator: {text}', flush=True)
+    try:
+        print(f'simulator: {text}', flush=True)
+    except OSError:  # nobody reads it any more; the PLCs go on
+        drop_output()
 
 
 def _print_fault(error: Exception) -> None:

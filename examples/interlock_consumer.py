@@ -20,17 +20,21 @@ Run it beside the bridge; it prints every change of its decision::
     python3 examples/interlock_consumer.py --topic /abdf1/read/cell_interlocks --bit 0
 
 It is no safety function: emergency stops and guards stay hard-wired or safety-rated.
+
+Exit status: 0 after Ctrl-C or SIGTERM, 2 for bad arguments.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import Any
 
 import rclpy
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
@@ -86,17 +90,38 @@ class InterlockConsumer(Node):
             print(f'{"PERMITTED" if permitted else "not permitted"}: {reason}', flush=True)
 
 
+def index(text: str) -> int:
+    """Return an index; Python would take -1 for the last bit."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f'"{text}" should be a whole number from 0')
+    return int(text)
+
+
+def seconds(text: str) -> float:
+    """Return a time above 0 s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value
+
+
 def main() -> int:
     """Run until Ctrl-C."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--topic', default='/abdf1/read/cell_interlocks')
-    parser.add_argument('--bit', type=int, default=0, help='index in the array')
-    parser.add_argument('--patience', type=float, default=2.0,
+    parser.add_argument('--bit', type=index, default=0, help='index in the array, from 0')
+    parser.add_argument('--patience', type=seconds, default=2.0,
                         help='seconds without a value after which motion is not permitted')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     rclpy.init()
-    node = InterlockConsumer(options.topic, options.bit, options.patience)
+    try:
+        node = InterlockConsumer(options.topic, options.bit, options.patience)
+    except InvalidTopicNameException as error:
+        parser.error(' '.join(str(error).split()))
     try:
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):

@@ -22,7 +22,7 @@ file says, holds. ``ros2 launch abdf1_ros bridge.launch.py --show-args`` lists t
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
 
 # Parameters of the node that have an argument here; all are strings.
 PARAMETERS = ('net_file', 'map_file', 'port')
@@ -34,8 +34,10 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     # As ParameterValue, because a bare string that reads like a number would become one.
     given = {name: ParameterValue(arguments[name], value_type=str)
              for name in PARAMETERS if arguments[name]}
-    # Later ones win: an argument beats the file.
-    parameters = [arguments['params_file']] if arguments['params_file'] else []
+    # Later ones win: an argument beats the file, in which $(find-pkg-share ...) may stand.
+    parameters: list[ParameterFile | dict[str, ParameterValue]] = []
+    if arguments['params_file']:
+        parameters.append(ParameterFile(arguments['params_file'], allow_substs=True))
     if given:
         parameters.append(given)
     return [Node(

@@ -79,6 +79,14 @@ def test_problem_without_number_shows_place_and_advice() -> None:
     assert str(Problem('net.csv:2:9', 'write 9600')) == 'net.csv:2:9: write 9600'
 
 
+def test_problem_is_one_line_whatever_the_file_holds() -> None:
+    problem = Problem('a\x1b[2J.csv:2:1', '"N7\n0" is wrong', Message.ERR_ADDRESS_SYNTAX,
+                      (1, 'N7\n0'))
+    assert str(problem) == (
+        r'a\x1b[2J.csv:2:1: 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (N7\n0); '
+        r'"N7\n0" is wrong')
+
+
 def test_configuration_error_shows_every_problem() -> None:
     problems = [Problem('a:1:1', 'this'), Problem('a:1:2', 'that')]
     error = ConfigurationError(problems)

@@ -16,29 +16,15 @@
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 
-PACKAGE = Path(__file__).resolve().parent.parent / 'abdf1_ros'
-MODULES = sorted(path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob('*.py'))
+from tools.rooms import ALLOWED, imports, MODULES, PACKAGE, room_of
 
-_BASE = ('errors', 'messages', 'counters')
-# What a room may import of this package; a room that is not named here may import everything.
-_ALLOWED = {
-    'messages.py': (),
-    'counters.py': (),
-    'errors.py': ('messages',),
-    'df1': (*_BASE, 'df1'),
-    'pccc': (*_BASE, 'df1.packet', 'pccc'),
-    'driver': (*_BASE, 'df1', 'pccc', 'driver'),
-}
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
-_MAY_WAIT = ('port.py', 'node.py', 'simulator.py')
+_MAY_WAIT = ('port.py', 'node.py', 'simulator.py', 'sniff.py', 'tap.py',
+             'commissioning/watch.py')
 
 
 def room(module: str) -> str:
@@ -46,30 +32,8 @@ def room(module: str) -> str:
     return module.split('/')[0]
 
 
-def _exists(dotted: str) -> bool:
-    path = PACKAGE.joinpath(*dotted.split('.'))
-    return path.is_dir() or path.with_suffix('.py').is_file()
-
-
-def imports(module: str, source: str) -> Iterator[str]:
-    """Yield the absolute dotted name of everything that ``module`` imports."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = node.module or ''
-            if node.level:
-                folder = ['abdf1_ros', *module.split('/')[:-1]]
-                parts = folder[:len(folder) - node.level + 1]
-                base = '.'.join([*parts, base] if base else parts)
-            for alias in node.names:
-                inner = f'{base}.{alias.name}'.removeprefix('abdf1_ros.')
-                is_module = base.split('.')[0] == 'abdf1_ros' and _exists(inner)
-                yield f'{base}.{alias.name}' if is_module else base
-
-
 def _may_use_ros(module: str) -> bool:
-    return module in ('node.py', 'demo.py') or (
+    return module in ('node.py', 'demo.py', 'monitor.py', 'monitor_node.py') or (
         module.startswith('node_') and '/' not in module)
 
 
@@ -80,7 +44,7 @@ def _is_ros(top: str) -> bool:
 def violations(module: str, source: str) -> list[str]:
     """Return every import of ``module`` (a path inside the package) that breaks a rule."""
     found = []
-    allowed = _ALLOWED.get(room(module))
+    allowed = ALLOWED.get(room(module))
     for name in imports(module, source):
         top, _, inner = name.partition('.')
         if top == 'abdf1_ros':
@@ -102,6 +66,11 @@ def violations(module: str, source: str) -> list[str]:
 def test_imports_follow_the_arrows(module: str) -> None:
     source = (PACKAGE / module).read_text(encoding='utf-8')
     assert violations(module, source) == []
+
+
+@pytest.mark.parametrize('module', MODULES)
+def test_every_module_has_a_room(module: str) -> None:
+    assert module == '__init__.py' or room_of(module).contents
 
 
 def test_every_layer_is_looked_at() -> None:
@@ -133,9 +102,24 @@ def test_every_layer_is_looked_at() -> None:
     ('messages.py', 'from abdf1_ros.errors import Abdf1Error'),
     ('errors.py', 'from abdf1_ros.df1 import packet'),
     ('counters.py', 'import time'),
+    ('sniffer/session.py', 'import time'),
+    ('sniffer/session.py', 'from abdf1_ros.port import Port'),
+    ('sniffer/session.py', 'from abdf1_ros.driver.network import Network'),
+    ('capture.py', 'import os'),
+    ('capture.py', 'from abdf1_ros.df1 import packet'),
+    ('sniff.py', 'import rclpy'),
+    ('plc.py', 'import rclpy'),
+    ('check.py', 'from std_msgs.msg import String'),
+    ('commissioning/session.py', 'import serial'),
+    ('driver/report.py', 'import time'),
+    ('driver/errands.py', 'from abdf1_ros.port import LinkThread'),
+    ('driver/errands.py', 'from abdf1_ros.commissioning import session'),
     ('simulator.py', 'import rclpy.node'),
     ('simulator.py', 'import serial'),
     ('demo.py', 'from threading import Thread'),
+    ('monitor_view.py', 'import rclpy'),
+    ('monitor_view.py', 'from abdf1_ros.node_messages import MESSAGES'),
+    ('monitor.py', 'import threading'),
     ('node_log.py', 'import threading'),
     ('paths.py', 'import rclpy'),
     ('port.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
@@ -158,6 +142,7 @@ def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
     ('node.py', 'import rclpy\nfrom std_msgs.msg import String\nfrom abdf1_ros import port'),
     ('node_parameters.py', 'from rcl_interfaces.msg import ParameterDescriptor\nimport rclpy'),
     ('node_diagnostics.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
+    ('monitor_node.py', 'import rclpy\nfrom std_msgs.msg import String'),
     ('simulator.py', 'import os, time\nfrom abdf1_ros.port import LinkThread'),
 ])
 def test_import_along_the_arrows_is_let_through(module: str, source: str) -> None:

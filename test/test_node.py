@@ -237,13 +237,18 @@ def test_floats_of_several_topics_do_not_supersede_each_other(make_bench: Benche
 
 # Writes that do not go well
 
+NOT_READ_BACK = 'not read back: no row reads all of these words'
+
 
 def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
-    bench = make_bench(PULSES)  # nothing is read, so nothing but the write can notice it
+    bench = make_bench(PULSES)
     publish = bench.publisher(UInt8MultiArray, 'pulses')
+    publish(*8 * [0])
+    assert bench.until_results(1)[0].message == 'written'  # so no echo is due for a while
+    bench.results.clear()
     bench.plcs.say('silent 1')
     inactive = '2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive'
-    for expected in (f'unknown whether written: {inactive}',
+    for expected in (f'unknown whether written: {inactive}; {NOT_READ_BACK}',
                      f'not written: not sent: {inactive}'):
         publish(*8 * [1])
         (result,) = bench.until_results(1)
@@ -263,7 +268,8 @@ def test_write_that_waits_too_long_for_the_line_is_not_sent(make_bench: Benches)
     for bit in range(3):
         publish(*(int(n == bit) for n in range(8)))
     first, *others = bench.until_results(3)
-    assert first.message == 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+    assert first.message == ('unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed '
+                             f'Out; {NOT_READ_BACK}')
     assert messages(others) == {'not written: not sent: waited longer than 0.2 s for the line': 2}
     assert float(details(others[0])['latency_ms']) > 200
     assert bench.words('B3:1') == [1]
@@ -317,6 +323,20 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
     read_topics = {name for name, _ in bench.node.get_topic_names_and_types()
                    if name.startswith('/abdf1/read/')}
     assert read_topics == {'/abdf1/read/missing', '/abdf1/read/speed'}
+
+
+def test_tag_cannot_forge_lines_or_statuses(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    tag, shown = 'lamp\n[FATAL] all is lost\x1b[2J', r'lamp\n[FATAL] all is lost\x1b[2J'
+    bench = make_bench(f'"{tag}",ReadWrite,N99:0,1,PLC5,1,recipe')
+    status = until_status(bench.diagnostics, 'mappings', ERROR)
+    assert shown in details(status)
+    bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+    (result,) = bench.until_results(1)
+    assert result.name == shown
+    lines = [line for line in ''.join(capfd.readouterr()).splitlines() if 'all is lost' in line]
+    assert [line.split(' ')[0] for line in lines] == ['[ERROR]', '[WARN]']
+    assert all(shown in line for line in lines)
 
 
 # Ends

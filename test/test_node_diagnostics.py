@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 import time
 from typing import Any
@@ -24,7 +25,8 @@ from typing import Any
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import load_mappings, Mapping
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.mapping import Command, Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.driver.values import Values
@@ -161,7 +163,7 @@ def test_last_numbered_error_has_its_age(bench: Bench) -> None:
 
 def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     bench.status('link', NOW)
-    bench.driver.transactions += 30
+    bench.driver._tasks.transactions += 30
     bench.driver.counters.chars_sent += 480
     bench.driver.counters.chars_received += 480
     values = details(bench.status('link', NOW + 2))
@@ -177,6 +179,26 @@ def test_scan_time_is_unknown_before_the_second_read(bench: Bench) -> None:
     assert values['scan time'] == values['longest scan time'] == 'unknown'
     expected = round(bench.driver.expected_scan_time * 1000)
     assert values['expected scan time'] == f'{expected} ms'
+
+
+def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
+    def periods() -> dict[str, str]:
+        values = details(bench.status('link'))
+        return {key: value for key, value in values.items() if key.startswith('period')}
+
+    points = list(bench.driver.points.values())
+    first, second = points[:2]
+    for point in points:
+        point.period = 0.1
+    assert periods() == {'period 100 ms': 'wanted 100 ms, not yet read twice'}
+    first.interval, second.interval = 0.128, 0.136
+    assert periods() == {'period 100 ms': 'wanted 100 ms, reads every 132 ms'}
+    second.period = 0.0
+    assert periods() == {
+        'period 0 ms': 'as often as the line allows, reads every 136 ms',
+        'period 100 ms': 'wanted 100 ms, reads every 128 ms'}
+    second.mapping = replace(second.mapping, command=Command.SERVE)
+    assert 'period 0 ms' not in periods()  # what the PLC writes has no pace of ours
 
 
 # counters
@@ -201,7 +223,8 @@ def test_station_before_its_first_answer(bench: Bench) -> None:
     assert bench.says('station 1') == (OK, 'OK: station 1 not heard yet')
     assert details(bench.status('station 1')) == {
         'active': 'yes', 'last answer': 'none yet', 'last TNS': 'none yet', 'replies': '0',
-        'transactions without reply': '0', 'error replies': '0', 'last event': 'none'}
+        'transactions without reply': '0', 'error replies': '0', 'last event': 'none',
+        'processor': 'unknown (not asked yet)', 'mode': 'unknown', 'faults': 'unknown'}
 
 
 def test_station_that_answers(bench: Bench) -> None:
@@ -271,7 +294,7 @@ def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
 
 def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
-    scheduler = bench.driver._scheduler
+    jobs: Any = bench.driver._scheduler._reads.jobs
 
     class Part:
         """A job that has not been done yet."""
@@ -285,11 +308,11 @@ def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) ->
 
         @property
         def interval(self) -> float:
-            scheduler._jobs.add(Part())
+            jobs.add(Part())
             return 0.25
 
-    scheduler._jobs.clear()
-    scheduler._jobs.add(Divided())
+    jobs.clear()
+    jobs.add(Divided())
     assert details(bench.status('link'))['scan time'] == '250 ms'
 
 

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.node_log import EventLog
+from abdf1_ros.node_log import EventLog, LineLog, MOST_CAUSES, MOST_LINES
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
 
@@ -130,6 +130,28 @@ def test_cause_is_news_after_a_quiet_minute_and_its_repetitions_are_counted(
     assert logged() == []
 
 
+def test_cause_that_lasts_is_logged_again_every_ten_minutes(
+        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+    for _ in range(1201):
+        log.add(event(Message.ERR_BAD_CRC))
+        clock.now += 1.0
+    first, *later = (text for _, text in logged())
+    assert first.endswith('[station 2]')
+    assert later == [f'{first} (599 more like it were not logged)'] * 2
+
+
+def test_station_that_comes_and_goes_does_not_fill_the_log(
+        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+    for _ in range(60):
+        log.forget(2)
+        log.add(event(Message.NTC_NAK_LIMIT_EXCEEDED))
+        clock.now += 1.0
+    assert len(logged()) == MOST_LINES
+    log.add(event(Message.NTC_NAK_LIMIT_EXCEEDED))
+    ((_, text),) = logged()
+    assert text.endswith('[station 2] (50 more like it were not logged)')
+
+
 def test_forgetting_a_station_makes_its_causes_news(
         log: EventLog, logged: Callable[[], Lines]) -> None:
     def happen() -> list[tuple[str, str]]:
@@ -137,12 +159,13 @@ def test_forgetting_a_station_makes_its_causes_news(
         log.add(event(Message.ERR_COMMAND_TIMEOUT, 1))
         log.add(event(Message.ERR_BAD_CRC, 2))
         log.add(event(Message.ERR_BAD_CRC, None))
-        return [(text[:4], text[-3:]) for _, text in logged()]
+        return [(text[:4], text[text.rfind('['):]) for _, text in logged()]
 
     assert len(happen()) == 4
     assert happen() == []
     log.forget(1)
-    assert happen() == [('2506', ' 1]'), ('2508', ' 1]')]
+    again = '[station 1] (1 more like it were not logged)'
+    assert happen() == [('2506', again), ('2508', again)]
     log.forget(77)
     assert happen() == []
 
@@ -162,3 +185,60 @@ def test_routine_is_for_debugging_only(
         talkative.add(event(message))
     assert [(level, text[:4]) for level, text in logged()] == [
         ('DEBUG', str(message.number)) for message in ROUTINE for _ in range(2)]
+
+
+def test_forged_senders_neither_fill_the_memory_nor_the_log(
+        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+    for number in range(MOST_CAUSES + 500):
+        log.add(event(Message.ERR_WRONG_MESSAGE, number))
+    assert len(logged()) == MOST_CAUSES
+    clock.now += 59.0
+    log.add(event(Message.ERR_WRONG_MESSAGE, 3))
+    log.add(event(Message.ERR_BAD_CRC, 3))
+    assert logged() == []
+    clock.now += 1.0
+    log.add(event(Message.ERR_BAD_CRC, 3))  # all but one of the others have been quiet
+    assert [text[:4] for _, text in logged()] == ['2506']
+    log.add(event(Message.ERR_WRONG_MESSAGE, 3))
+    assert logged() == []
+
+
+@pytest.fixture
+def lines(clock: Clock) -> LineLog:
+    return LineLog(get_logger('log_test'), clock)
+
+
+def test_lines_have_the_level_they_are_given(
+        lines: LineLog, logged: Callable[[], Lines]) -> None:
+    lines.info('a', 'one')
+    lines.warning('a', 'two')
+    lines.error('a', 'three')
+    assert logged() == [('INFO', 'one'), ('WARN', 'two'), ('ERROR', 'three')]
+
+
+@pytest.mark.parametrize('level', ['info', 'warning', 'error'])
+def test_line_cannot_pass_for_another(
+        lines: LineLog, logged: Callable[[], Lines], level: str) -> None:
+    forged = 'tag\n[FATAL] [1.0] [log_test]: \x1b[31mall is lost\u2028'
+    getattr(lines, level)('a', forged)
+    ((_, text),) = logged()
+    assert text == r'tag\n[FATAL] [1.0] [log_test]: \x1b[31mall is lost\u2028'
+
+
+@pytest.mark.parametrize('level', ['info', 'warning', 'error'])
+def test_only_a_few_lines_a_minute_are_about_one_thing(
+        lines: LineLog, clock: Clock, logged: Callable[[], Lines], level: str) -> None:
+    write = getattr(lines, level)
+    for number in range(MOST_LINES + 5):
+        write('one\n', str(number))
+        clock.now += 1.0
+    write('other', 'word')
+    assert [text for _, text in logged()] == [*map(str, range(MOST_LINES)), 'word']
+    clock.now += 60.0 - MOST_LINES - 5
+    write('one\n', 'first again')
+    write('one\n', 'next')
+    clock.now += 1.0
+    write('one\n', 'last')
+    assert [text for _, text in logged()] == [
+        r'first again (5 more about one\n were not logged)',
+        r'last (1 more about one\n were not logged)']

@@ -21,10 +21,12 @@ import math
 from pathlib import Path
 from typing import Any
 
-from abdf1_ros.driver.mapping import load_mappings, Mapping
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.values import ValueType
 from abdf1_ros.errors import FormatError
 from abdf1_ros.node_messages import (
+    encoder,
     latched_qos,
     MESSAGES,
     new_message,
@@ -41,6 +43,7 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
+from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import (
     Float32MultiArray,
     Int16MultiArray,
@@ -86,8 +89,59 @@ def test_layout_says_what_the_values_are(
     assert message.layout.data_offset == 0
 
 
-def test_string_has_no_layout(tmp_path: Path) -> None:
-    assert new_message(make_mapping(tmp_path, 'ST9:0')) == String()
+@pytest.mark.parametrize(('address', 'cells'), [
+    ('N7:3', {'Scale': 0.1}), ('N7:3', {'Offset': 1, 'Type': 'uint32'}), ('F8:3', {'Scale': 2})])
+def test_engineering_values_are_float32(
+        tmp_path: Path, address: str, cells: dict[str, object]) -> None:
+    message = new_message(make_mapping(tmp_path, address, Length=2, **cells))
+    assert type(message) is Float32MultiArray
+    assert (message.layout.dim[0].label, message.layout.dim[0].size) == (address, 2)
+
+
+@pytest.mark.parametrize(('address', 'cells'), [
+    ('ST9:0', {}), ('A10:0', {'Length': 5, 'Type': 'string'})])
+def test_string_has_no_layout(tmp_path: Path, address: str, cells: dict[str, object]) -> None:
+    assert new_message(make_mapping(tmp_path, address, **cells)) == String()
+
+
+@pytest.mark.parametrize('length', [1, 2, 3, 7])
+@pytest.mark.parametrize(('address', 'cells', 'values'), [
+    ('B3:1/3', {}, [1, 0, 0, 1, 1, 0, 1]), ('N7:3', {}, [-1, 0, 1, 256, -32768, 32767, 7]),
+    ('B3:3', {}, [65535, 1, 0, 2, 3, 4, 5]), ('F8:3', {}, [1.0, -0.5, 0.0, 2.0, 3.0, 4.0, 5.0]),
+    ('L10:3', {}, [-2**31, 1, 2**31 - 1, 0, 5, 6, 7]),
+    ('N7:3', {'Type': 'uint32'}, [2**32 - 1, 1, 0, 65536, 2, 3, 4]),
+    ('N7:3', {'Type': 'bcd16'}, [9999, 1, 0, 1000, 2, 3, 4])])
+def test_array_that_is_encoded_is_the_message(
+        tmp_path: Path, address: str, cells: dict[str, object], values: list[float],
+        length: int) -> None:
+    mapping = make_mapping(tmp_path, address, Length=length, **cells)
+    encode, message = encoder(mapping), new_message(mapping)
+    for given in (values[:length], values[-length:]):
+        # As it comes from a PLC, not as the message would make it.
+        read = mapping.codec.decode(mapping.codec.encode(given)) if mapping.address.bit is None \
+            else array('B', map(int, given))
+        message.data = given
+        assert encode(read) == serialize_message(message)
+        assert deserialize_message(encode(read), type(message)) == message
+
+
+def test_engineering_values_are_encoded(tmp_path: Path) -> None:
+    mapping = make_mapping(tmp_path, 'N7:3', Length=2, Scale=0.5)
+    assert mapping.scaling is not None
+    values = mapping.scaling.publish(mapping.codec.decode(b'\x03\x00\xff\xff'))
+    message = deserialize_message(encoder(mapping)(values), Float32MultiArray)
+    assert list(message.data) == [1.5, -0.5]
+
+
+def test_string_is_published_as_a_message(tmp_path: Path) -> None:
+    assert encoder(make_mapping(tmp_path, 'ST9:0'))('text') == String(data='text')
+
+
+@pytest.mark.parametrize(('text', 'arrived'), [
+    ('Tank \xe4\t\x1b[2J\r\n', 'Tank \xe4\t\x1b[2J\r\n'), ('ab\0cd', 'ab')])
+def test_string_arrives_unchanged_up_to_a_nul(text: str, arrived: str) -> None:
+    wire = serialize_message(String(data=text))
+    assert deserialize_message(wire, String).data == arrived
 
 
 def test_values_of_arrays_and_strings() -> None:

@@ -21,6 +21,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from abdf1_ros.driver.columns import COLUMNS
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.node_parameters import Configuration, configure, Parameters
@@ -107,7 +108,7 @@ def test_every_parameter_is_declared_read_only_with_a_description(
         'station', 'mode', 'plc_type', 'error_code', 'nak_retries', 'enq_retries', 'cmd_timeout',
         'com_port', 'baud', 'data_bits', 'stop_bits', 'parity', 'timeout', 'tx_delay',
         'handshake')}
-    assert len([name for name in names if name.startswith('map.')]) == 2 * 12
+    assert len([name for name in names if name.startswith('map.')]) == 2 * len(COLUMNS)
     for name in names:
         descriptor = node.describe_parameter(name)
         assert descriptor.read_only, name
@@ -168,6 +169,8 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
     ('read_only', 1, 'read_only = 1 should be true or false'),
     ('strict_map', 'on', "strict_map = 'on' should be true or false"),
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
+    ('port', 'ttyUSB0', 'Com_Port = "ttyUSB0" should be a number from 1, a device path such as '
+     '/dev/ttyUSB0, or a URL such as socket://host:port'),
     ('net.station', 255,
      '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
      'Station = "255" should be a whole number from 0 to 254'),
@@ -224,7 +227,8 @@ def test_mappings_are_shown_with_their_defaults(
     assert shown == {
         'tag': 'line/door', 'command': 'Read', 'address': 'I:017/12', 'station': '1',
         'plc_type': 'PLC5', 'length': '1', 'type': 'bool', 'topic': 'line/door', 'period': '',
-        'publish': 'Always', 'min': '', 'max': ''}
+        'publish': 'Always', 'min': '', 'max': '', 'word_order': 'Low', 'scale': '', 'offset': '',
+        'access': 'Typed', 'processor': ''}
 
 
 def test_mappings_can_be_kept_out_of_the_parameters(

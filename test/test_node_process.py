@@ -17,14 +17,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 import re
 import signal
 import time
 
+from abdf1_ros.driver.forecast import intervals, line_model, longest_wait
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.network import load_network
+from abdf1_ros.driver.planner import Planner
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from rclpy.duration import Duration, Infinite
+from rclpy.duration import Infinite
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt8MultiArray, UInt16MultiArray
 from support.ros import (
     details,
@@ -61,6 +66,14 @@ def observer() -> Iterator[Observer]:
         yield observer
 
 
+def stale_time_of_the_heartbeat(files: Files, baud: int, stale_after: float) -> float:
+    network = replace(load_network(str(files.net)), baud=baud)
+    blocks = Planner(line_model(network), 0.1).plan(load_mappings(str(files.map))[0])
+    period, = {block.period for block in blocks for mapping in block.mappings
+               if mapping.tag == 'heartbeat'}
+    return stale_after * intervals(blocks)[period] + longest_wait(blocks)
+
+
 def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> None:
     diagnostics = observer.diagnostics('/dev/ttyS98')
     arguments = ros_args(
@@ -75,7 +88,8 @@ def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> No
         assert (baud, period, stale_after) == (19200, 2, 5)
         assert limit == '999'  # the map is in its file alone
         (endpoint,) = observer.node.get_publishers_info_by_topic('/overrides/read/heartbeat')
-        assert endpoint.qos_profile.deadline == Duration(seconds=5)
+        assert endpoint.qos_profile.deadline.nanoseconds == pytest.approx(
+            1e9 * stale_time_of_the_heartbeat(files, 19200, stale_after), rel=1e-6)
         link = find_status(diagnostics.first(), 'link')
         assert details(link)['settings'] == '19200 baud, CRC'
         node.end()

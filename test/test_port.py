@@ -31,12 +31,24 @@ from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Symbol
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
-from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState, SerialPort
+from abdf1_ros.port import (
+    DescriptorPort,
+    LinkThread,
+    open_port,
+    Port,
+    PortOptions,
+    PortState,
+    SerialPort,
+)
 import pytest
 import serial
+from support.device_server import DeviceServer
 from support.ptys import PATIENCE, Pty, wait_until
 
 READY = b'ready'
+
+# pyserial starts its thread in the way of old.
+RFC2217 = pytest.mark.filterwarnings('ignore:set(Daemon|Name).* is deprecated')
 
 
 class Script:
@@ -101,7 +113,7 @@ class Link:
         network = Network(com_port=str(name))
         thread = LinkThread(
             machine, lambda: open_port(network), on_state=self.states.put,
-            last_back_off=0.02, **options)  # type: ignore[arg-type]
+            retry_period=0.02, **options)  # type: ignore[arg-type]
         self.threads.append(thread)
         thread.start()
         return thread
@@ -192,31 +204,15 @@ def test_port_that_vanishes_is_opened_again_when_it_is_back(pty: Pty, link: Link
         back.close()
 
 
-def test_attempts_to_open_come_further_and_further_apart() -> None:
+def test_attempts_to_open_do_not_end_and_are_half_a_second_apart() -> None:
     def refuse() -> Port:
         raise OSError(16, 'Device or resource busy')
 
     states: list[PortState] = []
-    thread = Impatient(Script().machine, refuse, 9, on_state=states.append)
+    thread = Impatient(Script().machine, refuse, 4, on_state=states.append)
     thread.run()
-    assert thread.pauses == [0.5, 1, 2, 4, 8, 16, 30, 30, 30]
+    assert thread.pauses == [0.5, 0.5, 0.5, 0.5]
     assert set(states) == {PortState(False, 'cannot open the port: Device or resource busy')}
-    thread.stop()
-
-
-def test_back_off_begins_anew_after_the_port_was_open(pty: Pty) -> None:
-    tries = itertools.count()
-
-    def open_at_third() -> Port:
-        if next(tries) != 3:
-            raise OSError('not now')
-        port = open_port(Network(com_port=str(pty.name)))
-        pty.close()
-        return port
-
-    thread = Impatient(Script(Step(b'', None)).machine, open_at_third, 6)
-    thread.run()
-    assert thread.pauses == [0.5, 1, 2, 0.5, 0.5, 1]
     thread.stop()
 
 
@@ -244,7 +240,7 @@ def test_stop_while_the_port_is_not_there(tmp_path: Path) -> None:
         asked.set()
         raise OSError('no')
 
-    thread = LinkThread(Script().machine, refuse, last_back_off=3600.0)
+    thread = LinkThread(Script().machine, refuse, retry_period=3600.0)
     thread.start()
     assert asked.wait(PATIENCE)
     began = time.monotonic()
@@ -466,6 +462,75 @@ def test_port_without_a_descriptor(wake: tuple[int, int]) -> None:
     os.write(wake[1], b'w')
     assert port.read(None, wake[0]) == b''
     port.close()
+
+
+def told_by_open(network: Network, options: PortOptions) -> list[str]:
+    """Return what ``open_port`` tells of the options."""
+    told: list[str] = []
+    open_port(network, None, options, told.append).close()
+    return told
+
+
+def test_option_that_a_port_does_not_have_is_told_and_no_error(pty: Pty) -> None:
+    network = Network(com_port=str(pty.name))
+    low_latency, rs485 = told_by_open(network, PortOptions(low_latency=True, rs485=True))
+    assert low_latency.startswith('the port has no low-latency mode: ')
+    assert rs485.startswith('the port has no RS-485 mode: ')
+    assert told_by_open(network, PortOptions(low_latency=False)) == []
+
+
+def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(serial.Serial, 'set_low_latency_mode',
+                        lambda port, mode: asked.append(mode))
+    monkeypatch.setattr(serial.Serial, '_set_rs485_mode',
+                        lambda port, settings: asked.append(settings.rts_level_for_tx))
+    network = Network(com_port=str(pty.name))
+    assert told_by_open(network, PortOptions(low_latency=True, rs485=True)) == []
+    assert asked == [True, True]
+
+
+def is_watched_and_sends_at_once(connection: socket.socket) -> bool:
+    options = (socket.TCP_NODELAY, socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL,
+               socket.TCP_USER_TIMEOUT)
+    values = [connection.getsockopt(socket.IPPROTO_TCP, option) for option in options]
+    return values == [1, 5, 1, 5000] and \
+        connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+
+
+def test_socket_url_sends_at_once_and_notices_a_lost_host() -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        port = open_port(Network(com_port=f'socket://127.0.0.1:{server.getsockname()[1]}'))
+        assert isinstance(port, DescriptorPort)
+        with socket.socket(fileno=os.dup(port.fileno())) as connection:
+            assert is_watched_and_sends_at_once(connection)
+        port.close()
+
+
+@RFC2217
+def test_machine_runs_on_an_rfc2217_device_server(link: Link) -> None:
+    script = Script(Step(ACK, PATIENCE), Step(None, None))
+    with DeviceServer() as server:  # its line gives back what is sent
+        thread = link.start(script.machine, f'rfc2217://127.0.0.1:{server.port}')
+        assert link.state().is_open
+        assert script.next() == Control(Code.ACK)
+        assert server.baud == 9600
+        thread.stop()
+
+
+@RFC2217
+def test_rfc2217_url_sends_at_once_and_notices_a_lost_host(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = []
+    connect = socket.create_connection
+    monkeypatch.setattr(
+        socket, 'create_connection',
+        lambda *args, **named: opened.append(connect(*args, **named)) or opened[0])
+    with DeviceServer() as server:
+        port = open_port(Network(com_port=f'rfc2217://127.0.0.1:{server.port}'))
+        assert isinstance(port, SerialPort)
+        assert is_watched_and_sends_at_once(opened[0])
+        port.close()
 
 
 def test_machine_runs_on_a_port_without_a_descriptor(link: Link) -> None:

@@ -24,7 +24,8 @@ from abdf1_ros.df1.frames import Code, Control, Frame, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc, stored
@@ -71,10 +72,11 @@ class Master:
         self._plc = plc
         self._tns = 0
 
-    def deliver(self, data: bytes) -> bytes:
+    def deliver(self, request: Request) -> bytes:
         """Send a command; return what the PLC says to that."""
         self._tns += 1
-        packet = Packet(self._plc.station, 5, 0x0F, 0, self._tns, data)
+        cmd, data = request
+        packet = Packet(self._plc.station, 5, cmd, 0, self._tns, data)
         return self._plc.handle(Frame(packet.encode(), self._plc.station))
 
     def poll(self) -> bytes:
@@ -84,7 +86,7 @@ class Master:
     def read(self, text: str, words: int = 1) -> bytes:
         """Return words, by a whole transaction."""
         address = Address.parse(text, self._plc.table.plc_type)
-        dialect = DIALECTS[address.plc_type]
+        dialect = dialect_of(address.plc_type)
         assert self.deliver(dialect.read(address, words)) == frames.ACK
         decoder = frames.FrameDecoder(Checksum.CRC, frames.Duplex.HALF)
         decoder.feed(self.poll())
@@ -113,11 +115,54 @@ def test_data_file(path: Path, clock: Clock) -> None:
     assert stored(two, 'I:1.0', 2) == b'\5\0\0\0'  # what is not named is 0
 
 
+def test_data_file_with_structures(path: Path, clock: Clock) -> None:
+    one, two = load(path, clock, '1,PLC5,PD10:0,82,,,', '1,PLC5,PD10:0.SP,2,1.5 -2,,',
+                    '1,PLC5,PD10:0.PV,1,7.5,Ramp,100', '1,PLC5,PD10:0/MO,1,1,,',
+                    '1,PLC5,MG11:1.ERR,1,-3,,', '1,PLC5,BT12:0,6,1 2,,', '1,PLC5,SC13:0.PRE,1,9,,',
+                    '2,SLC,PD10:0.SPS,2,500 7,,', '2,SLC,MG11:0/DN,1,1,,')
+    assert stored(one, 'PD10:0', 6) == bytes.fromhex('02 00 00 00 00 00 C0 3F 00 00 00 C0')
+    assert stored(one, 'MG11:1.ERR') == bytes.fromhex('FD FF')
+    assert (stored(one, 'BT12:0', 2), stored(one, 'SC13:0.PRE')) == (b'\1\0\2\0', b'\x09\0')
+    assert stored(two, 'PD10:0.SPS', 2) == bytes.fromhex('F4 01 07 00')
+    assert stored(two, 'MG11:0.17') == bytes.fromhex('00 20')
+    clock.now += 0.1
+    read_pv = bytes.fromhex('68 00 00 01 00 0F 00 0A 00 1A 01 00')
+    reply = one.serve(Packet(1, 5, 0x0F, 0, 1, read_pv))
+    assert reply.data == bytes.fromhex('96 09 94 08 00 00 08 41')
+
+
+def test_data_file_of_a_plc2_and_a_plc3(path: Path, clock: Clock) -> None:
+    two, three = load(path, clock, '4,PLC2,020,3,1 2 65535,,', '4,PLC2,022/17,1,,Toggle,100',
+                      '5,plc3,E3.1.8.10.0.2,2,7 8,,', '5,PLC3,N10:0,1,-1,,',
+                      '5,PLC3,T:1.ACC,1,5,Ramp,100')
+    clock.now += 0.1
+    assert Master(two).read('020', 3) == b'\1\0\2\0\xff\x7f'
+    three_master = Master(three)
+    assert three_master.read('B10:0', 4) == b'\0\0\0\0\7\0\x08\0'
+    assert (three_master.number('N10:0'), three_master.number('T:1.ACC')) == (-1, 6)
+
+
+@pytest.mark.parametrize(('plc', 'text', 'cmd'), [('PLC2', '020', 0x08), ('PLC3', 'N7:0', 0x0F)])
+def test_message_of_a_plc2_and_a_plc3(plc: str, text: str, cmd: int, clock: Clock) -> None:
+    machine = simulated_plc(4, plc, clock, (text, 1))
+    said: list[str] = []
+    machine.send(Address.parse(text, machine.table.plc_type), [7], 5, said.append)
+    sending = machine.next_task(0.0)
+    assert sending is not None
+    assert (sending.command.cmd, sending.command.dst) == (cmd, 5)
+    sending.reply(sending.command.reply())
+    assert said == ['confirmed']
+
+
 @pytest.mark.parametrize('row, text', [
+    ('1,PLC2,N7:0,,,,', '2:3 (Address): write the octal number of a word, as in 020 or 110/17'),
+    ('1,PLC3,F8:0,,,,', '2:3 (Address): F is no file type of a PLC-3; file types: O, I, T, C, '
+                        'N, D, B, A, S'),
     ('300,PLC5,N7:0,,,,', '2:1 (Station): Station = "300" should be a whole number from 0 to '
                           '254'),
     ('x,PLC5,N7:0,,,,', '2:1 (Station): Station = "x" should be a whole number from 0 to 254'),
-    ('1,PLC9,N7:0,,,,', '2:2 (PLC_Type): PLC_Type = "PLC9" should be one of PLC5, SLC'),
+    ('1,PLC9,N7:0,,,,',
+     '2:2 (PLC_Type): PLC_Type = "PLC9" should be one of PLC2, PLC3, PLC5, SLC'),
     ('1,PLC5,N7,,,,', '2:3 (Address): an element is missing, as in N7:0'),
     ('1,PLC5,N7:1000,,,,', '2:3 (Address): elements of N run from 0 to 999'),
     ('1,PLC5,N7:0,0,,,', '2:4 (Length): Length = "0" should be a whole number from 1 to 1000'),
@@ -198,7 +243,7 @@ def test_motion_goes_on_from_what_was_written(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,SLC,N7:0,1,0,Ramp,100')
     master = Master(plc)
     address = Address.parse('N7:0', plc.table.plc_type)
-    master.deliver(DIALECTS[address.plc_type].write(address, b'\x64\0'))
+    master.deliver(dialect_of(address.plc_type).write(address, b'\x64\0'))
     master.poll()
     plc.handle(ACKNOWLEDGED)
     clock.now += 0.1
@@ -210,7 +255,7 @@ def plc(clock: Clock) -> SimulatedPlc:
     return simulated_plc(1, 'SLC', clock, ('N7:0', 10))
 
 
-READ = bytes.fromhex('a2 02 07 89 00 00')
+READ = (0x0F, bytes.fromhex('a2 02 07 89 00 00'))
 
 
 def test_without_faults(plc: SimulatedPlc) -> None:
@@ -227,6 +272,15 @@ def test_silent(plc: SimulatedPlc) -> None:
     assert (master.deliver(READ), master.poll()) == (b'', b'')
     plc.faults = Faults()
     assert master.poll() == frames.EOT  # it has not heard anything
+    assert master.number('N7:0') == 0
+
+
+def test_full(plc: SimulatedPlc) -> None:
+    plc.faults = Faults(full=True)
+    master = Master(plc)
+    assert (master.deliver(READ), master.poll()) == (b'', frames.EOT)
+    plc.faults = Faults()
+    assert master.poll() == frames.EOT  # it has not kept the command
     assert master.number('N7:0') == 0
 
 
@@ -261,7 +315,7 @@ def test_error(plc: SimulatedPlc, status: tuple[int, ...], link_data: str) -> No
 
 def test_error_executes_nothing(plc: SimulatedPlc) -> None:
     plc.faults = Faults(status=(0x50,))
-    Master(plc).deliver(bytes.fromhex('aa 02 07 89 00 00 05 00'))
+    Master(plc).deliver((0x0F, bytes.fromhex('aa 02 07 89 00 00 05 00')))
     assert stored(plc, 'N7:0') == b'\0\0'
 
 

@@ -28,6 +28,11 @@ import termios
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import decode_identity
 from abdf1_ros.simulated_plc import Faults, SimulatedPlc
 from abdf1_ros.simulator import CommandError, execute, main, PtyLine
 import pytest
@@ -54,6 +59,7 @@ def plcs() -> list[SimulatedPlc]:
 
 @pytest.mark.parametrize('line, faults, text', [
     ('silent 12', Faults(silent=True), 'station 12: silent'),
+    ('full 12', Faults(full=True), 'station 12: full'),
     ('  slow   12  3 \n', Faults(slow=3), 'station 12: slow 3'),
     ('delay 12 50', Faults(delay=0.05), 'station 12: delay 50'),
     ('noise 12 0.01', Faults(noise=0.01), 'station 12: noise 0.01'),
@@ -67,10 +73,23 @@ def test_command(plcs: list[SimulatedPlc], line: str, faults: Faults, text: str)
     assert plcs[0].faults == Faults()
 
 
+def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
+    plcs[1].faults = faults = Faults(slow=9)
+    plcs[1].counters.messages_sent, plcs[1].counters.chars_received = 3, 70
+    name, _, counts = execute('counters 12', plcs).partition(': ')
+    assert name == 'station 12'
+    told = dict(word.split('=') for word in counts.split())
+    assert {key: int(value) for key, value in told.items()} == plcs[1].counters.by_mnemonic()
+    assert told['CNT_MSG_PACKETS_SENT'] == '3'
+    assert plcs[1].faults is faults
+
+
 @pytest.mark.parametrize('line, text', [
     ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
     ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is no command'),
-    ('silent 1 2', '"silent 1 2" is no command'), ('slow 1', '"slow 1" is no command'),
+    ('silent 1 2', '"silent 1 2" is no command'), ('full 1 2', '"full 1 2" is no command'),
+    ('counters 1 2', '"counters 1 2" is no command'),
+    ('slow 1', '"slow 1" is no command'),
     ('slow 1 few', '"slow 1 few" has a number that is none'),
     ('delay 1', '"delay 1" is no command'),
     ('delay 1 long', '"delay 1 long" has a number that is none'),
@@ -84,6 +103,28 @@ def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
         execute(line, plcs)
     assert str(caught.value).startswith(text)
     assert plcs[0].faults is before
+
+
+@pytest.mark.parametrize('setting', Setting)
+def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
+    plcs[1].faults = before = Faults(slow=9)
+    assert execute(f'mode 12 {setting.value}', plcs) == f'station 12: mode {setting.value}'
+    assert plcs[1].processor.setting is setting
+    assert plcs[0].processor.setting is Setting.REMOTE
+    assert plcs[1].faults is before  # a mode is no fault of the line
+    status = plcs[1].serve(Packet(12, 5, 0x06, 0, 1, STATUS_REQUEST)).data
+    assert decode_identity(status) == decode_identity(
+        EmulatedProcessor(PlcType.SLC, setting).encode())
+
+
+@pytest.mark.parametrize('line, text', [
+    ('mode 12', '"mode 12" is no command'), ('mode 12 run now', '"mode 12 run now" is no'),
+    ('mode 12 stop', 'mode 12 stop: the modes are run, program, remote, test, fault')])
+def test_bad_mode(plcs: list[SimulatedPlc], line: str, text: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        execute(line, plcs)
+    assert str(caught.value).startswith(text)
+    assert plcs[1].processor.setting is Setting.REMOTE
 
 
 @pytest.fixture
@@ -123,6 +164,11 @@ class Simulator:
         """End its standard input."""
         assert self._process.stdin is not None
         self._process.stdin.close()
+
+    def close_output(self) -> None:
+        """Read nothing more of what it prints."""
+        assert self._process.stdout is not None
+        self._process.stdout.close()
 
     def signal(self, number: signal.Signals) -> None:
         """Send it a signal."""
@@ -277,9 +323,10 @@ def test_bad_data_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> No
     path = tmp_path / 'data.csv'
     path.write_text(DATA + '3,PLC7,N7:0,,,,\n3,SLC,Q7:0,,,,\n', encoding='utf-8')
     assert _refused(capsys, '--data', str(path)).splitlines() == [
-        f'simulator: {path}:4:2 (PLC_Type): PLC_Type = "PLC7" should be one of PLC5, SLC',
-        f'{path}:5:3 (Address): Q is no file type; file types: O, I, S, B, T, C, R, N, F, ST, A, '
-        'D, L']
+        f'simulator: {path}:4:2 (PLC_Type): PLC_Type = "PLC7" should be one of PLC2, PLC3, PLC5, '
+        'SLC',
+        f'{path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, N, F, ST, '
+        'A, D, L, PD, MG']
 
 
 def test_missing_data_file(capsys: pytest.CaptureFixture[str]) -> None:
@@ -370,3 +417,11 @@ def test_on_a_port_that_pyserial_opens(start: Start) -> None:
             _converse(client.fileno(), Checksum.CRC, '11 02')
         simulator.signal(signal.SIGTERM)
         assert simulator.end() == (0, '')
+
+
+def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(start: Start) -> None:
+    simulator = start()
+    simulator.line()
+    simulator.close_output()
+    simulator.type('silent 1\nnormal 1\nquit\n')
+    assert simulator.end() == (0, '')

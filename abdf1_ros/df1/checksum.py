@@ -41,8 +41,8 @@ class Checksum(Enum):
         """
         if self is Checksum.BCC:
             return bcc(data, station or 0)
-        seed = 0 if station is None else crc16(bytes((station, 0x02)))
-        return crc16(b'\x03', crc16(data, seed))
+        covered = data + b'\x03'
+        return crc16(covered if station is None else bytes((station, 0x02)) + covered)
 
     def encode(self, value: int) -> bytes:
         """Return the check as it stands on the line: the CRC low byte first (M 5-6)."""

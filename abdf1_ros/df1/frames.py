@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from functools import cache
 
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
@@ -32,6 +33,10 @@ from abdf1_ros.df1.packet import HEADER_SIZE
 # Bytes of unstuffed link data that we take: the largest reply is 244 bytes behind a header
 # (M 7-30..7-40), and no known device sends more than this.
 MAX_LINK_DATA = 261
+
+# Bytes that wait to be read while a machine does not listen, some seconds of the fastest line.
+# What comes beyond is lost, as it is in a UART.
+MAX_WAITING = 65536
 
 
 class Code(IntEnum):
@@ -74,6 +79,7 @@ def master_frame(station: int, data: bytes, checksum: Checksum) -> bytes:
     return _SOH + stuff(bytes((station,))) + STX + stuff(data) + ETX + check
 
 
+@cache
 def poll_frame(station: int) -> bytes:
     """Return the poll of ``station`` (0-254): its check is a BCC on every line (M 5-3)."""
     return ENQ + stuff(bytes((station,))) + bytes((bcc(b'', station),))
@@ -93,6 +99,10 @@ class Control:
     """DLE ACK, DLE NAK, DLE EOT, or (full duplex) DLE ENQ."""
 
     code: Code
+
+
+_CONTROLS: dict[int, Control] = {
+    code: Control(code) for code in (Code.ACK, Code.NAK, Code.EOT, Code.ENQ)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,9 +181,11 @@ class FrameDecoder:
         self.last_byte = 0
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line, in any chunks."""
+        """Take bytes from the line, in any chunks; with ``MAX_WAITING`` unread, drop them."""
         if data:
-            self._buffer += data
+            room = MAX_WAITING - len(self._buffer)
+            self._buffer += data[:room]
+            self.noise += max(0, len(data) - room)
             self.last_byte = data[-1]
 
     def next_symbol(self) -> Symbol | None:
@@ -209,10 +221,8 @@ class FrameDecoder:
             self._step = self._soh_station
         elif code == Code.ENQ and half:
             self._step = self._poll_station
-        elif code in (Code.ACK, Code.NAK, Code.EOT, Code.ENQ):
-            return Control(Code(code))
         else:
-            return Unknown(code)
+            return _CONTROLS.get(code) or Unknown(code)
         return None
 
     def _begin_data(self, station: int | None) -> None:

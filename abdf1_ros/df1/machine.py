@@ -248,15 +248,16 @@ class Machine:
         return self._put_on_line(step)
 
     def _put_on_line(self, step: Step) -> bool:
+        free = max(self.now, self._line_free)
         if step.frame:
+            size = len(step.frame)
             self._out += step.frame
-            self.counters.chars_sent += len(step.frame)
-            left = max(self.now, self._line_free) + len(step.frame) * self._timing.char_time
-            self._line_free = left
-            self._echo_due += len(step.frame)
+            self.counters.chars_sent += size
+            self._line_free = free = free + size * self._timing.char_time
+            self._echo_due += size
             if self._forget_on_send:
                 self.decoder.reset()
-        self._set_deadline(step.timeout, max(self.now, self._line_free))
+        self._set_deadline(step.timeout, free)
         return step.timeout == 0
 
     def _transmit(self, step: Step) -> None:

@@ -29,7 +29,8 @@ A station that passes a retry limit becomes inactive.
 
 A transaction therefore ends within (NAK_Retries + 1) x Timeout for delivery, Cmd_Timeout for
 polling, and (ENQ_Retries + 1) x Timeout for the last poll. The retries of a phase are never
-cut short by Cmd_Timeout: with S0's defaults (both 1000 ms) no retry would ever happen.
+cut short by Cmd_Timeout: with S0's defaults (both 1000 ms) no retry would ever happen. Nor is
+it up as long as messages come that were queued before the reply, but for a few of them only.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from collections.abc import Callable, Generator
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Symbol
 from abdf1_ros.df1.machine import Machine, Procedure, Step
-from abdf1_ros.df1.master_line import MasterLine, MasterSettings, Talk
+from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, Talk
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -131,7 +132,7 @@ class HalfDuplexMaster:
     def _collect(self, number: int, command: Packet,
                  started: float) -> Generator[Step, Symbol | None, Packet]:
         """Poll until the reply to ``command`` is here (S0, "Network Reads"; M 3-13..3-15)."""
-        pause = 0.0
+        pause, passed_over = 0.0, 0
         while True:
             answer = yield from self._line.poll_with_retries(number, pause)
             packet = None
@@ -143,7 +144,10 @@ class HalfDuplexMaster:
             if packet is not None:
                 self._line.take_unwanted(number, packet)
             pause = self._settings.poll_pause
-            if self._machine.now - started >= self._settings.cmd_timeout:
+            passed_over += isinstance(answer, Frame)
+            may_be_next = isinstance(answer, Frame) and passed_over <= MOST_QUEUED
+            is_over = self._machine.now - started >= self._settings.cmd_timeout
+            if is_over and not may_be_next:
                 raise CommandTimeout
 
     def _give_up(self, number: int) -> Talk:

@@ -52,8 +52,19 @@ BROADCAST_PAUSE = 0.05
 # Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
 MAX_FORWARDS = 16
 
+# The same with the replies among them, which are always acknowledged. There are never so many
+# unless a slave sends replies to nothing; those are dropped.
+MAX_KEPT = 2 * MAX_FORWARDS
+
+# Messages that a slave may have queued before the reply we want. They are taken even when the
+# time of the command is up, or on a slow line each reply would for ever be found behind the one
+# before it.
+MOST_QUEUED = 8
+
 # Times as long as for one poll of the dead is left to the living.
 LIVING_SHARE = 7
+
+_ACKNOWLEDGED = Control(Code.ACK)
 
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
@@ -119,7 +130,7 @@ class MasterLine:
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             answer = yield from self._ask(frame, number, (Code.ACK, Code.NAK))
-            if answer == Control(Code.ACK):
+            if answer == _ACKNOWLEDGED:
                 self.stations.heard(number, self.machine.now)
                 return
             cause = self._undelivered(answer, number)
@@ -258,12 +269,13 @@ class MasterLine:
 
         It is served, kept to be passed on, or dropped and accounted for.
         """
-        if self._is_to_forward(packet):
+        has_room = len(self._forwards) < MAX_KEPT
+        if self._is_to_forward(packet) and has_room:
             self._forwards.append(packet)
             return
         is_ours = packet.dst == self.settings.station and packet.src == number
         if is_ours and not packet.is_reply and self.settings.accept_slave_messages \
-                and self._serve is not None:
+                and self._serve is not None and has_room:
             self._forwards.append(self._serve(packet))
             return
         if packet.is_reply and is_ours:

@@ -26,9 +26,9 @@ The receiver answers every message at once with ACK or NAK and remembers what it
 an ENQ (M 4-7..4-9). That memory begins as NAK, and falls back to NAK with everything heard
 that was no message: an old ACK must not stand for a new message that got lost.
 
-Responses name no message. A transfer that needed a retry is therefore followed by Timeout in
+Responses name no message. A transfer that needed an ENQ is therefore followed by Timeout in
 which responses that come late are passed over; they would stand for the next message. Behind
-a reply that came before its ACK, a tenth of a second does.
+a NAK, which came in time, and behind a reply that came before its ACK, a tenth of a second does.
 
 An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
 at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
@@ -63,7 +63,7 @@ MAX_WAITING_REPLIES = 8
 
 _MIN_RESPONSE_TIME = 0.02
 
-# How long (s) an ACK may come behind the reply that overtook it.
+# How long (s) an ACK may come behind the reply that overtook it, or behind another response.
 _LATE_ACK = 0.1
 
 Hearing = Generator[Step, Symbol | None, None]
@@ -211,9 +211,9 @@ class FullDuplexPeer:
                            station=station)
                 sending = frames.ENQ
         delivered = self._machine.now if response in (Code.ACK, Code.STX) else None
-        if naks or enqs:
+        if enqs:
             yield from self._listen(self._timeout)
-        elif response is Code.STX:
+        elif naks or response is Code.STX:
             yield from self._listen(_LATE_ACK)
         return delivered
 

@@ -41,7 +41,14 @@ from dataclasses import dataclass, field
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.machine import Machine, Procedure, Step
-from abdf1_ros.df1.master_line import is_good, LIVING_SHARE, MasterLine, MasterSettings, Talk
+from abdf1_ros.df1.master_line import (
+    is_good,
+    LIVING_SHARE,
+    MasterLine,
+    MasterSettings,
+    MOST_QUEUED,
+    Talk,
+)
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -118,10 +125,20 @@ class _PollList:
 
 @dataclass(slots=True)
 class _Outstanding:
-    """A delivered command; ``deadline`` (clock value in s) is when its reply is overdue."""
+    """
+    A delivered command; ``deadline`` (clock value in s) is when its reply is overdue.
+
+    ``passed_over`` counts other messages that came in its place.
+    """
 
     task: Task
     deadline: float
+    passed_over: int = 0
+
+    def is_over(self, now: float, is_message: bool) -> bool:
+        """Tell whether to give up after an answer; behind a message the reply may be next."""
+        self.passed_over += is_message
+        return now >= self.deadline and not (is_message and self.passed_over <= MOST_QUEUED)
 
 
 class StandardPollingMaster:
@@ -145,6 +162,7 @@ class StandardPollingMaster:
         self._outstanding: dict[int, _Outstanding] = {}
         self._listed = frozenset((*polling.priority, *polling.normal))
         self._line.polled = self._listed
+        stations.add(self._listed - {settings.station})
         # Stations that were passed a command and not polled since. There is no second one for
         # them, or several senders would soon fill a sink that a poll empties by one message.
         self._given: set[int] = set()
@@ -263,7 +281,7 @@ class StandardPollingMaster:
             return
         if packet is not None:
             self._line.take_unwanted(number, packet)
-        if entry is not None and self._machine.now >= entry.deadline:
+        if entry is not None and entry.is_over(self._machine.now, isinstance(answer, Frame)):
             self._line.counters.command_timeouts += 1
             self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
             self._end(number, CommandTimeout())

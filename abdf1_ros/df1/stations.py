@@ -60,25 +60,35 @@ class ActiveStationList:
     """
     All stations the master talks to.
 
-    Every station counts as active at start (S0). ``on_change`` is called with a station
-    whenever it becomes active or inactive.
+    Every station counts as active at start (S0). ``on_change`` is called with a station of the
+    list whenever it becomes active or inactive. A station outside of it, to which a slave wants
+    something passed on, has a record like any other, but is not in the list: no message can
+    put a station there.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
                  on_change: Callable[[Station], None] = lambda station: None) -> None:
-        self._stations = {number: Station(number) for number in sorted(set(numbers))}
+        self._stations: dict[int, Station] = {}
+        self._strangers: dict[int, Station] = {}
         self._on_change = on_change
+        self.add(numbers)
+
+    def add(self, numbers: Iterable[int]) -> None:
+        """Take stations into the list."""
+        for number in numbers:
+            self._stations[number] = self[number]
+            self._strangers.pop(number, None)
+        self._stations = dict(sorted(self._stations.items()))
 
     def __iter__(self) -> Iterator[Station]:
         """Iterate over the stations by number."""
         return iter(self._stations.values())
 
     def __getitem__(self, number: int) -> Station:
-        """Return a station, taking it into the list at the first use."""
-        if number not in self._stations:
-            self._stations[number] = Station(number)
-            self._stations = dict(sorted(self._stations.items()))
-        return self._stations[number]
+        """Return the record of a station (0-254), of the list or not."""
+        if number in self._stations:
+            return self._stations[number]
+        return self._strangers.setdefault(number, Station(number))
 
     def heard(self, number: int, now: float) -> None:
         """Note an answer of any kind: the station is active."""
@@ -86,13 +96,17 @@ class ActiveStationList:
         station.last_heard = now
         if not station.active:
             station.active, station.silent_since = True, None
-            self._on_change(station)
+            self._tell(station)
 
     def lost(self, number: int, now: float) -> None:
         """Take a station out of the active ones."""
         station = self[number]
         if station.active:
             station.active, station.silent_since = False, now
+            self._tell(station)
+
+    def _tell(self, station: Station) -> None:
+        if station.number in self._stations:
             self._on_change(station)
 
     def words(self) -> list[int]:

@@ -37,6 +37,9 @@ _DELIMITERS = ',;\t'
 # A last line that no file has, as comments are taken out; only an open quote swallows it.
 _END = '#'
 
+# Far more than a file with a row for every word of a PLC has.
+_LARGEST = 10_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -82,10 +85,14 @@ def whole_number(text: str) -> int | None:
 
 def _read_lines(path: str) -> list[str]:
     try:
-        raw = Path(path).read_bytes().removeprefix(codecs.BOM_UTF8)
+        with Path(path).open('rb') as file:
+            raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
     except OSError as error:
         raise ConfigurationError(
             [Problem(path, f'cannot be read: {error.strerror or error}')]) from None
+    if len(raw) > _LARGEST:
+        raise ConfigurationError([Problem(
+            path, f'larger than {_LARGEST // 1_000_000} MB; is it a CSV file?')])
     try:
         text = raw.decode()
     except UnicodeDecodeError as error:

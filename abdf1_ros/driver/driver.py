@@ -23,38 +23,35 @@ port and a clock; the tests give it a virtual line.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Generator, Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
+from abdf1_ros.driver.forecast import intervals, line_model, longest_wait, scan_time
+from abdf1_ros.driver.health import Health
+from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
-from abdf1_ros.driver.scheduler import ReadJob, Scheduler
+from abdf1_ros.driver.read_backs import ReadBacks
+from abdf1_ros.driver.read_queue import ReadJob
+from abdf1_ros.driver.refusals import Change, Refusals
+from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler
 from abdf1_ros.driver.served import Served
+from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.dialects import DIALECTS
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.status import check_status, is_address_fault, is_local
-
-# What a station takes to answer, for the estimate of the scan time (M 14-2 counts two answers
-# for each transaction; PLCs serve the port once per program scan).
-_USUAL_RESPONSE = 0.01
-
-
-Request = tuple[int, bytes]
-"""CMD, and what stands behind TNS."""
-
-Steps = Generator[Request, Packet, None]
+from abdf1_ros.pccc.link_counters import served_counters
+from abdf1_ros.pccc.status import is_address_fault
 
 
 class Listener(Protocol):
@@ -92,28 +89,32 @@ class Driver:
             timing=network.timing, counters=self.counters,
             forget_on_send=network.mode == 'Master')
         self.is_online = False
-        self.transactions = 0
         self._to_serve: deque[Write] = deque()
-        self._tasks: set[_JobTask] = set()
-        self._under_way: deque[_JobTask] = deque()
+        self._tasks = JobTasks(network.station, settings.first_tns)
         self._settings = settings
         self._listener = listener
-        self._served = Served(PlcType(network.plc_type), mappings, self._serve_written)
+        self._served = self._make_served()
         self.link = make_link(network, settings, self.machine, self.stations,
                               self._served.serve, listener.happened)
-        self._tns = settings.first_tns
-        self._last_tns: dict[int, int] = {}
-        self._planner = Planner(
-            network.checksum, network.duplex, network.timing.char_time,
-            settings.default_period)
-        blocks = self._planner.plan(mappings)
-        self.expected_scan_time = sum(
-            block.line_time + 2 * _USUAL_RESPONSE * len(block.requests) for block in blocks)
-        self.points = {mapping: self._point(mapping) for mapping in mappings if mapping.reads}
+        planner = Planner(line_model(network), settings.default_period)
+        self._refusals = Refusals(planner)
+        blocks = planner.plan(mappings)
+        self.expected_scan_time = scan_time(blocks)
+        self.points = self._make_points(blocks)
         self._scheduler = Scheduler(
             self.stations, probe_time=network.timeout / 1000,
             write_timeout=settings.write_timeout, report=listener.written)
         self._scheduler.add_reads(map(self._job, blocks), 0.0)
+        self._read_backs = ReadBacks(settings.write_timeout, listener.written)
+        self.health = Health(
+            self.stations, {block.station for block in blocks}, settings.processor_period,
+            self._scheduler, lambda station, error: self._link_failed(station, (), error),
+            lambda: self.machine.now)
+
+    @property
+    def transactions(self) -> int:
+        """Return how many commands have had a reply."""
+        return self._tasks.transactions
 
     @property
     def scan_time(self) -> float | None:
@@ -141,7 +142,7 @@ class Driver:
                 raise FormatError('this node is read_only')
             if not self.is_online:
                 raise FormatError('the port is not open')
-            if self._scheduler.is_full:
+            if self._scheduler.is_full or len(self._to_serve) >= MAX_WAITING_WRITES:
                 raise FormatError('too many writes are waiting')
             write = Write(mapping, values, now)
             if mapping.serves:
@@ -151,22 +152,48 @@ class Driver:
         except FormatError as error:
             self.refuse(mapping, str(error), values)
 
+    def request_counters(self, station: int) -> None:
+        """
+        Ask for the link counters of a station; may be called from any thread, then wake the link.
+
+        They come to ``health``; without a port nobody is asked.
+        """
+        if self.is_online:
+            self.health.request_counters(station)
+
     def refuse(self, mapping: Mapping, reason: str, values: Sequence[float] | str) -> None:
         """Report that a request to write was not taken."""
         self._listener.written(
             WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
 
-    def _point(self, mapping: Mapping) -> ReadPoint:
-        if mapping.serves:
-            # Without a Period nobody expects the other end to write.
-            expected = mapping.period / 1000 if mapping.period else math.inf
-            point = ReadPoint(mapping, expected, self._settings.stale_after * expected)
-            point.last_good = None if mapping.period else 0.0
-            return point
+    def _make_points(self, blocks: Sequence[Block]) -> dict[Mapping, ReadPoint]:
+        """Return the points of all mappings that read, in their order."""
+        expected = intervals(blocks)
+        found = {mapping: expected[block.period] for block in blocks for mapping in block.mappings}
+        wait = longest_wait(blocks)
+        return {mapping: self._served_point(mapping) if mapping.serves
+                else self._polled_point(mapping, found[mapping], wait)
+                for mapping in self.mappings if mapping.reads}
+
+    def _polled_point(self, mapping: Mapping, interval: float, wait: float) -> ReadPoint:
+        """Return a point; its block comes every ``interval`` s, up to ``wait`` s later."""
         period = self._settings.default_period if mapping.period is None \
             else mapping.period / 1000
-        stale_time = self._settings.stale_after * max(period, self.expected_scan_time)
-        return ReadPoint(mapping, period, stale_time)
+        return ReadPoint(
+            mapping, period, self._settings.stale_after * max(period, interval) + wait)
+
+    def _served_point(self, mapping: Mapping) -> ReadPoint:
+        # Without a Period nobody expects the other end to write.
+        expected = mapping.period / 1000 if mapping.period else math.inf
+        point = ReadPoint(mapping, expected, self._settings.stale_after * expected)
+        point.last_good = None if mapping.period else 0.0
+        return point
+
+    def _make_served(self) -> Served:
+        plc_type, mode = PlcType(self.network.plc_type), self.network.mode
+        counters = served_counters(self.counters, plc_type, is_full_duplex=mode == 'Peer',
+                                   is_master=mode == 'Master')
+        return Served(plc_type, self.mappings, self._serve_written, counters, mode == 'Peer')
 
     def _job(self, block: Block) -> ReadJob:
         return ReadJob(block, [self.points[mapping] for mapping in block.mappings])
@@ -174,34 +201,42 @@ class Driver:
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command: of a write, of a job that is under way, or of a new one."""
         self.expire(now)
-        under_way = next((task for task in self._under_way if task.station not in busy), None)
+        under_way = self._tasks.waiting(busy)
         write = self._scheduler.next_write(now, under_way is not None, busy)
         if write is not None:
-            return self._start(write.mapping.station, self._write_steps(write))
+            return self._tasks.start(write.mapping.station, self._write_steps(write))
         if under_way is not None:
-            self._under_way.remove(under_way)
-            return under_way
+            return self._tasks.take(under_way)
+        check = self.health.next_check(now, busy)
+        if check is not None:
+            return self._tasks.start(check.station, self.health.steps(check))
         job = self._scheduler.next_read(now, busy)
-        return None if job is None else self._start(job.station, self._read_steps(job, now))
+        return None if job is None else self._tasks.start(job.station, self._read_steps(job, now))
 
     def next_due(self) -> float | None:
-        """Return when the next read is due (clock value in s), None for never."""
-        return self._scheduler.next_due()
+        """Return when there is something to do next (clock value in s), None for never."""
+        moments = (self._scheduler.next_due(), self.health.next_due(),
+                   self._read_backs.next_due())
+        return min((moment for moment in moments if moment is not None), default=None)
 
     def expire(self, now: float) -> None:
         """Do what needs no line: store what we serve, end what has waited too long for it."""
         while self._to_serve:
             self._store(self._to_serve.popleft())
         self._scheduler.expire(now)
+        self._read_backs.expire(now)
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
             self._scheduler.release(station.number, self.machine.now)
+            self.health.came_back(station.number, self.machine.now)
+        else:
+            self.health.went_away(station.number)
         self._listener.station_changed(station)
 
     def _store(self, write: Write) -> None:
         """Put values where the other end reads them."""
-        self._served.store(write.mapping, write.values)
+        self._served.store(write.mapping, write.raw)
         self._listener.written(write.result(Outcome.WRITTEN, '', self.machine.now))
 
     def _serve_written(self, mapping: Mapping, words: bytes) -> None:
@@ -211,6 +246,7 @@ class Driver:
     def _run(self) -> Procedure:
         """Work as long as there is a port."""
         self._scheduler.drop_writes('requested while the port was not open', self.machine.now)
+        self.health.begin(self.machine.now)
         self.is_online = True
         reason = 'internal error, see the log'
         try:
@@ -224,59 +260,48 @@ class Driver:
     def _went_down(self, error: PortLost) -> None:
         """Leave nothing without a result, and no old command to be sent later."""
         self.is_online = False
-        for task in list(self._tasks):
-            task.fail(error)
-        self._under_way.clear()
+        self._tasks.fail(error)
+        self.health.end(str(error))
+        for job in self._scheduler.jobs:
+            job.interrupted()
         for mapping, point in self.points.items():
             if mapping.polls:
                 point.fail(str(error))
         self._scheduler.drop_writes(str(error), self.machine.now)
+        self._read_backs.end(self.machine.now)
         while self._to_serve:
             write = self._to_serve.popleft()
             self._listener.written(
                 write.result(Outcome.NOT_SENT, str(error), self.machine.now))
 
-    def _start(self, station: int, steps: Steps) -> Task:
-        task = _JobTask(self, station, steps)
-        self._tasks.add(task)
-        return task
-
-    def new_command(self, station: int, request: Request) -> Packet:
-        """Return the command for a request, with a transaction number of its own."""
-        cmd, data = request
-        return Packet(station, self.network.station, cmd, 0, self._next_tns(station), data)
-
-    def advanced(self, task: _JobTask, is_done: bool) -> None:
-        """Take note that a task has its next command ready, or is done."""
-        if is_done:
-            self._tasks.discard(task)
-        else:
-            self._under_way.append(task)
-
-    def _read_steps(self, job: ReadJob, started: float) -> Steps:
-        data = b''
-        dialect = job.block.dialect
+    def _read_steps(self, job: ReadJob, now: float) -> Steps:
+        """Read one packet of a job."""
         try:
-            for request in job.block.requests:
-                command = dialect.cmd, dialect.read(request.start, request.words)
-                reply = check_status((yield command))
-                data += dialect.read_data(request.start, request.words, reply)
+            data = yield from job.read_on(now)
         except RemoteError as error:
             self.stations[job.station].remote_errors += 1
             self._read_failed(job, str(error), is_address_fault(error))
         except FormatError as error:
-            self._read_failed(job, f'unusable reply: {error}', divisible=False)
+            self._read_failed(job, f'unusable reply: {error}', is_refusal=False)
         except LinkError as error:
             self._link_failed(job.station, job.points, error)
         else:
-            job.done(self.machine.now)
-            self._distribute(job, data)
+            if data is not None:
+                self._read_done(job, data)
         finally:
-            self._scheduler.finished(job, started, self.machine.now)
+            self._scheduler.finished(job, self.machine.now)
 
-    def _distribute(self, job: ReadJob, data: bytes) -> None:
-        for point in job.points:
-            self._update(point, job.block.words_of(point.mapping, data))
+    def _read_done(self, job: ReadJob, data: bytes) -> None:
+        """Hand on what was read to the points that want it."""
+        now = self.machine.now
+        self._read_backs.read(job.block, data, job.started, now)
+        has_recovered = any(point.error is not None for point in job.points)
+        for point, place in zip(job.points, job.slices, strict=True):
+            if job.is_hastened or point.is_due(now, job.block.period):
+                self._update(point, data[place])
+        job.done(now)
+        if has_recovered:
+            self._change(self._refusals.recovered(job.block, self.blocks))
 
     def _update(self, point: ReadPoint, words: bytes) -> None:
         try:
@@ -291,18 +316,24 @@ class Driver:
         if point.fail(reason):
             self._listener.unreadable(point.mapping, reason)
 
-    def _read_failed(self, job: ReadJob, reason: str, divisible: bool) -> None:
-        """Fail the points; a block with a bad address is divided until that one is alone."""
+    def _read_failed(self, job: ReadJob, reason: str, is_refusal: bool) -> None:
+        """Fail the points; what is read after a refusal is another block's matter."""
         job.interrupted()
-        is_divided = divisible and len(job.points) > 1
+        is_news = is_refusal and job in self._scheduler.jobs
+        change = self._refusals.refused(job.block) if is_news else None
+        is_divided = change is not None and list(change.old) == [job.block]
         for point in job.points:
             if is_divided:
                 point.fail(f'{reason} (or another address read with it has this fault)')
             else:
                 self._unreadable(point, reason)
-        if is_divided:
-            parts = map(self._job, self._planner.split(job.block))
-            self._scheduler.replace(job, parts, self.machine.now)
+        self._change(change)
+
+    def _change(self, change: Change | None) -> None:
+        """Read other blocks from now on."""
+        if change is not None:
+            old = [job for job in self._scheduler.jobs if job.block in change.old]
+            self._scheduler.replace(old, map(self._job, change.new), self.machine.now)
 
     def _link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
         """Fail what the end of a transaction without a reply concerns."""
@@ -317,77 +348,20 @@ class Driver:
 
     def _write_steps(self, write: Write) -> Steps:
         station = write.mapping.station
-        cmd = DIALECTS[write.mapping.plc_type].cmd
-        done = 0
+        self._read_backs.overtaken(write, self.machine.now)
         try:
-            for data in write.commands:
-                check_status((yield cmd, data))
-                done += 1
-        except RemoteError as error:
+            ending = yield from carry_out(write)
+        finally:
+            self._scheduler.write_ended(write)
+        if isinstance(ending.error, RemoteError):
             self.stations[station].remote_errors += 1
-            outcome = Outcome.UNKNOWN if is_local(error) else Outcome.FAILED
-            self._finish_write(write, outcome, str(error), done)
-        except LinkError as error:
-            outcome = Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
-            self._finish_write(write, outcome, str(error), done)
-            self._link_failed(station, (), error)
+        if ending.is_unsure:
+            self._read_backs.add(write, ending, self.blocks, self.machine.now)
+        else:
+            self._listener.written(write.result(ending.outcome, ending.detail, self.machine.now))
+        if isinstance(ending.error, LinkError):
+            self._link_failed(station, (), ending.error)
             if station != BROADCAST and not self.stations[station].active:
                 self._scheduler.unanswered(self.machine.now)
-        else:
-            is_broadcast = station == BROADCAST
-            outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
-            self._finish_write(write, outcome, '', done)
-        if done:
+        if ending.done or ending.is_unsure:
             self._scheduler.hasten(write, self.machine.now)
-
-    def _finish_write(self, write: Write, outcome: Outcome, detail: str, done: int) -> None:
-        if 0 < done < len(write.commands):
-            outcome = Outcome.PARTLY
-            detail += f' (after {done} of {len(write.commands)} packets were written)'
-        self._listener.written(write.result(outcome, detail, self.machine.now))
-
-    def _next_tns(self, station: int) -> int:
-        """Return the next transaction number, never the one this station had last."""
-        self._tns = self._tns + 1 & 0xFFFF
-        if self._tns == self._last_tns.get(station):
-            self._tns = self._tns + 1 & 0xFFFF
-        self._last_tns[station] = self._tns
-        return self._tns
-
-
-class _JobTask:
-    """
-    A job as the link sees it: one command after the other.
-
-    ``steps`` yields requests and is sent the replies; an error is raised in it.
-    """
-
-    def __init__(self, driver: Driver, station: int, steps: Steps) -> None:
-        self.sent = False
-        self._driver = driver
-        self.station = station
-        self._steps = steps
-        self.command = driver.new_command(station, next(steps))
-
-    def reply(self, packet: Packet) -> None:
-        """Take the reply and go on to the next request."""
-        self._driver.transactions += 1
-        self._advance(lambda: self._steps.send(packet))
-
-    def fail(self, error: LinkError) -> None:
-        """Raise ``error`` in the job."""
-        error.sent = self.sent
-        self._advance(lambda: self._steps.throw(error))
-
-    def _advance(self, resume: Callable[[], Request]) -> None:
-        try:
-            request = resume()
-        except StopIteration:
-            self._driver.advanced(self, is_done=True)
-            return
-        except Exception:  # a bug has ended the job
-            self._driver.advanced(self, is_done=True)
-            raise
-        self.sent = False
-        self.command = self._driver.new_command(self.station, request)
-        self._driver.advanced(self, is_done=False)

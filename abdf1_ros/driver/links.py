@@ -39,11 +39,12 @@ class DriverSettings:
     """
     What is not in the net CSV; times in seconds.
 
-    ``stale_after`` counts periods. ``max_outstanding`` commands may wait for their reply at a
-    time in full duplex. ``polling`` is for standard polling, None for one list of all mapped
-    stations. ``first_tns`` is the transaction number to begin with, which should be random, or
-    a restarted driver repeats itself and is taken for a duplicate. All else is explained with
-    the settings of masters and slaves in ``df1``.
+    ``stale_after`` counts periods. ``processor_period`` passes between two questions for the
+    diagnostic status of a station, 0 for never. ``max_outstanding`` commands may wait for their
+    reply at a time in full duplex. ``polling`` is for standard polling, None for one list of all
+    mapped stations. ``first_tns`` is the transaction number to begin with, which should be
+    random, or a restarted driver repeats itself and is taken for a duplicate. All else is
+    explained with the settings of masters and slaves in ``df1``.
     """
 
     default_period: float = 0.1
@@ -57,6 +58,7 @@ class DriverSettings:
     eot_suppression: bool = False
     duplicate_detection: bool = True
     poll_timeout: float = 60.0
+    processor_period: float = 0.0
     first_tns: int = 0
 
 

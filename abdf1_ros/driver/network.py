@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields
 from typing import Any
+from urllib.parse import urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
@@ -32,6 +33,7 @@ SUPPORTED_MODES = MODES
 POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+_DEVICE_SERVERS = ('socket', 'rfc2217')
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,8 +214,17 @@ def _check_mode(name: str, value: int | str, where: str) -> None:
 
 def _check_port(name: str, value: int | str, where: str) -> None:
     text = str(value)
-    named = text.startswith('/') or '://' in text
-    if name == 'com_port' and not named and not (
-            text.isdigit() and (whole_number(text) or 0) >= 1):
+    if name == 'com_port' and not (_is_url(text) or text.startswith('/') or (
+            text.isdigit() and (whole_number(text) or 0) >= 1)):
         raise Problem(where, f'Com_Port = "{text}" should be a number from 1, a device path '
                              'such as /dev/ttyUSB0, or a URL such as socket://host:port')
+
+
+def _is_url(text: str) -> bool:
+    """Tell whether ``text`` is a URL, one of a device server with its host and port."""
+    try:
+        url = urlsplit(text)
+        return '://' in text and (
+            url.scheme not in _DEVICE_SERVERS or bool(url.hostname and url.port))
+    except ValueError:  # a port above 65535
+        return False

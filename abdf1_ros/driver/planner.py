@@ -13,36 +13,31 @@
 # limitations under the License.
 
 """
-The read planner: cover all mapped words with the fewest characters on the line.
+The read planner: cover all mapped words for the least of the line's time.
 
-A read costs a fixed number of characters (frames, ACKs, poll, headers) and two for each word,
-so it pays to read across a gap that is cheaper than another transaction. Per area (a file, or
-one I/O slot) the cheapest split of the mappings into blocks is found by dynamic programming.
-A mapping that fits in one packet always lies in one, so its values belong together; a longer
-one is a block of its own, read packet by packet.
+Mappings of one station and one area (a file, or one I/O slot) are read together where that is
+cheaper than apart; which blocks are cheapest is worked out in ``partition``, what they cost in
+``line_model``. A mapping that fits in one packet always lies in one, so its values belong
+together; a longer one is a block of its own, read packet by packet.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+import math
 
-from abdf1_ros.df1 import frames
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.packet import HEADER_SIZE
+from abdf1_ros.driver.line_model import LineModel, Request
 from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import Dialect, DIALECTS
+from abdf1_ros.driver.partition import Draft, draft, Span, Terms
+from abdf1_ros.pccc.address import Address, Area
+from abdf1_ros.pccc.dialect import Dialect, Transfer
+from abdf1_ros.pccc.file_types import FileType
 
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """One read command: ``words`` words from ``start`` on."""
-
-    start: Address
-    words: int
+Place = tuple[int, Area, Dialect]
+"""Station, area and way to read: what blocks never reach beyond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +45,9 @@ class Block:
     """
     What is read together: one request, or several for one mapping longer than a packet.
 
-    ``mappings`` are served by it. ``period`` is in seconds; ``line_time`` is what its
-    transactions take on the line when the station answers at once, in seconds.
+    ``mappings`` are served by it. ``period`` is in seconds, the shortest of theirs;
+    ``line_time`` is what its transactions take on the line when the station answers at once,
+    in seconds.
     """
 
     station: int
@@ -63,156 +59,201 @@ class Block:
     @property
     def dialect(self) -> Dialect:
         """Return the family's way to read."""
-        return DIALECTS[self.mappings[0].plc_type]
+        return self.mappings[0].dialect
+
+    @property
+    def place(self) -> Place:
+        """Return what the block never reaches beyond."""
+        return _place(self.mappings[0])
 
     @property
     def start(self) -> Address:
         """Return the first word of the block."""
         return self.requests[0].start
 
-    def words_of(self, mapping: Mapping, data: bytes) -> bytes:
-        """Return the words of ``mapping`` in the block's ``data``."""
+    @property
+    def words(self) -> int:
+        """Return the number of words of all requests."""
+        return sum(request.words for request in self.requests)
+
+    @property
+    def span(self) -> Span:
+        """Return the words of the block."""
+        return Span(self.start.offset, self.start.offset + self.words)
+
+    @property
+    def transfer(self) -> Transfer:
+        """Return all that the requests move together."""
+        return Transfer(self.start, self.words)
+
+    def slice_of(self, mapping: Mapping) -> slice:
+        """Return where in the block's data the words of ``mapping`` are."""
         at = 2 * (mapping.address.offset - self.start.offset)
-        return data[at:at + 2 * mapping.codec.words]
+        return slice(at, at + 2 * mapping.codec.words)
+
+    def commands(self) -> list[tuple[int, bytes]]:
+        """Return CMD, and what stands behind TNS, of each request."""
+        return [self.dialect.read(request.start, request.words, self.transfer)
+                for request in self.requests]
 
 
 @dataclass(frozen=True, slots=True)
-class _Span:
-    """Words ``first`` up to, not including, ``end`` of an area."""
+class _Wish:
+    """A mapping, and which words it needs how often (s)."""
 
-    first: int
-    end: int
-
-    @property
-    def words(self) -> int:
-        return self.end - self.first
-
-    def holds(self, other: _Span) -> bool:
-        return self.first <= other.first and other.end <= self.end
-
-    def aligned(self, per_element: int) -> _Span:
-        """Return whole elements, which is what reads of more than one word take."""
-        if self.words <= 1:
-            return self
-        return _Span(self.first - self.first % per_element, self.end + -self.end % per_element)
+    mapping: Mapping
+    span: Span
+    period: float
 
 
 class Planner:
-    """Plan reads for a line with this check and this time per character (s)."""
+    """
+    Plan reads for a line; mappings without a period get ``default_period`` (s).
 
-    def __init__(self, checksum: Checksum, duplex: Duplex, char_time: float,
-                 default_period: float) -> None:
-        self._checksum = checksum
-        self._duplex = duplex
-        self._char_time = char_time
+    ``refuse`` and ``allow`` say what stations have been found to have; plans go around the rest.
+    """
+
+    def __init__(self, line: LineModel, default_period: float) -> None:
+        self.line = line
         self._default_period = default_period
+        self._refused: defaultdict[Place, set[Span]] = defaultdict(set)
+        self._costs: dict[tuple[Dialect, FileType], list[float]] = {}
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
         """Return the blocks that serve every mapping that reads."""
-        groups = defaultdict(list)
+        places: defaultdict[Place, list[_Wish]] = defaultdict(list)
         for mapping in mappings:
             if mapping.polls:
-                key = mapping.station, mapping.address.area, self._period(mapping)
-                groups[key].append(mapping)
-        return [block for group in groups.values() for block in self._plan_area(group)]
+                places[_place(mapping)].append(
+                    _Wish(mapping, _span(mapping), self._period(mapping)))
+        plans = [self._plan_place(place, group, math.inf) for place, group in places.items()]
+        # No block is read more often than all of them can be, so what the faster ones save
+        # by staying short counts for less on a line that is full.
+        scan_time = sum(block.line_time for plan in plans for block in plan)
+        return [block for place, group in places.items()
+                for block in self._plan_place(place, group, scan_time)]
 
     def split(self, block: Block) -> list[Block]:
-        """Return blocks for the same mappings, none with more than half of them."""
-        ordered = sorted(block.mappings, key=lambda mapping: mapping.address.offset)
-        middle = len(ordered) // 2
-        return [self._block(half, _cover(half))
-                for half in (ordered[:middle], ordered[middle:])]
+        """Return two blocks, each with half of the mappings; none if all are the same words."""
+        spans = sorted(set(map(_span, block.mappings)))
+        if len(spans) == 1:
+            return []
+        middle = spans[len(spans) // 2]
+        halves: tuple[list[Mapping], list[Mapping]] = [], []
+        for mapping in block.mappings:
+            halves[_span(mapping) >= middle].append(mapping)
+        return [self._block(half, _cover(half)) for half in halves]
 
-    def line_time(self, dialect: Dialect, request: Request) -> float:
-        """Return the seconds that a read takes on the line, answered at the first poll."""
-        command = bytes(HEADER_SIZE) + dialect.read(request.start, request.words)
-        reply = bytes(HEADER_SIZE + dialect.reply_size(request.start, request.words))
-        characters = len(frames.message_frame(reply, self._checksum)) + 2 * len(frames.ACK)
-        if self._duplex is Duplex.HALF:
-            characters += len(frames.master_frame(0, command, self._checksum))
-            characters += len(frames.poll_frame(0))
-        else:
-            characters += len(frames.message_frame(command, self._checksum))
-        return characters * self._char_time
+    def refuse(self, place: Place, span: Span) -> None:
+        """Take note that no read at ``place`` may hold all of ``span``."""
+        self._refused[place].add(span)
+
+    def allow(self, place: Place, span: Span) -> bool:
+        """Take note that all of ``span`` can be read; return whether that is news."""
+        wrong = {other for other in self._refused[place] if span.holds(other)}
+        self._refused[place] -= wrong
+        return bool(wrong)
 
     def _period(self, mapping: Mapping) -> float:
         if mapping.period is None:
             return self._default_period
         return mapping.period / 1000
 
-    def _plan_area(self, mappings: list[Mapping]) -> list[Block]:
-        """Plan the mappings of one station, area and period."""
-        limit = _max_words(mappings[0])
-        long = [mapping for mapping in mappings if mapping.codec.words > limit]
-        short = [mapping for mapping in mappings if mapping.codec.words <= limit]
-        blocks = [self._block([mapping], _cover([mapping])) for mapping in long]
-        spans = self._cheapest([_cover([mapping]) for mapping in short], mappings[0], limit)
-        for span in spans:
-            served = [mapping for mapping in short if span.holds(_cover([mapping]))]
-            short = [mapping for mapping in short if mapping not in served]
-            blocks.append(self._block(served, span))
-        return blocks
+    def _plan_place(self, place: Place, wishes: Sequence[_Wish],
+                    scan_time: float) -> list[Block]:
+        """Plan the mappings of one place."""
+        refused = self._refused[place]
+        terms = self._terms(wishes[0].mapping, refused)
+        alone: defaultdict[Span, list[Mapping]] = defaultdict(list)
+        together = []
+        for wish in wishes:
+            if wish.span.words > terms.limit or any(map(wish.span.holds, refused)):
+                alone[wish.span].append(wish.mapping)
+            else:
+                together.append(wish)
+        needed: defaultdict[float, list[Span]] = defaultdict(list)
+        for wish in together:
+            needed[wish.period].append(wish.span)
+        served = alone | _served(together, draft(needed, terms, scan_time))
+        return [self._block(group, span) for span, group in served.items()]
 
-    def _cheapest(self, needed: list[_Span], example: Mapping, limit: int) -> list[_Span]:
-        """Return the spans of at most ``limit`` words that hold all ``needed`` at least cost."""
-        spans = _without_contained(needed)
-        fixed, per_word = self._costs(example)
-        per_element = example.address.file_type.layout.words
-        best = [0.0]
-        choice: list[tuple[int, _Span]] = []
-        for last in range(len(spans)):
-            options = []
-            for first in range(last, -1, -1):
-                span = _Span(spans[first].first, spans[last].end).aligned(per_element)
-                if span.words > limit:
-                    break
-                options.append((best[first] + fixed + per_word * span.words, first, span))
-            cost, first, span = min(options, key=lambda option: option[:2])
-            best.append(cost)
-            choice.append((first, span))
-        chosen: list[_Span] = []
-        rest = len(spans)
-        while rest:
-            rest, span = choice[rest - 1]
-            chosen.insert(0, span)
-        return chosen
+    def _terms(self, example: Mapping, refused: Iterable[Span]) -> Terms:
+        """Return what blocks cost at the place of ``example``."""
+        key = example.dialect, example.address.file_type
+        if key not in self._costs:
+            self._costs[key] = self._costs_of(example)
+        return Terms(self._costs[key], _per_element(example), refused)
 
-    def _costs(self, mapping: Mapping) -> tuple[float, float]:
-        """Return what a read of this area costs, and what each word adds."""
-        dialect = DIALECTS[mapping.plc_type]
-        start = mapping.address.at_offset(0)
-        step = mapping.address.file_type.layout.words
-        many = _max_words(mapping)
-        one = self.line_time(dialect, Request(start, step))
-        per_word = (self.line_time(dialect, Request(start, many)) - one) / max(many - step, 1)
-        return one - step * per_word, per_word
+    def _costs_of(self, example: Mapping) -> list[float]:
+        """Return the seconds that a read takes, by its number of words."""
+        start, per_element = example.address.at_offset(0), _per_element(example)
+        costs = [0.0] * (_max_words(example) + 1)
+        for words in {1, *range(per_element, len(costs), per_element)}:
+            costs[words] = self.line.read_time(example.dialect, Request(start, words))
+        value = next((place for place in map(start.at_offset, range(per_element))
+                      if place.is_value(2)), None)
+        if value is not None:  # a float32 within a structure is read by itself
+            costs[2] = self.line.read_time(example.dialect, Request(value, 2))
+        return costs
 
-    def _block(self, mappings: Sequence[Mapping], span: _Span) -> Block:
+    def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
         first = mappings[0]
         limit = _max_words(first)
+        if span.words > limit:  # a long mapping: no packet ends within a value
+            limit -= limit % max(mapping.codec.element_words for mapping in mappings)
         requests = tuple(
             Request(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))
-        dialect = DIALECTS[first.plc_type]
-        line_time = sum(self.line_time(dialect, request) for request in requests)
-        return Block(first.station, requests, tuple(mappings), self._period(first), line_time)
+        line_time = sum(self.line.read_time(first.dialect, request, first.station)
+                        for request in requests)
+        period = min(map(self._period, mappings))
+        return Block(first.station, requests, tuple(mappings), period, line_time)
+
+
+def _place(mapping: Mapping) -> Place:
+    return mapping.station, mapping.address.area, mapping.dialect
 
 
 def _max_words(mapping: Mapping) -> int:
-    return DIALECTS[mapping.plc_type].max_read(mapping.address.file_type)
+    return mapping.dialect.max_read(mapping.address.file_type)
 
 
-def _cover(mappings: Sequence[Mapping]) -> _Span:
-    """Return the words to read for ``mappings``."""
-    first = min(mapping.address.offset for mapping in mappings)
-    end = max(mapping.address.offset + mapping.codec.words for mapping in mappings)
-    return _Span(first, end).aligned(mappings[0].address.file_type.layout.words)
+def _per_element(mapping: Mapping) -> int:
+    return mapping.address.layout.words
 
 
-def _without_contained(spans: list[_Span]) -> list[_Span]:
-    """Return the spans that no other holds, by first word."""
-    kept: list[_Span] = []
-    for span in sorted(set(spans), key=lambda span: (span.first, -span.end)):
-        if not kept or span.end > kept[-1].end:
-            kept.append(span)
-    return kept
+def _span(mapping: Mapping) -> Span:
+    """Return the words to read for one mapping."""
+    first, words = mapping.address.offset, mapping.codec.words
+    span = Span(first, first + words)
+    return span if mapping.address.is_value(words) else span.aligned(_per_element(mapping))
+
+
+def _cover(mappings: Iterable[Mapping]) -> Span:
+    """Return the words to read for ``mappings``, which lie in one block."""
+    mappings = list(mappings)
+    spans = list(map(_span, mappings))
+    if len(set(spans)) == 1:
+        return spans[0]
+    cover = Span(min(span.first for span in spans), max(span.end for span in spans))
+    return cover.aligned(_per_element(mappings[0]))
+
+
+def _served(wishes: Iterable[_Wish], drafts: Iterable[Draft]) -> dict[Span, list[Mapping]]:
+    """Return which mappings each block serves; of several blocks the slowest will do."""
+    levels: dict[float, list[Span]] = defaultdict(list)
+    for entry in sorted(drafts, key=lambda entry: (-entry.period, entry.span)):
+        levels[entry.period].append(entry.span)
+    served: dict[Span, list[Mapping]] = {}
+    for wish in wishes:
+        span = next(found for period, spans in levels.items() if period <= wish.period
+                    and (found := _holder(spans, wish.span)) is not None)
+        served.setdefault(span, []).append(wish.mapping)
+    return served
+
+
+def _holder(spans: Sequence[Span], wanted: Span) -> Span | None:
+    """Return the one of ``spans`` (sorted, none within another) that holds ``wanted``."""
+    # The last that begins early enough also ends last of these.
+    index = bisect_right(spans, wanted.first, key=lambda span: span.first)
+    return spans[index - 1] if index and spans[index - 1].holds(wanted) else None

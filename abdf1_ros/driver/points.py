@@ -24,9 +24,11 @@ from enum import Enum
 from abdf1_ros.driver.mapping import Mapping, Publish
 from abdf1_ros.driver.values import Values, ValueType
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Request, Transfer
 
 _SHOWN_VALUES = 16
+_SHOWN_CHARACTERS = 100  # more than a PLC string has
 
 
 class Freshness(Enum):
@@ -44,8 +46,9 @@ class ReadPoint:
     What is known of one mapping that reads.
 
     ``period`` and ``stale_time`` are in seconds: a value is late when it is older than one and
-    a half periods and than half of ``stale_time``, stale when older than all of it. ``error``
-    says why the last read gave no value.
+    a half periods and than half of ``stale_time``, stale when older than all of it. ``interval``
+    is the seconds between its last two good reads, if nothing was between them. ``error`` says
+    why the last read gave no value.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
@@ -53,9 +56,11 @@ class ReadPoint:
         self.period = period
         self.stale_time = stale_time
         self.last_good: float | None = None
+        self.interval: float | None = None
         self.error: str | None = None
         self.failures = 0
         self._codec = mapping.codec
+        self._scaling = mapping.scaling
         self._published: bytes | str | None = None
 
     def update(self, words: bytes, now: float) -> Values | None:
@@ -68,11 +73,13 @@ class ReadPoint:
         # Neither words nor floats: neighbours' bits are no change, and a NaN is like itself.
         content = values if isinstance(values, str) else values.tobytes()
         changed = content != self._published or self.error is not None
+        if self.last_good is not None:
+            self.interval = now - self.last_good if self.error is None else None
         self.last_good, self.error = now, None
         self._published = content
         if self.mapping.publish is Publish.CHANGE and not changed:
             return None
-        return values
+        return values if self._scaling is None else self._scaling.publish(values)
 
     def fail(self, error: str) -> bool:
         """Take note that a read gave no value; return whether the reason is a new one."""
@@ -81,17 +88,27 @@ class ReadPoint:
         self.failures += 1
         return is_news
 
+    def is_due(self, now: float, block_period: float) -> bool:
+        """
+        Tell whether a read that is made now is for this point.
+
+        Its block may be read every ``block_period`` seconds, more often than it wants.
+        """
+        if self.last_good is None or self.error is not None or self.period <= block_period:
+            return True
+        return now - self.last_good >= self.period - 0.5 * block_period
+
     def age(self, now: float) -> float | None:
         """Return the seconds since the last good read, None before the first."""
         return None if self.last_good is None else now - self.last_good
 
     def freshness(self, now: float) -> Freshness:
         """Judge the last value."""
-        age = self.age(now)
         if self.error is not None:
             return Freshness.FAILED
-        if age is None:
+        if self.last_good is None:
             return Freshness.WAITING
+        age = now - self.last_good
         if age > self.stale_time:
             return Freshness.STALE
         usual = max(1.5 * self.period, self.stale_time / 2)
@@ -116,7 +133,8 @@ class WriteResult:
     """
     The one result of one write to one mapping.
 
-    ``detail`` is empty for a write that went well; ``latency`` is seconds from the request.
+    ``detail`` is empty for a write that went well; ``latency`` is seconds from the request. That
+    of an unsure outcome says what a read has found afterwards, or why there was none.
     """
 
     mapping: Mapping
@@ -135,22 +153,52 @@ class Write:
     Values on their way to one mapping.
 
     Raises FormatError, saying what is wrong, when they cannot or must not be written.
-    ``commands`` are FNC and parameters of each command it takes.
+    ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that
+    it takes.
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
         self.mapping = mapping
         self.requested = now
-        self.values = values
         self.value = show(values)
-        mapping.codec.check(values)
-        _check_limits(mapping, values)
-        self.commands = _commands(mapping, values)
+        self.raw = _raw(mapping, values)
+        self.commands = _commands(mapping, self.raw)
+
+    @property
+    def may_rewrite(self) -> bool:
+        """Tell whether bits may be changed by writing back their word, where all else fails."""
+        processor = self.mapping.processor
+        return self.is_pulse and processor is not None and processor.may_lack_masked_write
+
+    def bit_change(self, packet: int) -> tuple[Address, int, int]:
+        """Return word, mask and bits of a packet that changes bits."""
+        assert not isinstance(self.raw, str)
+        address = self.mapping.address
+        mask, bits = self.mapping.codec.bit_changes(self.raw)[packet]
+        return address.at_offset(address.offset + packet), mask, bits
 
     @property
     def is_pulse(self) -> bool:
         """Tell whether each write counts by itself, not only the newest."""
         return self.mapping.type is ValueType.BOOL
+
+    def overlaps(self, other: Write) -> bool:
+        """Tell whether both write to the same words, or to bits of them."""
+        one, two = self.mapping, other.mapping
+        first, second = one.address.offset, two.address.offset
+        return (one.station, one.address.area) == (two.station, two.address.area) \
+            and first < second + two.codec.words and second < first + one.codec.words
+
+    def is_held(self, words: bytes) -> bool:
+        """Tell whether these words, all of the mapping's, hold what was to be written."""
+        codec = self.mapping.codec
+        if isinstance(self.raw, str) or self.is_pulse:
+            try:
+                held = codec.decode(words)
+            except FormatError:
+                return False
+            return held == self.raw if isinstance(held, str) else [*held] == [*self.raw]
+        return words == codec.encode(self.raw)
 
     def result(self, outcome: Outcome, detail: str, now: float) -> WriteResult:
         """Return how this write ended."""
@@ -160,7 +208,9 @@ class Write:
 def show(values: Sequence[float] | str) -> str:
     """Return values as text for people, cut short when there are many."""
     if isinstance(values, str):
-        return repr(values)
+        rest = len(values) - _SHOWN_CHARACTERS
+        more = f' and {rest} more characters' if rest > 0 else ''
+        return repr(values[:_SHOWN_CHARACTERS]) + more
     text = ', '.join(map(_text, values[:_SHOWN_VALUES]))
     rest = len(values) - _SHOWN_VALUES
     return f'[{text}, and {rest} more]' if rest > 0 else f'[{text}]'
@@ -170,35 +220,51 @@ def _text(value: float) -> str:
     return str(value) if isinstance(value, int) else f'{value:.7g}'  # what a float32 is good for
 
 
-def _check_limits(mapping: Mapping, values: Sequence[float] | str) -> None:
+def _raw(mapping: Mapping, values: Sequence[float] | str) -> Sequence[float] | str:
+    """Return what the PLC is to hold; FormatError unless all of it can and may be written."""
+    codec, scaling = mapping.codec, mapping.scaling
+    if isinstance(values, str) or scaling is None:
+        codec.check(values)
+        _check_limits(mapping, values)
+        return values
+    raw = scaling.raw(values, mapping.type)
+    codec.check(raw)
+    _check_limits(mapping, values)
+    if mapping.type is not ValueType.FLOAT32:  # rounding must not lead past a limit either
+        _check_limits(mapping, scaling.publish(raw), ', the nearest that can be written,')
+    return raw
+
+
+def _check_limits(mapping: Mapping, values: Sequence[float] | str, what: str = '') -> None:
     if isinstance(values, str):
         return
     minimum, maximum = mapping.minimum, mapping.maximum
-    if mapping.type is ValueType.FLOAT32:  # the limits as near as values can come to them
+    if mapping.message_type is ValueType.FLOAT32:  # limits as near as values can come to them
         minimum, maximum = array('f', (minimum, maximum))
     for index, value in enumerate(values):
         if not minimum <= value <= maximum:
-            raise FormatError(f'value {_text(value)} at index {index} is outside '
+            raise FormatError(f'value {_text(value)} at index {index}{what} is outside '
                               f'Min {mapping.minimum:.15g}, Max {mapping.maximum:.15g}')
 
 
-def _commands(mapping: Mapping, values: Sequence[float] | str) -> list[bytes]:
+def _commands(mapping: Mapping, values: Sequence[float] | str) -> list[Request]:
     address, codec = mapping.address, mapping.codec
-    dialect = DIALECTS[mapping.plc_type]
+    dialect = mapping.dialect
     if mapping.type is ValueType.BOOL:
         assert not isinstance(values, str)
         return [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
                 for n, (mask, bits) in enumerate(codec.bit_changes(values))]
     data = codec.encode(values)
-    packets = _packets(mapping, len(data) // 2)
+    whole = Transfer(address, len(data) // 2)
     return [dialect.write(address.at_offset(address.offset + first),
-                          data[2 * first:2 * (first + count)])
-            for first, count in packets]
+                          data[2 * first:2 * (first + count)], whole)
+            for first, count in _packets(mapping, whole.words)]
 
 
 def _packets(mapping: Mapping, words: int) -> list[tuple[int, int]]:
-    """Return first word and number of words of each packet that a write takes."""
-    kind = mapping.address.file_type
+    """Return first word and number of words of each packet; none ends within a value."""
+    kind, value_words = mapping.address.file_type, mapping.codec.element_words
     # Members of structures are written one by one: between them lie words not ours.
-    step = 1 if kind.is_structure else DIALECTS[mapping.plc_type].max_write(kind)
+    step = value_words if kind.is_structure else mapping.dialect.max_write(kind)
+    step -= step % value_words
     return [(first, min(step, words - first)) for first in range(0, words, step)]

@@ -15,73 +15,27 @@
 """
 The scheduler: which job has the line next.
 
-Writes go first, but after four in a row a read that is due has its turn. Reads go by their due
-time, so that on a saturated line all of one period fall behind alike and a slow one is still
-never left out. The reads of an inactive station are set aside; every now and then one of them
-goes out as a probe, at a pace that leaves seven eighths of the line to the living. A write to
-such a station is a probe as well; those that follow it too soon end unsent.
+Writes go first, but after four in a row a read that is due has its turn; which read that is, and
+how they share a line that is too slow for them, is told in ``read_queue``. The reads of an
+inactive station are set aside; every now and then one of them goes out as a probe, at a pace
+that leaves seven eighths of the line to the living. A write to such a station is a probe as
+well; those that follow it too soon end unsent.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Iterable, Sequence
-import heapq
-import itertools
+from collections.abc import Callable, Container, Iterable
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.planner import Block
-from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
+from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
 from abdf1_ros.messages import Message
 
 MAX_WRITES_IN_A_ROW = 4
 MAX_WAITING_WRITES = 1000
 _LIVING_SHARE = 7  # times as long as for one probe
-
-
-class ReadJob:
-    """
-    A block to be read again and again, and the points it serves.
-
-    ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
-    between its last two good reads and ``longest`` the greatest of these; an outage of the
-    station does not count. ``ticket`` is the scheduler's: the queue entry that counts.
-    """
-
-    def __init__(self, block: Block, points: Sequence[ReadPoint]) -> None:
-        self.block = block
-        self.points = tuple(points)
-        self.due = 0.0
-        self.interval: float | None = None
-        self.longest: float | None = None
-        self.ticket = 0
-        self._last_done: float | None = None
-
-    @property
-    def station(self) -> int:
-        """Return the station to read from."""
-        return self.block.station
-
-    def done(self, now: float) -> None:
-        """Take note of a good read."""
-        if self._last_done is not None:
-            self.interval = now - self._last_done
-            self.longest = max(self.interval, self.longest or 0.0)
-        self._last_done = now
-
-    def interrupted(self) -> None:
-        """Take note that there are no good reads for the time being."""
-        self.interval = self._last_done = None
-
-    def covers(self, write: Write) -> bool:
-        """Tell whether the block shows what ``write`` has changed."""
-        mapping, start = write.mapping, self.block.start
-        if (self.station, start.area) != (mapping.station, mapping.address.area):
-            return False
-        end = start.offset + sum(request.words for request in self.block.requests)
-        first = mapping.address.offset
-        return first < end and start.offset < first + mapping.codec.words
 
 
 class Scheduler:
@@ -101,18 +55,18 @@ class Scheduler:
         self._report = report
         self._inbox: deque[Write] = deque()
         self._writes: deque[Write] = deque()
+        self._writes_under_way: list[Write] = []
         self._writes_in_a_row = 0
-        self._jobs: set[ReadJob] = set()
-        self._heap: list[tuple[float, int, ReadJob]] = []
-        self._tickets = itertools.count(1)
+        self._reads = ReadQueue()
         self._parked: dict[int, deque[ReadJob]] = {}
         self._next_probe = 0.0
+        self._last_probe_was_echo = False
         self._next_write_probe = 0.0
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
         """Return all read jobs."""
-        return frozenset(self._jobs)
+        return frozenset(self._reads.jobs)
 
     @property
     def is_full(self) -> bool:
@@ -132,14 +86,11 @@ class Scheduler:
 
     def add_reads(self, jobs: Iterable[ReadJob], now: float) -> None:
         """Take new jobs, all due at once."""
-        for job in jobs:
-            self._jobs.add(job)
-            self._push(job, now)
+        self.replace((), jobs, now)
 
-    def replace(self, job: ReadJob, parts: Iterable[ReadJob], now: float) -> None:
-        """Put ``parts`` in the place of ``job``, which has just been taken."""
-        self._jobs.discard(job)
-        self.add_reads(parts, now)
+    def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
+        """Put ``new`` jobs in the place of ``old`` ones, whose station has just answered."""
+        self._reads.replace(old, new, now)
 
     def add_write(self, write: Write) -> None:
         """Queue a write; may be called from any thread."""
@@ -150,25 +101,44 @@ class Scheduler:
         """
         Return the next write, unless it is a read's turn.
 
-        ``is_read_waiting`` tells of a read that has begun and wants to go on. Writes to
-        stations in ``busy`` keep waiting.
+        ``is_read_waiting`` tells of something begun that wants to go on. Writes to
+        stations in ``busy`` keep waiting, and so does one of words that are being written: the
+        packets of two must not mix. Each that is returned ends with ``write_ended``.
         """
         self.expire(now)
-        write = next((write for write in self._writes if write.mapping.station not in busy),
-                     None)
+        write = self._first_free(busy)
         is_reads_turn = self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and (
-            is_read_waiting or self._is_read_due(now))
+            is_read_waiting or self.is_read_due(now))
         if write is None or is_reads_turn:
             self._writes_in_a_row = 0
             return None
         self._writes.remove(write)
+        self._writes_under_way.append(write)
         self._writes_in_a_row += 1
         return write
+
+    def _first_free(self, busy: Container[int]) -> Write | None:
+        """Return the first write that need not wait; those of a station keep their order."""
+        held_up: set[int] = set()
+        for write in self._writes:
+            station = write.mapping.station
+            if station in busy or station in held_up:
+                continue
+            if not any(write.overlaps(other) for other in self._writes_under_way):
+                return write
+            held_up.add(station)
+        return None
+
+    def write_ended(self, write: Write) -> None:
+        """Take note that a write is not under way any more; the next of its words may go out."""
+        self._writes_under_way.remove(write)
 
     def expire(self, now: float) -> None:
         """End the writes that have waited too long."""
         while self._inbox:
             self._queue(self._inbox.popleft(), now)
+        if not self._writes:
+            return
         while self._writes and now - self._writes[0].requested > self._write_timeout:
             detail = f'waited longer than {self._write_timeout:g} s for the line'
             self._report(self._writes.popleft().result(Outcome.NOT_SENT, detail, now))
@@ -187,34 +157,68 @@ class Scheduler:
         """Return the next read or probe of a station not in ``busy``, None for nothing due."""
         return self._take_probe(now) or self._take_read(now, busy)
 
+    def is_read_due(self, now: float) -> bool:
+        """Tell whether a read of an active station is due; those of others are set aside."""
+        while (job := self._reads.first(now)) is not None:
+            if self._stations[job.station].active:
+                return True
+            self._reads.take(now)
+            self._park(job)
+        return False
+
     def next_due(self) -> float | None:
         """Return when the next read or probe is due (clock value in s), None for never."""
-        due = self._heap[0][0] if self._heap else None
+        due = self._reads.next_due()
         if not self._parked:
             return due
         return self._next_probe if due is None else min(due, self._next_probe)
 
-    def finished(self, job: ReadJob, started: float, now: float) -> None:
+    def finished(self, job: ReadJob, now: float) -> None:
         """Take a job back, whether it went well or not, unless it has been replaced."""
-        if job not in self._jobs:
+        if job not in self._reads.jobs:
             return
         if not self._stations[job.station].active:
-            self._next_probe = now + (self._probe_interval if self._heap else job.block.period)
+            self._next_probe = now + (self._probe_interval if self._reads else job.block.period)
             self._park(job)
             return
         self.release(job.station, now)
-        self._push(job, max(job.due + job.block.period, started))
+        is_whole = not job.is_under_way
+        self._reads.put(job, max(job.due + job.block.period, job.started) if is_whole else job.due)
 
     def unanswered(self, now: float) -> None:
         """Take note that a write has found its station inactive: the next ones do not try."""
-        self._next_write_probe = now + (self._probe_interval if self._heap else 0.0)
+        self._next_write_probe = now + (self._probe_interval if self._reads else 0.0)
+
+    def check_goes(self) -> None:
+        """Take note that a check has the line; it does not use up the turn of the reads."""
+        if self._writes:
+            self._writes_in_a_row = MAX_WRITES_IN_A_ROW
+
+    def probe_from(self, now: float) -> float:
+        """
+        Return from when (clock value in s) an echo may be a probe; from ``now`` on: it is one.
+
+        Where reads of other inactive stations wait as well, they take turns.
+        """
+        if now < self._next_probe:
+            return self._next_probe
+        if self._parked and self._last_probe_was_echo:
+            return now + self._probe_interval
+        self._last_probe_was_echo = True
+        return now
+
+    def probe_failed(self, now: float) -> None:
+        """Take note that an echo has found its station silent."""
+        self._next_probe = now + (self._probe_interval if self._reads else 0.0)
 
     def hasten(self, write: Write, now: float) -> None:
         """Make the reads that show what ``write`` changed due at once."""
         self.release(write.mapping.station, now)
-        for job in self._jobs:
-            if job.covers(write) and job.due > now:
-                self._push(job, now)
+        for job in self._reads.jobs:
+            if job.covers(write):
+                job.is_hastened = True
+                if job.due > now:
+                    self._reads.put(job, now)
 
     def drop_writes(self, detail: str, now: float) -> None:
         """End every waiting write without sending it."""
@@ -236,6 +240,7 @@ class Scheduler:
             self.release(number, now)  # it has answered a write
         if not self._parked or now < self._next_probe:
             return None
+        self._last_probe_was_echo = False
         station = next(iter(self._parked))
         jobs = self._parked.pop(station)
         job = jobs.popleft()
@@ -244,39 +249,22 @@ class Scheduler:
         return job
 
     def _take_read(self, now: float, busy: Container[int]) -> ReadJob | None:
-        found = None
         passed_over = []
-        while found is None and self._is_read_due(now):
-            job = heapq.heappop(self._heap)[2]
+        while (job := self._reads.take(now)) is not None:
             if not self._stations[job.station].active:
                 self._park(job)
             elif job.station in busy:
                 passed_over.append(job)
             else:
-                found = job
-        for job in passed_over:
-            self._push(job, job.due)
-        return found
-
-    def _is_read_due(self, now: float) -> bool:
-        """Tell whether a read of an active station is due; those of others are set aside."""
-        while self._heap:
-            due, ticket, job = self._heap[0]
-            if ticket == job.ticket and job in self._jobs:
-                if due > now or self._stations[job.station].active:
-                    return due <= now
-                self._park(job)
-            heapq.heappop(self._heap)  # or a later entry has replaced this one
-        return False
-
-    def _push(self, job: ReadJob, due: float) -> None:
-        job.due, job.ticket = due, next(self._tickets)
-        heapq.heappush(self._heap, (due, job.ticket, job))
+                break
+        for other in passed_over:
+            self._reads.put(other, other.due)
+        return job
 
     def release(self, station: int, now: float) -> None:
         """Make the reads of a station that were set aside due at once."""
         for job in self._parked.pop(station, ()):
-            self._push(job, now)
+            self._reads.put(job, now)
 
     def _park(self, job: ReadJob) -> None:
         job.interrupted()

@@ -25,9 +25,10 @@ from abdf1_ros.driver.values import ValueType
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.server import SERVED_FAMILIES, Server
-from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.link_counters import ServedCounters
+from abdf1_ros.pccc.server import Server
 
 
 class _MappedTable(DataTable):
@@ -65,22 +66,22 @@ class Served:
     The served mappings, and the commands that come for them.
 
     ``on_write`` is called with a mapping and its words after the other end has written any of
-    them. All of it belongs to the link thread.
+    them; ``counters`` are what it reads as ours. All of it belongs to the link thread.
     """
 
     def __init__(self, plc_type: PlcType, mappings: Sequence[Mapping],
-                 on_write: Callable[[Mapping, bytes], None]) -> None:
+                 on_write: Callable[[Mapping, bytes], None],
+                 counters: ServedCounters | None = None, is_full_duplex: bool = False) -> None:
         self._mappings = [mapping for mapping in mappings if mapping.serves]
         self._on_write = on_write
         self._table = _MappedTable(plc_type)
         for mapping in self._mappings:
             self._table.create(_first_word(mapping), mapping.codec.words)
-        self._server = Server(self._table) if plc_type in SERVED_FAMILIES else None
+        processor = EmulatedProcessor(plc_type, is_full_duplex=is_full_duplex)
+        self._server = Server(self._table, processor, counters)
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command from outside and return its reply."""
-        if self._server is None:
-            return command.reply(sts=STS_ILLEGAL_COMMAND)
         self._table.changed.clear()
         reply = self._server.serve(command)
         for mapping in self._mappings:
@@ -93,7 +94,7 @@ class Served:
         return self._table.read(_first_word(mapping), mapping.codec.words)
 
     def store(self, mapping: Mapping, values: Sequence[float] | str) -> None:
-        """Put checked values where the other end reads them."""
+        """Put checked raw values where the other end reads them."""
         start = _first_word(mapping)
         if mapping.type is ValueType.BOOL:
             assert not isinstance(values, str)

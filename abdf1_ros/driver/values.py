@@ -25,10 +25,12 @@ import struct
 import sys
 from typing import Any
 
+from abdf1_ros.driver import strings
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
 
-_MAX_STRING = 82
+FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 
 
 class ValueType(Enum):
@@ -59,35 +61,46 @@ class ValueType(Enum):
         return _RANGES[self]
 
 
+class WordOrder(Enum):
+    """Which word of a 32-bit value over 16-bit words comes first."""
+
+    LOW = 'Low'
+    HIGH = 'High'
+
+
 _WORDS = {
     ValueType.BOOL: 0, ValueType.INT16: 1, ValueType.UINT16: 1, ValueType.BCD16: 1,
-    ValueType.INT32: 2, ValueType.UINT32: 2, ValueType.FLOAT32: 2, ValueType.STRING: 42}
+    ValueType.INT32: 2, ValueType.UINT32: 2, ValueType.FLOAT32: 2,
+    ValueType.STRING: strings.COUNTED_WORDS}
 _ARRAY_CODES = {
     ValueType.BOOL: 'B', ValueType.INT16: 'h', ValueType.UINT16: 'H', ValueType.BCD16: 'H',
     ValueType.INT32: 'i', ValueType.UINT32: 'I', ValueType.FLOAT32: 'f'}
-_FLOAT_MAX = 3.4028234663852886e38
 _RANGES: dict[ValueType, tuple[float, float]] = {
     ValueType.BOOL: (0, 1), ValueType.INT16: (-32768, 32767), ValueType.UINT16: (0, 65535),
     ValueType.BCD16: (0, 9999), ValueType.INT32: (-2**31, 2**31 - 1),
-    ValueType.UINT32: (0, 2**32 - 1), ValueType.FLOAT32: (-_FLOAT_MAX, _FLOAT_MAX),
+    ValueType.UINT32: (0, 2**32 - 1), ValueType.FLOAT32: (-FLOAT_MAX, FLOAT_MAX),
     ValueType.STRING: (-math.inf, math.inf)}
 
 _WORD_TYPES = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16, ValueType.INT32,
                ValueType.UINT32, ValueType.FLOAT32)
+_UNSIGNED_FIRST = (ValueType.UINT16, ValueType.INT16, *_WORD_TYPES[2:])
 _TYPES: dict[FileType, tuple[ValueType, ...]] = {
     FileType.FLOAT: (ValueType.FLOAT32,),
     FileType.LONG: (ValueType.INT32, ValueType.UINT32),
     FileType.STRING: (ValueType.STRING,),
-    FileType.TIMER: (ValueType.INT16, ValueType.UINT16),
-    FileType.COUNTER: (ValueType.INT16, ValueType.UINT16),
-    FileType.CONTROL: (ValueType.INT16, ValueType.UINT16),
-    FileType.INTEGER: _WORD_TYPES}
-_UNSIGNED_FIRST = (ValueType.UINT16, ValueType.INT16, *_WORD_TYPES[2:])
+    FileType.INTEGER: (*_WORD_TYPES, ValueType.STRING),
+    FileType.ASCII: (*_UNSIGNED_FIRST, ValueType.STRING)}
 
 
-def types_of(file_type: FileType) -> tuple[ValueType, ...]:
-    """Return the types that words of such a file may be read as, the natural one first."""
-    return _TYPES.get(file_type, _UNSIGNED_FIRST)
+def types_of(address: Address) -> tuple[ValueType, ...]:
+    """Return the types that may be read from there, the natural one first."""
+    if address.bit is not None:
+        return (ValueType.BOOL,)
+    if address.is_value(2):
+        return (ValueType.FLOAT32,)
+    if address.file_type.is_structure:
+        return ValueType.INT16, ValueType.UINT16
+    return _TYPES.get(address.file_type, _UNSIGNED_FIRST)
 
 
 Values = Any
@@ -99,28 +112,38 @@ class Codec:
     """
     Turn ``length`` elements into words and back.
 
-    Words are bytes, each word low byte first; elements of two words have their low word first.
-    ``bit`` is the number of the first bit, for bits only.
+    Words are bytes, each word low byte first. ``bit`` is the number of the first bit, for bits
+    only; ``word_order`` is for elements of two words. A ``packed`` string is the characters in
+    ``length`` words, without the length word of an ST element.
     """
 
     type: ValueType
     length: int
     bit: int = 0
+    word_order: WordOrder = WordOrder.LOW
+    packed: bool = False
+
+    @property
+    def element_words(self) -> int:
+        """Return the words that have to stay together to be one value."""
+        return 1 if self.packed else max(1, self.type.words)
 
     @property
     def words(self) -> int:
         """Return the number of words that the elements take or touch."""
         if self.type is ValueType.BOOL:
             return (self.bit + self.length + 15) // 16
-        return self.type.words * self.length
+        return self.element_words * self.length
 
     def decode(self, data: bytes) -> Values:
         """Return the values in ``data``; FormatError where the words are no such value."""
         if self.type is ValueType.STRING:
-            return _decode_string(data)
+            return strings.decode_packed(data) if self.packed else strings.decode_counted(data)
         if self.type is ValueType.BOOL:
             number = int.from_bytes(data, 'little') >> self.bit
             return array('B', ((number >> n) & 1 for n in range(self.length)))
+        if self.word_order is WordOrder.HIGH:
+            data = _exchange_words(data)
         values: Values = array(self.type.array_code, data)
         if sys.byteorder == 'big':
             values.byteswap()
@@ -133,7 +156,7 @@ class Codec:
         if isinstance(values, str) is not (self.type is ValueType.STRING):
             raise FormatError(f'{values!r} is no {self.type.value}')
         if isinstance(values, str):
-            _encode_string(values)
+            self._encode_string(values)
             return
         if len(values) != self.length:
             raise FormatError(f'{len(values)} values, the mapping has {self.length}')
@@ -146,7 +169,16 @@ class Codec:
     def encode(self, values: Sequence[float] | str) -> bytes:
         """Return whole words for ``values`` that ``check`` has passed; not for bits."""
         if isinstance(values, str):
-            return _encode_string(values)
+            return self._encode_string(values)
+        data = self._encode_numbers(values)
+        return _exchange_words(data) if self.word_order is WordOrder.HIGH else data
+
+    def _encode_string(self, text: str) -> bytes:
+        if self.packed:
+            return strings.encode_packed(text, self.length)
+        return strings.encode_counted(text)
+
+    def _encode_numbers(self, values: Sequence[float]) -> bytes:
         if self.type is ValueType.FLOAT32:
             return struct.pack(f'<{self.length}f', *values)
         if self.type is ValueType.BCD16:
@@ -170,25 +202,8 @@ def _from_bcd(word: int) -> int:
         raise FormatError(f'word {word:04X} is not BCD') from None
 
 
-def _swap(data: bytes) -> bytes:
-    """Exchange the bytes of each word: the first character is the high byte."""
-    swapped = bytearray(data)
-    swapped[0::2], swapped[1::2] = data[1::2], data[0::2]
-    return bytes(swapped)
-
-
-def _decode_string(data: bytes) -> str:
-    length = int.from_bytes(data[:2], 'little')
-    if length > _MAX_STRING:
-        raise FormatError(f'string length {length} is more than {_MAX_STRING}')
-    return _swap(data[2:])[:length].decode('latin-1')
-
-
-def _encode_string(text: str) -> bytes:
-    try:
-        characters = text.encode('latin-1')
-    except UnicodeEncodeError as error:
-        raise FormatError(f'character {text[error.start]!r} does not exist in a PLC') from None
-    if len(characters) > _MAX_STRING:
-        raise FormatError(f'{len(characters)} characters, a PLC string has {_MAX_STRING}')
-    return len(characters).to_bytes(2, 'little') + _swap(characters.ljust(_MAX_STRING, b'\0'))
+def _exchange_words(data: bytes) -> bytes:
+    """Put the second word of each pair before the first."""
+    words = array('H', data)
+    words[0::2], words[1::2] = words[1::2], words[0::2]
+    return words.tobytes()

@@ -21,7 +21,11 @@ Grammar (S0, "Mapping Address Formatting Rules"; P5A), letters in any case::
               | "B" file "/" bit                            B3/17 is B3:1/1
     PLC-5 I/O   I:017/12      rack and group octal, bit octal
     SLC I/O     I:1.0/3       slot, word, bit decimal; ".0" may be left out
-    member      a name (T4:0.ACC, T4:0/DN) or the number of a word (T4:0.2)
+                I:5/3         with access Flat the word of the whole image
+    member      a name (T4:0.ACC, T4:0/DN) or the number of a word (T4:0.2); a float32 of a
+                PLC-5 PD element has the number of its first word (PD10:0.2 is PD10:0.SP)
+
+Those of a PLC-2 and a PLC-3 are described in ``plc2_address`` and ``plc3_address``.
 """
 
 from __future__ import annotations
@@ -29,18 +33,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 import re
 
-from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.file_types import FileType, Member, PlcType
+from abdf1_ros.pccc import plc2_address, plc3_address
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import file_types_of, FileType, Layout, layout_of, PlcType
 
 BITS = 16
-
-
-class AddressSyntaxError(FormatError):
-    """The text is no address of this family."""
-
-
-class AddressRangeError(FormatError):
-    """The address is well formed, but outside what the family can have."""
 
 
 _FORM = re.compile(
@@ -55,9 +53,11 @@ _FIRST_FREE_FILE = 3
 _LAST_FILE = {PlcType.PLC5: 999, PlcType.SLC: 255}
 _LAST_ELEMENT = {PlcType.PLC5: 999, PlcType.SLC: 255}
 _LAST_PLC5 = {
-    FileType.OUTPUT: 0o277, FileType.INPUT: 0o277, FileType.STATUS: 127, FileType.STRING: 779}
+    FileType.OUTPUT: 0o277, FileType.INPUT: 0o277, FileType.STATUS: 127, FileType.STRING: 779,
+    FileType.PID: 398, FileType.MESSAGE: 584}
 _LAST_SLC_SLOT = 30
 _LAST_SLC_SLOT_WORD = 255
+_LAST_SLC_FLAT_WORD = (_LAST_SLC_SLOT + 1) * (_LAST_SLC_SLOT_WORD + 1) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class Area:
     plc_type: PlcType
     file_type: FileType
     file: int
-    slot: int = 0
+    slot: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,9 @@ class Address:
     One place in a data table.
 
     ``element`` is the element number (for PLC-5 I/O rack x 8 + group, for SLC I/O the slot),
-    ``word`` the word inside the element or slot, ``bit`` 0-15 or None for a whole word.
+    ``word`` the word inside the element or slot, ``bit`` 0-15 or None for a whole word. The
+    one stretch of words that a PLC-2 has counts as file 0 of type B. ``is_flat`` is for SLC I/O
+    whose ``element`` is the word in the whole image.
     """
 
     plc_type: PlcType
@@ -85,15 +87,22 @@ class Address:
     element: int
     word: int = 0
     bit: int | None = None
+    is_flat: bool = False
 
     @classmethod
-    def parse(cls, text: str, plc_type: PlcType) -> Address:
+    def parse(cls, text: str, plc_type: PlcType, access: Access | None = None) -> Address:
         """
-        Read an address.
+        Read an address; with ``access`` FLAT, SLC I/O is counted through the whole image.
 
         Raises AddressSyntaxError or AddressRangeError, whose text says what would be right.
         """
-        match = _FORM.fullmatch(text.strip().upper())
+        text = text.strip().upper()
+        if plc_type is PlcType.PLC2:
+            word, bit_number = plc2_address.parse(text)
+            return cls(plc_type, FileType.BINARY, 0, word, 0, bit_number)
+        if plc_type is PlcType.PLC3:
+            return cls(plc_type, *plc3_address.parse(text))
+        match = _FORM.fullmatch(text)
         if match is None:
             raise AddressSyntaxError(
                 'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3')
@@ -101,8 +110,9 @@ class Address:
         file = _file(match['file'], file_type, plc_type)
         if match['element'] is None:
             return cls._flat_bit(match['bit'], file_type, file, plc_type)
-        element = _element(match['element'], file_type, plc_type)
-        address = cls(plc_type, file_type, file, element)
+        is_flat = access is Access.FLAT and file_type.is_io
+        element = _element(match['element'], file_type, plc_type, is_flat)
+        address = cls(plc_type, file_type, file, element, is_flat=is_flat)
         member, bit = match['member'], match['bit']
         if member:
             address = (address._with_word(int(member)) if member.isdigit()
@@ -121,29 +131,40 @@ class Address:
         return cls(plc_type, file_type, file, element, 0, bit_number)
 
     def _with_member(self, name: str) -> Address:
-        member = self.file_type.layout.members.get(name)
-        if member is None or self.bit is not None or self.word:
-            known = ', '.join(self.file_type.layout.members) or 'none'
+        members = self.layout.members
+        member = members.get(name)
+        # A bit may be named behind the number of its word, a value behind nothing.
+        if member is None or self.bit is not None or (
+                self.word and (member.bit is None or member.word != self.word)):
+            known = ', '.join(members) or 'none'
             raise AddressSyntaxError(
                 f'{name} is no member here; members of {self.file_type.value} files: {known}')
         return replace(self, word=member.word, bit=member.bit)
 
     def _with_word(self, word: int) -> Address:
+        if self.is_flat:
+            raise AddressSyntaxError(
+                'with access Flat write the word of the whole image, as in I:5 or O:0/3')
         if self._is_slot:
             if word > _LAST_SLC_SLOT_WORD:
                 raise AddressRangeError(f'words of a slot run from 0 to {_LAST_SLC_SLOT_WORD}')
         elif not self.file_type.is_structure:
             raise AddressSyntaxError(
                 f'elements of {self.file_type.value} files have no numbered words')
-        elif word >= self.file_type.layout.words:
+        elif word >= self.layout.words:
             raise AddressRangeError(
                 f'words of a {self.file_type.value} element run from 0 to '
-                f'{self.file_type.layout.words - 1}')
+                f'{self.layout.words - 1}')
+        elif not self.layout.value_words(word):
+            raise AddressSyntaxError(
+                f'word {word} is the second half of a float32; write the first, {word - 1}')
         return replace(self, word=word)
 
     def _with_bit(self, text: str) -> Address:
         if not self.file_type.has_bits or self.bit is not None:
             raise AddressSyntaxError(f'{self.file_type.value} files have no bits to address')
+        if self.layout.value_words(self.word) != 1:
+            raise AddressSyntaxError(f'{self} is a float32, which has no bits to address')
         octal = self._is_octal
         if octal and set(text) & set('89'):
             raise AddressSyntaxError('PLC-5 I/O bits are octal, 0 to 17')
@@ -158,12 +179,17 @@ class Address:
 
     @property
     def _is_slot(self) -> bool:
-        return self.file_type.is_io and self.plc_type is PlcType.SLC
+        return self.file_type.is_io and self.plc_type is PlcType.SLC and not self.is_flat
+
+    @property
+    def layout(self) -> Layout:
+        """Return how the elements of its file are built."""
+        return layout_of(self.file_type, self.plc_type)
 
     @property
     def area(self) -> Area:
         """Return the stretch of data table this lies in."""
-        slot = self.element if self._is_slot else 0
+        slot = self.element if self._is_slot else None
         return Area(self.plc_type, self.file_type, self.file, slot)
 
     @property
@@ -171,26 +197,38 @@ class Address:
         """Return the number of this word within its area."""
         if self._is_slot:
             return self.word
-        return self.element * self.file_type.layout.words + self.word
+        return self.element * self.layout.words + self.word
 
     @property
     def area_size(self) -> int:
         """Return how many words the area can have at most."""
         if self._is_slot:
             return _LAST_SLC_SLOT_WORD + 1
-        last = _last_element(self.file_type, self.plc_type)
-        return (last + 1) * self.file_type.layout.words
+        last = _last_element(self.file_type, self.plc_type, self.is_flat)
+        return (last + 1) * self.layout.words
 
     def at_offset(self, offset: int) -> Address:
         """Return the address of word ``offset`` of the same area."""
         if self._is_slot:
             return replace(self, word=offset, bit=None)
-        element, word = divmod(offset, self.file_type.layout.words)
+        element, word = divmod(offset, self.layout.words)
         return replace(self, element=element, word=word, bit=None)
+
+    def with_bit(self, bit: int) -> Address:
+        """Return the address of a bit of this word."""
+        return replace(self, bit=bit)
+
+    def is_value(self, words: int) -> bool:
+        """Tell whether so many words from here on are one value of a structure."""
+        return self.file_type.is_structure and self.layout.value_words(self.word) == words
 
     def __str__(self) -> str:
         """Return the address in the form that ``parse`` reads."""
         kind = self.file_type
+        if self.plc_type is PlcType.PLC2:
+            return plc2_address.show(self.element, self.bit)
+        if self.plc_type is PlcType.PLC3:
+            return plc3_address.show(kind, self.file, self.element, self.word, self.bit)
         file = '' if kind.is_io else str(self.file)
         if self._is_slot:
             place = f'{self.element}.{self.word}'
@@ -201,36 +239,30 @@ class Address:
         return f'{kind.value}{file}:{place}{self._member_text()}'
 
     def _member_text(self) -> str:
-        if self.file_type.is_structure:
-            here = Member(self.word, self.bit)
-            for name, member in self.file_type.layout.members.items():
-                if member == here and here != Member(0):
-                    return f'.{name}' if here.bit is None else f'/{name}'
-            if self.word:
-                return f'.{self.word}/{self.bit}'
-        if self.bit is None:
-            return ''
-        return f'/{self.bit:02o}' if self._is_octal else f'/{self.bit}'
+        bit = f'{self.bit:02o}' if self._is_octal and self.bit is not None else self.bit
+        if self.word and not self._is_slot or self.bit is not None:
+            for name, member in self.layout.members.items():
+                if (member.word, member.bit) == (self.word, self.bit):
+                    return f'.{name}' if self.bit is None else f'/{name}'
+        word = f'.{self.word}' if self.word and not self._is_slot else ''
+        return word if bit is None else f'{word}/{bit}'
 
 
 def _file_type(letters: str, plc_type: PlcType) -> FileType:
-    try:
-        kind = FileType(letters)
-    except ValueError:
-        known = ', '.join(entry.value for entry in FileType)
-        raise AddressSyntaxError(f'{letters} is no file type; file types: {known}') from None
-    code = kind.layout.plc5_id if plc_type is PlcType.PLC5 else kind.layout.slc_code
-    if code is None:
-        raise AddressSyntaxError(f'a {plc_type.value} has no {letters} files')
-    return kind
+    known = file_types_of(plc_type)
+    for kind in known:
+        if kind.value == letters:
+            return kind
+    raise AddressSyntaxError(f'{plc_type.value} has no {letters} files; file types: '
+                             f'{", ".join(kind.value for kind in known)}')
 
 
 def _file(text: str | None, kind: FileType, plc_type: PlcType) -> int:
     fixed = _FIXED_FILES.get(kind)
     if text is None:
-        if kind.layout.default_file is None:
+        if kind.default_file is None:
             raise AddressSyntaxError(f'give the file number, as in {kind.value}9:0')
-        return kind.layout.default_file
+        return kind.default_file
     file = int(text)
     if fixed is not None and file != fixed:
         raise AddressRangeError(f'the {kind.value} file is file {fixed}')
@@ -240,25 +272,32 @@ def _file(text: str | None, kind: FileType, plc_type: PlcType) -> int:
     return file
 
 
-def _element(text: str, kind: FileType, plc_type: PlcType) -> int:
+def _element(text: str, kind: FileType, plc_type: PlcType, is_flat: bool) -> int:
     octal = kind.is_io and plc_type is PlcType.PLC5
     if octal and set(text) & set('89'):
         raise AddressSyntaxError('PLC-5 I/O words are octal, as in I:017')
     element = int(text, 8 if octal else 10)
-    _check_element(element, kind, plc_type)
+    _check_element(element, kind, plc_type, is_flat)
     return element
 
 
-def _last_element(kind: FileType, plc_type: PlcType) -> int:
+def _last_element(kind: FileType, plc_type: PlcType, is_flat: bool = False) -> int:
+    if plc_type is PlcType.PLC2:
+        return plc2_address.LAST_WORD
+    if plc_type is PlcType.PLC3:
+        return plc3_address.last_element(kind)
     if plc_type is PlcType.PLC5:
         return _LAST_PLC5.get(kind, _LAST_ELEMENT[plc_type])
-    return _LAST_SLC_SLOT if kind.is_io else _LAST_ELEMENT[plc_type]
+    if kind.is_io:
+        return _LAST_SLC_FLAT_WORD if is_flat else _LAST_SLC_SLOT
+    return _LAST_ELEMENT[plc_type]
 
 
-def _check_element(element: int, kind: FileType, plc_type: PlcType) -> None:
-    last = _last_element(kind, plc_type)
+def _check_element(element: int, kind: FileType, plc_type: PlcType,
+                   is_flat: bool = False) -> None:
+    last = _last_element(kind, plc_type, is_flat)
     if element > last:
         octal = kind.is_io and plc_type is PlcType.PLC5
         shown = f'{last:o} (octal)' if octal else str(last)
-        name = 'slots' if kind.is_io and not octal else 'elements'
+        name = 'slots' if kind.is_io and not octal and not is_flat else 'elements'
         raise AddressRangeError(f'{name} of {kind.value} run from 0 to {shown}')

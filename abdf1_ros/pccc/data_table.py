@@ -44,6 +44,11 @@ class DataTable:
         self._words: dict[Area, bytearray] = {}
         self._types: dict[int, FileType] = {}
 
+    @property
+    def _has_sections(self) -> bool:
+        """Tell whether each type has file numbers of its own."""
+        return self.plc_type is PlcType.PLC3
+
     def __iter__(self) -> Iterator[Area]:
         """Iterate over the files (for SLC I/O, the slots)."""
         return iter(self._words)
@@ -51,12 +56,16 @@ class DataTable:
     def create(self, address: Address, words: int) -> None:
         """Make the file of ``address`` long enough for ``words`` words from there on."""
         known = self._types.setdefault(address.file, address.file_type)
-        if known is not address.file_type:
+        if known is not address.file_type and not self._has_sections:
             raise NoSuchFile(f'file {address.file} is of type {known.value} already')
         store = self._words.setdefault(address.area, bytearray())
-        per_element = address.file_type.layout.words
+        per_element = address.layout.words
         end = -(-(address.offset + words) // per_element) * per_element  # whole elements
         store.extend(bytes(max(0, 2 * end - len(store))))
+
+    def length(self, area: Area) -> int:
+        """Return how many words a file (for SLC I/O, a slot) has."""
+        return len(self._words[area]) // 2
 
     def file_type(self, file: int) -> FileType:
         """Return the type of a file by its number."""

@@ -12,23 +12,75 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The diagnostic commands that every node answers: echo and diagnostic status (M 7-6..7-27)."""
+"""
+The diagnostic commands that every node answers (M 7-6..7-27), and those that nobody may send us.
+
+Here are their bytes. What a diagnostic status says is in ``identity``, what diagnostic counters
+count in ``link_counters``. This driver sends no command that changes a processor's mode or the
+settings of a link, and refuses those that it gets.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+from abdf1_ros.pccc.fields import Reader, word
 from abdf1_ros.pccc.file_types import PlcType
 
 CMD = 0x06
 ECHO = 0x00
+READ_COUNTERS = 0x01
 STATUS = 0x03
+RESET_COUNTERS = 0x07
 
-# Remote run, type extender and processor as M 10-3..10-6 (SLC) and M chapter 10 (PLC-5) lay
-# them out. What does not exist here (memory, faults, programs) is 0.
-_SLC_5_03 = bytes((0x00, 0xEE, 0x34, 0x49, 0x00)) + b'5/03'.ljust(11) + bytes((
-    0, 0, 0x06, 0, 0, 0, 0, 0xFC))
-_PLC_5_40 = bytes((0x06, 0xEB, 0x15)) + bytes(33)
+MAX_ECHO = 243  # bytes (M 7-8)
+MAX_ECHO_SLC = 236  # of an SLC 5/03 and later (M 7-8)
+MAX_COUNTERS = 244  # bytes in a reply to 06/01
+
+STATUS_REQUEST = bytes((STATUS,))
+RESET_REQUEST = bytes((RESET_COUNTERS,))
 
 
-def identity(plc_type: PlcType) -> bytes:
-    """Return the diagnostic status of an emulated processor: SLC 24 bytes, PLC-5 36."""
-    return _SLC_5_03 if plc_type is PlcType.SLC else _PLC_5_40
+def max_echo(plc_type: PlcType) -> int:
+    """Return how many bytes a processor of the family echoes (M 7-8)."""
+    return MAX_ECHO_SLC if plc_type is PlcType.SLC else MAX_ECHO
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """Echo, 06/00 (M 7-8): the reply has the same data, at most ``max_echo`` bytes."""
+
+    data: bytes = b''
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters."""
+        return bytes((ECHO,)) + self.data
+
+    @classmethod
+    def read(cls, reader: Reader) -> Echo:
+        """Take the data off ``reader``."""
+        return cls(reader.rest())
+
+
+@dataclass(frozen=True, slots=True)
+class ReadCounters:
+    """
+    Read diagnostic counters, 06/01.
+
+    ``address`` is 0 for an SLC, anything for a PLC-5, and for a module what its diagnostic
+    status says; ``size`` is bytes, at most 244.
+    """
+
+    address: int
+    size: int
+
+    def encode(self) -> bytes:
+        """Return FNC and parameters."""
+        return bytes((READ_COUNTERS,)) + word(self.address) + bytes((self.size,))
+
+    @classmethod
+    def read(cls, reader: Reader) -> ReadCounters:
+        """Take the parameters off ``reader``; FormatError unless there are just these."""
+        request = cls(reader.word(), reader.byte())
+        reader.end()
+        return request

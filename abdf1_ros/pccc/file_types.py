@@ -19,6 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+from abdf1_ros.pccc import members
+from abdf1_ros.pccc.members import Members
+
 
 class PlcType(Enum):
     """The PLC families; the value is what the CSV files call them (S0, PLC_Type)."""
@@ -27,49 +30,6 @@ class PlcType(Enum):
     PLC3 = 'PLC3'
     PLC5 = 'PLC5'
     SLC = 'SLC'
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A named part of a structure: ``word`` counts from 0; ``bit`` is None for a word."""
-
-    word: int
-    bit: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """
-    How the elements of a file are built.
-
-    ``words`` is 16-bit words per element as addresses count them; ``plc5_words`` is what a
-    PLC-5 typed read returns for one (its timers carry two internal words behind the three).
-    ``default_file`` is None where an address must give the file number. ``slc_code`` is the
-    file type of the SLC commands (M 7-17; 8D, 8E, 8F, 91 from practice), ``plc5_id`` the data
-    type of the typed commands (M 7-28). ``control_words`` are words that the processor keeps.
-    """
-
-    words: int = 1
-    default_file: int | None = None
-    slc_code: int | None = None
-    plc5_id: int | None = 4
-    plc5_words: int | None = None
-    members: dict[str, Member] = field(default_factory=dict)
-    control_words: frozenset[int] = frozenset()
-
-
-def _structure(flags: dict[str, int], second: str, third: str) -> dict[str, Member]:
-    words = {'CON': Member(0), second: Member(1), third: Member(2)}
-    return words | {name: Member(0, bit) for name, bit in flags.items()}
-
-
-_CONTROL = frozenset((0,))
-_TIMER = _structure({'EN': 15, 'TT': 14, 'DN': 13}, 'PRE', 'ACC')
-_COUNTER = _structure(
-    {'CU': 15, 'CD': 14, 'DN': 13, 'OV': 12, 'UN': 11, 'UA': 10}, 'PRE', 'ACC')
-_CONTROL_BLOCK = _structure(
-    {'EN': 15, 'EU': 14, 'DN': 13, 'EM': 12, 'ER': 11, 'UL': 10, 'IN': 9, 'FD': 8},
-    'LEN', 'POS')
 
 
 class FileType(Enum):
@@ -88,11 +48,15 @@ class FileType(Enum):
     ASCII = 'A'
     BCD = 'D'
     LONG = 'L'
+    PID = 'PD'
+    MESSAGE = 'MG'
+    BLOCK_TRANSFER = 'BT'
+    SFC_STATUS = 'SC'
 
     @property
-    def layout(self) -> Layout:
-        """Return how the elements of such a file are built."""
-        return _LAYOUTS[self]
+    def default_file(self) -> int | None:
+        """Return the file that is meant without a number (S0), None where there is none."""
+        return _DEFAULT_FILES.get(self)
 
     @property
     def is_io(self) -> bool:
@@ -101,29 +65,108 @@ class FileType(Enum):
 
     @property
     def is_structure(self) -> bool:
-        """Tell whether elements are made of a control word and two values."""
-        return bool(self.layout.control_words)
+        """Tell whether elements are made of words that mean different things."""
+        return self in _STRUCTURES
 
     @property
     def has_bits(self) -> bool:
         """Tell whether single bits of such a file can be addressed."""
-        return self.layout.words == 1 or self.is_structure
+        return self not in (FileType.FLOAT, FileType.LONG, FileType.STRING)
 
 
-_LAYOUTS = {
-    FileType.OUTPUT: Layout(default_file=0, slc_code=0x8B),
-    FileType.INPUT: Layout(default_file=1, slc_code=0x8C),
-    FileType.STATUS: Layout(default_file=2, slc_code=0x84),
-    FileType.BINARY: Layout(default_file=3, slc_code=0x85),
-    FileType.TIMER: Layout(3, 4, 0x86, 5, 5, _TIMER, _CONTROL),
-    FileType.COUNTER: Layout(3, 5, 0x87, 6, 3, _COUNTER, _CONTROL),
-    FileType.CONTROL: Layout(3, 6, 0x88, 7, 3, _CONTROL_BLOCK, _CONTROL),
-    FileType.INTEGER: Layout(default_file=7, slc_code=0x89),
-    FileType.FLOAT: Layout(2, 8, 0x8A, 8, 2),
-    FileType.STRING: Layout(42, None, 0x8D, 3, 42),
-    FileType.ASCII: Layout(slc_code=0x8E),
-    FileType.BCD: Layout(slc_code=0x8F),
-    FileType.LONG: Layout(2, None, 0x91, None),
+_DEFAULT_FILES = {
+    FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, FileType.BINARY: 3,
+    FileType.TIMER: 4, FileType.COUNTER: 5, FileType.CONTROL: 6, FileType.INTEGER: 7,
+    FileType.FLOAT: 8}
+_STRUCTURES = (
+    FileType.TIMER, FileType.COUNTER, FileType.CONTROL, FileType.PID, FileType.MESSAGE,
+    FileType.BLOCK_TRANSFER, FileType.SFC_STATUS)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """
+    How the elements of a file are built in one family.
+
+    ``words`` is 16-bit words per element as addresses count them. ``code`` is what commands
+    call the file: the data type of a PLC-5 (M 7-28; PD, MG, SC, BT from practice), the file
+    type of an SLC (M 7-17; 8D and above from practice), 0 where they do not name it.
+    ``typed_words`` is what a typed read of a PLC-5 returns for an element, where that is not
+    ``words``. ``members`` are empty unless the file type is a structure.
+    """
+
+    words: int = 1
+    code: int = 0
+    members: Members = field(default_factory=dict)
+    typed_words: int | None = None
+
+    @property
+    def wire_words(self) -> int:
+        """Return the words of an element in the data of a typed command."""
+        return self.typed_words or self.words
+
+    def value_words(self, word: int) -> int:
+        """Return the words of the value that begins at ``word``, 0 within a float32."""
+        for member in self.members.values():
+            if member.words == 2 and 0 <= word - member.word < 2:
+                return 0 if word > member.word else 2
+        return 1
+
+    def may_write(self, word: int, bit: int | None = None) -> bool:
+        """Tell whether a word of an element, or a bit of it, may be written from outside."""
+        parts = [member for member in self.members.values() if member.writable
+                 and member.word <= word < member.word + member.words]
+        return not self.members or any(part.bit in (None, bit) for part in parts)
+
+
+_INTEGER, _BYTES = 4, 3
+_LAYOUTS: dict[PlcType, dict[FileType, Layout]] = {
+    PlcType.PLC2: {FileType.BINARY: Layout()},
+    PlcType.PLC3: {kind: Layout() for kind in (
+        FileType.OUTPUT, FileType.INPUT, FileType.INTEGER, FileType.BCD, FileType.BINARY,
+        FileType.ASCII, FileType.STATUS)} | {
+        FileType.TIMER: Layout(3, members=members.PLC3_TIMER),
+        FileType.COUNTER: Layout(3, members=members.PLC3_COUNTER)},
+    PlcType.PLC5: {kind: Layout(code=_INTEGER) for kind in (
+        FileType.OUTPUT, FileType.INPUT, FileType.STATUS, FileType.BINARY, FileType.INTEGER,
+        FileType.ASCII, FileType.BCD)} | {
+        # The two words behind ACC are internal and have no address.
+        FileType.TIMER: Layout(3, 5, members.TIMER, typed_words=5),
+        FileType.COUNTER: Layout(3, 6, members.COUNTER),
+        FileType.CONTROL: Layout(3, 7, members.CONTROL),
+        FileType.FLOAT: Layout(2, 8),
+        FileType.STRING: Layout(42, _BYTES),
+        FileType.PID: Layout(82, 0x15, members.PLC5_PID),
+        FileType.MESSAGE: Layout(56, 0x16, members.PLC5_MESSAGE),
+        FileType.SFC_STATUS: Layout(3, 0x1D, members.PLC5_SFC),
+        FileType.BLOCK_TRANSFER: Layout(6, 0x20, members.PLC5_BLOCK_TRANSFER)},
+    PlcType.SLC: {
+        FileType.OUTPUT: Layout(code=0x8B),
+        FileType.INPUT: Layout(code=0x8C),
+        FileType.STATUS: Layout(code=0x84),
+        FileType.BINARY: Layout(code=0x85),
+        FileType.TIMER: Layout(3, 0x86, members.TIMER),
+        FileType.COUNTER: Layout(3, 0x87, members.COUNTER),
+        FileType.CONTROL: Layout(3, 0x88, members.CONTROL),
+        FileType.INTEGER: Layout(code=0x89),
+        FileType.FLOAT: Layout(2, 0x8A),
+        FileType.STRING: Layout(42, 0x8D),
+        FileType.ASCII: Layout(code=0x8E),
+        FileType.BCD: Layout(code=0x8F),
+        FileType.LONG: Layout(2, 0x91),
+        FileType.MESSAGE: Layout(25, 0x92, members.SLC_MESSAGE),
+        FileType.PID: Layout(23, 0x93, members.SLC_PID)},
 }
 
-BY_SLC_CODE = {kind.layout.slc_code: kind for kind in FileType}
+
+def file_types_of(plc_type: PlcType) -> tuple[FileType, ...]:
+    """Return the file types that a family can have."""
+    return tuple(kind for kind in FileType if kind in _LAYOUTS[plc_type])
+
+
+def layout_of(file_type: FileType, plc_type: PlcType) -> Layout:
+    """Return how elements of such a file are built; KeyError where the family has none."""
+    return _LAYOUTS[plc_type][file_type]
+
+
+BY_SLC_CODE = {layout.code: kind for kind, layout in _LAYOUTS[PlcType.SLC].items()}

@@ -22,21 +22,47 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.fields import number, Reader, word
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.typed_data import TypedData
+from abdf1_ros.pccc.typed_data import FLOAT, INTEGER, TypedData
 
 CMD = 0x0F
 READ_MODIFY_WRITE = 0x26
 TYPED_WRITE = 0x67
 TYPED_READ = 0x68
 
-# What a reply may carry is 240 bytes of descriptor and data, what a write may carry the same
-# with the address (M 7-28, 7-30). 220 bytes of data fit both with the longest of all.
-MAX_DATA = 220
+# What a reply may carry is 240 bytes of descriptors and data, what a write may carry the same
+# with the address (M 7-28, 7-30).
 MAX_REPLY = 240
+MAX_WRITE = 240
+MAX_INTEGERS = 110  # 118 would fit, but without room for descriptors that are padded
+# Mask and area, file and element in three bytes each (M 13-10..13-12).
+MAX_ELEMENT_ADDRESS = 8
 
 _AREA, _FILE, _ELEMENT, _SUB_ELEMENT = 1, 2, 4, 8
 _ASCII_PREFIX = b'\x00$'
 _MAX_SETS = 243
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """
+    What a typed command counts.
+
+    ``type_id`` is its data type (M 7-29), ``wire_size`` its bytes on the line, ``size`` those
+    of them that have an address.
+    """
+
+    type_id: int
+    wire_size: int
+    size: int
+
+
+def element_of(address: Address, is_value: bool) -> Element:
+    """Return what is moved at ``address``: one value of a structure, or whole elements."""
+    layout = address.layout
+    if not is_value:
+        return Element(layout.code, 2 * layout.wire_words, 2 * layout.words)
+    is_float = layout.value_words(address.word) == 2
+    return Element(FLOAT, 4, 4) if is_float else Element(INTEGER, 2, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +93,9 @@ class SystemAddress:
         area = reader.number() if mask & _AREA else 0
         if area:
             raise FormatError(f'memory area {area} is not the data table')
-        file = reader.number() if mask & _FILE else 0
+        if not mask & _FILE:  # M 13-10..13-15 take it for 1, other drivers for 0
+            raise FormatError(f'address mask {mask:02X} names no file')
+        file = reader.number()
         element = reader.number() if mask & _ELEMENT else 0
         return cls(file, element, reader.number() if mask & _SUB_ELEMENT else None)
 
@@ -162,14 +190,21 @@ class ReadModifyWrite:
     def encode(self) -> bytes:
         """Return FNC and parameters; FormatError when they are more than 243 bytes."""
         body = b''.join(entry.encode() for entry in self.sets)
-        if len(body) > _MAX_SETS:
-            raise FormatError(f'{len(body)} bytes of words to modify, {_MAX_SETS} are allowed')
+        _check_sets(body)
         return bytes((READ_MODIFY_WRITE,)) + body
 
     @classmethod
     def read(cls, reader: Reader) -> ReadModifyWrite:
-        """Take the parameters off ``reader``."""
+        """Take the parameters off ``reader``; FormatError when they are more than 243 bytes."""
+        body = reader.rest()
+        _check_sets(body)
+        reader = Reader(body)
         sets = [BitSet.read(reader)]
         while not reader.is_empty:
             sets.append(BitSet.read(reader))
         return cls(tuple(sets))
+
+
+def _check_sets(body: bytes) -> None:
+    if len(body) > _MAX_SETS:
+        raise FormatError(f'{len(body)} bytes of words to modify, {_MAX_SETS} are allowed')

@@ -15,8 +15,9 @@
 """
 The commands of an SLC 500 or MicroLogix: protected typed logical read and write (M 7-17, 7-18).
 
-All with three address fields: file number, file type, element, and sub-element, the word
-inside an element at which the data begin.
+Their address is file number, file type, element, and sub-element, the word inside an element at
+which the data begin. A1 and A9 are read and write without the sub-element; they are older than
+the manual and in use still (1756-PM020).
 """
 
 from __future__ import annotations
@@ -24,9 +25,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.pccc.fields import number, Reader, word
+from abdf1_ros.pccc.file_types import FileType
 
 CMD = 0x0F
+SHORT_READ = 0xA1
 LOGICAL_READ = 0xA2
+SHORT_WRITE = 0xA9
 LOGICAL_WRITE = 0xAA
 MASKED_WRITE = 0xAB
 
@@ -34,63 +38,75 @@ MASKED_WRITE = 0xAB
 MAX_READ = 236
 MAX_WRITE = 234
 
+# The words of the whole output and input image, whatever their slots; not in the manual, which
+# reserves these types, but what SLC 5/05 answer.
+FLAT_CODES = {FileType.OUTPUT: 0x82, FileType.INPUT: 0x83}
+BY_FLAT_CODE = {code: kind for kind, code in FLAT_CODES.items()}
+
 
 @dataclass(frozen=True, slots=True)
 class LogicalAddress:
-    """File number, file type code (M 7-17), element, and word inside the element."""
+    """
+    File number, file type code (M 7-17), element, and word inside the element.
+
+    ``sub_element`` is None in the short commands, which begin at the first word.
+    """
 
     file: int
     type_code: int
     element: int
-    sub_element: int
+    sub_element: int | None
 
     def encode(self) -> bytes:
-        """Return the four fields."""
-        return (number(self.file) + bytes((self.type_code,)) + number(self.element)
-                + number(self.sub_element))
+        """Return the fields."""
+        fields = number(self.file) + bytes((self.type_code,)) + number(self.element)
+        return fields if self.sub_element is None else fields + number(self.sub_element)
 
     @classmethod
-    def read(cls, reader: Reader) -> LogicalAddress:
-        """Take the four fields off ``reader``."""
-        return cls(reader.number(), reader.byte(), reader.number(), reader.number())
+    def read(cls, reader: Reader, is_short: bool = False) -> LogicalAddress:
+        """Take the fields off ``reader``."""
+        file, type_code, element = reader.number(), reader.byte(), reader.number()
+        return cls(file, type_code, element, None if is_short else reader.number())
 
 
 @dataclass(frozen=True, slots=True)
 class LogicalRead:
-    """Protected typed logical read, 0F/A2 (M 7-17); ``size`` is bytes, 1-255."""
+    """Protected typed logical read, 0F/A2 (M 7-17) or A1; ``size`` is bytes, 1-255."""
 
     address: LogicalAddress
     size: int
 
     def encode(self) -> bytes:
         """Return FNC and parameters."""
-        return bytes((LOGICAL_READ, self.size)) + self.address.encode()
+        function = SHORT_READ if self.address.sub_element is None else LOGICAL_READ
+        return bytes((function, self.size)) + self.address.encode()
 
     @classmethod
-    def read(cls, reader: Reader) -> LogicalRead:
+    def read(cls, reader: Reader, is_short: bool = False) -> LogicalRead:
         """Take the parameters off ``reader``."""
         size = reader.byte()
-        address = LogicalAddress.read(reader)
+        address = LogicalAddress.read(reader, is_short)
         reader.end()
         return cls(address, size)
 
 
 @dataclass(frozen=True, slots=True)
 class LogicalWrite:
-    """Protected typed logical write, 0F/AA (M 7-18)."""
+    """Protected typed logical write, 0F/AA (M 7-18) or A9."""
 
     address: LogicalAddress
     data: bytes
 
     def encode(self) -> bytes:
         """Return FNC and parameters."""
-        return bytes((LOGICAL_WRITE, len(self.data))) + self.address.encode() + self.data
+        function = SHORT_WRITE if self.address.sub_element is None else LOGICAL_WRITE
+        return bytes((function, len(self.data))) + self.address.encode() + self.data
 
     @classmethod
-    def read(cls, reader: Reader) -> LogicalWrite:
+    def read(cls, reader: Reader, is_short: bool = False) -> LogicalWrite:
         """Take the parameters off ``reader``."""
         size = reader.byte()
-        address = LogicalAddress.read(reader)
+        address = LogicalAddress.read(reader, is_short)
         return cls(address, _sized(reader, size))
 
 

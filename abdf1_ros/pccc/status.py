@@ -36,6 +36,9 @@ _ADDRESS_FAULTS = (
     EXT_ILLEGAL_FIELD, EXT_TOO_MANY_LEVELS, EXT_BAD_ADDRESS, EXT_WRONG_SIZE, EXT_TOO_LARGE,
     EXT_DELETED_AREA, EXT_TYPE_MISMATCH)
 
+# Behind these stands the address of the node that owns the file or program (M 8-5).
+_WITH_OWNER = (0x1A, 0x1B)
+
 _LOCAL = {
     0x01: 'destination has no buffer space',
     0x02: 'destination does not acknowledge, delivery not guaranteed',
@@ -89,7 +92,7 @@ _EXTENDED = {
     0x17: 'type mismatch',
     0x18: 'bad response from the module',
     0x19: 'duplicate label',
-    0x1A: 'file is open, another node owns it',
+    0x1A: 'file is open, owned by another node',
     0x1B: 'program is owned by another node',
     0x1E: 'data table element is protected',
     0x1F: 'temporary internal problem',
@@ -119,7 +122,10 @@ def check_status(reply: Packet) -> bytes:
         return reply.data
     extended = reply.sts & EXTENDED == EXTENDED and len(reply.data) > 0
     ext_sts = reply.data[0] if extended else None
-    raise RemoteError(reply.sts, ext_sts, status_text(reply.sts, ext_sts))
+    text = status_text(reply.sts, ext_sts)
+    if ext_sts in _WITH_OWNER and len(reply.data) > 1:
+        text += f' ({reply.data[1]})'
+    raise RemoteError(reply.sts, ext_sts, text)
 
 
 def is_address_fault(error: RemoteError) -> bool:

@@ -65,13 +65,15 @@ class TypedData:
         """
         Read an array or a bare element, in every legal form.
 
-        Bytes behind the declared size of an array are passed over: some devices pad. Raises
-        FormatError for anything else that does not add up.
+        Padding behind the declared size of an array is passed over. Raises FormatError for
+        anything else that does not add up.
         """
         reader = Reader(parameter)
         type_id, size = _read_descriptor(reader)
         if type_id == ARRAY:
-            reader = Reader(reader.take(size))
+            array = reader.take(size)
+            reader.end()
+            reader = Reader(array)
             type_id, size = _read_descriptor(reader)
         data = reader.rest()
         if size == 0 or len(data) % size:

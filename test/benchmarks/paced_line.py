@@ -18,23 +18,30 @@ A line for benchmarks: two pseudo-terminals, paced as a port of that speed would
 Between them a thread for each direction hands on every byte at the moment it would have left
 the port (10 bits a character). ``measure`` runs the driver at one end against simulated
 stations at the other, and counts what it does in a time.
+
+``answering_line`` is for measuring the driver alone: line and stations are one process, which
+knows what it will answer while the question is still "on the line". So its answers begin at
+the exact time, and all that is lost is lost by the driver and the operating system.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass
 import math
 import os
 import select
+import signal
 import threading
 import time
 import tty
 
+from abdf1_ros.df1.frames import ACK, Duplex
 from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.df1.stations import Station
+from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Command, Mapping
@@ -117,6 +124,20 @@ def simulated(station: int, network: Network, delay: float = 0.0) -> SimulatedPl
     return plc
 
 
+def far_end(network: Network, station: int, mappings: Sequence[Mapping]) -> Machine:
+    """Return a PLC that has all words of ``mappings`` and answers at once."""
+    table = DataTable(mappings[0].plc_type)
+    for mapping in mappings:
+        table.create(mapping.address, mapping.codec.words)
+    plc = SimulatedPlc(station, table, network.checksum, time.monotonic)
+    if network.duplex is Duplex.HALF:
+        return Machine(multidrop([plc]), checksum=network.checksum)
+    return Machine(
+        lambda machine: FullDuplexPeer(
+            machine, PeerSettings(network.checksum), ActiveStationList(), plc.serve).run(plc),
+        checksum=network.checksum, duplex=Duplex.FULL)
+
+
 @dataclass(frozen=True, slots=True)
 class Measured:
     """What a run has shown: per second, in seconds, and counts."""
@@ -155,6 +176,99 @@ def paced_line(near: Machine, far: Machine, baud: int,
         for wire in wires:
             wire.stopping = True
             wire.join()
+
+
+class _AnsweringLine:
+    """
+    A half-duplex line, or two wires, with ``far`` at its other end, on ``descriptor``.
+
+    Each answer begins ``response_time`` s after the last character of what it answers. Where
+    it is allowed to, the process runs before all others, as the hardware it stands for does.
+    """
+
+    # A process that sleeps comes back late by up to this; the rest of a wait it stays awake.
+    _LATE = 0.0002
+    # Bytes that a UART hands over at a time.
+    _CHUNK = 8
+
+    def __init__(self, descriptor: int, far: Machine, char_time: float,
+                 response_time: float, sent: Callable[[bytes], None]) -> None:
+        self._descriptor = descriptor
+        self._sent = sent
+        self._far = far
+        self._char_time = char_time
+        self._response_time = response_time
+        self._free = 0.0
+
+    def run(self) -> None:
+        """Answer for ever."""
+        with suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+        self._far.start(time.monotonic())
+        while True:
+            deadline = self._far.deadline
+            timeout = None if deadline is None else max(0.0, deadline - time.monotonic())
+            if select.select([self._descriptor], [], [], timeout)[0]:
+                data = os.read(self._descriptor, 4096)
+                self._free = max(self._free, time.monotonic()) + len(data) * self._char_time
+                self._far.receive_data(data, self._free)
+            else:
+                self._far.handle_timeout(time.monotonic())
+            data = self._far.data_to_send()
+            if data:
+                self._send(data)
+                self._sent(data)
+
+    def _send(self, data: bytes) -> None:
+        if data.startswith(ACK) and len(data) > len(ACK):  # a peer's, and its reply behind it
+            self._send(ACK)
+            data = data[len(ACK):]
+        self._free += self._response_time
+        for at in range(0, len(data), self._CHUNK):
+            chunk = data[at:at + self._CHUNK]
+            self._free += len(chunk) * self._char_time
+            time.sleep(max(0.0, self._free - time.monotonic() - self._LATE))
+            while time.monotonic() < self._free:
+                pass
+            os.write(self._descriptor, chunk)
+
+
+@contextmanager
+def answering_line(near: Machine, far: Machine, baud: int,
+                   response_time: float = 0.0) -> Iterator[LinkThread]:
+    """Run ``near`` in a thread, on a line at whose end ``far`` answers, in another process."""
+    with answering_pty(far, BITS / baud, response_time) as ours:
+        link = LinkThread(near, lambda: DescriptorPort(ours, lambda: None))
+        link.start()
+        yield link
+        link.stop()
+
+
+@contextmanager
+def answering_pty(far: Machine, char_time: float, response_time: float = 0.0,
+                  sent: Callable[[bytes], None] = lambda data: None) -> Iterator[int]:
+    """
+    Give the near end of a line at whose other end ``far`` answers, in a process.
+
+    There ``sent`` is called with whatever has been sent.
+    """
+    theirs, ours = os.openpty()
+    tty.setraw(ours)
+    tty.setraw(theirs)
+    process = os.fork()
+    if process == 0:
+        try:
+            os.close(ours)
+            _AnsweringLine(theirs, far, char_time, response_time, sent).run()
+        finally:
+            os._exit(1)
+    os.close(theirs)
+    try:
+        yield ours
+    finally:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        os.close(ours)
 
 
 def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedPlc],

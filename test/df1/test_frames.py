@@ -22,12 +22,14 @@ from abdf1_ros.df1.frames import (
     Code,
     Control,
     Duplex,
+    ENQ,
     EOT,
     Fault,
     Frame,
     FrameDecoder,
     master_frame,
     MAX_LINK_DATA,
+    MAX_WAITING,
     message_frame,
     NAK,
     Poll,
@@ -351,6 +353,17 @@ def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: lis
             assert not isinstance(symbol, Frame) or len(symbol.data) <= MAX_LINK_DATA + 1
         assert len(decoder._buffer) <= 2  # a DLE, or one of two check bytes
         assert len(decoder._data) <= MAX_LINK_DATA + 1
+
+
+def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
+    decoder = FrameDecoder(CRC, Duplex.FULL)
+    for _ in range(40):
+        decoder.feed(ENQ * 1000)
+    assert len(decoder._buffer) == MAX_WAITING
+    assert decoder.noise == 80_000 - MAX_WAITING
+    assert drain(decoder) == [Control(Code.ENQ)] * (MAX_WAITING // 2)
+    decoder.feed(EOT)
+    assert drain(decoder) == [Control(Code.EOT)]
 
 
 @PROPERTY

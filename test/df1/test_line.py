@@ -31,7 +31,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -121,10 +122,11 @@ class Rig:
                 self._done = True
             yield Step(None, None)
 
-    def exchange(self, number: int, data: bytes) -> Outcome:
+    def exchange(self, number: int, request: Request) -> Outcome:
         """Carry out one transaction and return what became of it."""
+        cmd, data = request
         self._tns = self._tns + 1 & 0xFFFF
-        self._command = Packet(number, MASTER, 0x0F, 0, self._tns, data)
+        self._command = Packet(number, MASTER, cmd, 0, self._tns, data)
         self._done = False
         self.line.wake(self.machine)
         self.line.run(lambda: self._done, limit=60.0)
@@ -134,7 +136,7 @@ class Rig:
         """Read, write or modify some words of some station."""
         number = self.random.choice(list(FAMILIES))
         family = FAMILIES[number]
-        dialect = DIALECTS[family]
+        dialect = dialect_of(family)
         address = Address.parse(f'N7:{self.random.randrange(WORDS - 20)}', family)
         words = self.random.randint(1, 20)
         kind = self.random.randrange(3)
@@ -177,9 +179,9 @@ def assert_recovers(rig: Rig) -> None:
     for number, family in FAMILIES.items():
         was_active = rig.stations[number].active
         address = Address.parse('N7:0', family)
-        outcome = rig.exchange(number, DIALECTS[family].read(address, 20))
+        outcome = rig.exchange(number, dialect_of(family).read(address, 20))
         assert isinstance(outcome.result, Packet), f'station {number}, active: {was_active}'
-        data = DIALECTS[family].read_data(address, 20, outcome.result.data)
+        data = dialect_of(family).read_data(address, 20, outcome.result.data)
         assert data == rig.plcs[number].table.read(address, 20)
         assert rig.stations[number].active
 
@@ -217,7 +219,7 @@ def test_counters_of_both_ends_agree_on_a_clean_line(checksum: Checksum, chunk: 
 
 def test_clean_exchange_takes_the_time_of_its_characters() -> None:
     rig = Rig(propagation=0.0)
-    command = DIALECTS[PlcType.SLC].read(Address.parse('N7:0', PlcType.SLC), 1)
+    command = dialect_of(PlcType.SLC).read(Address.parse('N7:0', PlcType.SLC), 1)
     outcome = rig.exchange(2, command)
     # Command 21 characters, ACK 2, poll 4, reply 14; the TNS is 0F01, nothing is stuffed.
     assert rig.machine.counters.chars_sent == 21 + 4 + 2
@@ -226,14 +228,14 @@ def test_clean_exchange_takes_the_time_of_its_characters() -> None:
 
 def test_tx_delay_passes_before_command_poll_and_ack() -> None:
     rig = Rig(propagation=0.0, timing=LineTiming(char_time(BAUD), tx_delay=0.05))
-    command = DIALECTS[PlcType.SLC].read(Address.parse('N7:0', PlcType.SLC), 1)
+    command = dialect_of(PlcType.SLC).read(Address.parse('N7:0', PlcType.SLC), 1)
     outcome = rig.exchange(2, command)
     assert outcome.seconds == pytest.approx((21 + 2 + 4 + 14) * char_time(BAUD) + 3 * 0.05)
 
 
 def test_refused_command_counts_as_error_message_at_both_ends() -> None:
     rig = Rig()
-    command = DIALECTS[PlcType.SLC].read(Address.parse('N99:0', PlcType.SLC), 1)
+    command = dialect_of(PlcType.SLC).read(Address.parse('N99:0', PlcType.SLC), 1)
     result = rig.exchange(2, command).result
     assert isinstance(result, Packet)
     assert result.sts == 0x10
@@ -307,7 +309,7 @@ def test_dead_stations_come_back_by_a_probe() -> None:
     rig = Rig()
     rig.line.noise = Noise(lost=1.0)
     for number in FAMILIES:
-        first, second = (rig.exchange(number, b'\x00') for _ in range(2))
+        first, second = (rig.exchange(number, (0x0F, b'\x00')) for _ in range(2))
         assert isinstance(first.result, StationInactive)
         assert isinstance(second.result, StationInactive)
         assert first.seconds > 4 * 0.1 and second.seconds < 0.11

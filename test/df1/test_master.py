@@ -23,7 +23,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame, STX
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings, MIN_RESPONSE_TIME
+from abdf1_ros.df1.master_line import MasterSettings, MIN_RESPONSE_TIME, MOST_QUEUED
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
 import pytest
@@ -369,9 +369,26 @@ def test_command_timeout_is_not_early() -> None:
 
 def test_command_timeout_by_stale_messages() -> None:
     script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
-    error = script.run(COMMAND, SENT, Answer(ACK), POLLED, says(STALE), Expect(ACK + NAK))
+    stale = [replace(REPLY, tns=0x0090 + n) for n in range(MOST_QUEUED + 1)]
+    steps = [step for packet in stale for step in (POLLED_AGAIN, says(packet), ACKED)][1:-1]
+    error = script.run(COMMAND, SENT, Answer(ACK), POLLED, *steps, Expect(ACK + NAK))
     assert isinstance(error, CommandTimeout)
-    assert script.numbers() == [(2510, SLAVE, MASTER, 0x0101), (2508,)]
+    assert script.numbers() == [
+        *((2510, SLAVE, MASTER, packet.tns) for packet in stale), (2508,)]
+
+
+def test_reply_behind_stale_messages_is_taken_even_after_the_command_timeout() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
+    assert script.run(COMMAND, SENT, Answer(ACK), POLLED, says(STALE), ACKED, POLLED_AGAIN,
+                      SAYS_REPLY, ACKED) == REPLY
+    assert 'command_timeouts' not in script.counts()
+
+
+def test_eot_behind_stale_messages_ends_a_command_whose_time_is_up() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
+    error = script.run(COMMAND, SENT, Answer(ACK), POLLED, says(STALE), ACKED, POLLED_AGAIN,
+                       SAYS_EOT, NAKED)
+    assert isinstance(error, CommandTimeout)
 
 
 def test_reply_at_the_last_poll_is_taken_even_after_the_command_timeout() -> None:

@@ -20,7 +20,12 @@ from dataclasses import replace
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import master_frame
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS
+from abdf1_ros.df1.master_line import (
+    BROADCAST_PAUSE,
+    MasterSettings,
+    MAX_FORWARDS,
+    MAX_KEPT,
+)
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
@@ -323,4 +328,46 @@ def test_station_is_brought_back_by_a_message_for_it(standard: bool) -> None:
     rig.start(8)
     poll(rig, 7)
     assert rig[8].served == [command]
-    assert rig.master.changes == [(8, True)]
+    assert rig.master.stations[8].active
+
+
+@BOTH
+@pytest.mark.parametrize('is_there', [False, True])
+def test_station_that_a_message_names_is_no_station_of_ours(
+        standard: bool, is_there: bool) -> None:
+    rig = bench(standard, 7)
+    if is_there:
+        rig.slaves[8] = type(rig[7])(8, rig.clock)
+        rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+    for number in range(8, 255):
+        rig.message(7, number)
+    rig.start()
+    outcomes = {(number, 2) for number in range(9, 255)}
+    if not is_there:
+        outcomes.add((8, 2))
+    elif not standard:  # which never polls a station outside of its lists for the reply
+        outcomes.add((8, 0))
+    while len(rig[7].heard) < len(outcomes) and rig.clock() < 200.0:
+        rig.ask(7)
+        rig.run(0.5)
+    assert {(reply.src, reply.sts) for reply in rig[7].heard} == outcomes
+    assert [station.number for station in rig.master.stations] == [7]
+    assert rig.master.stations.words() == [1 << 7, *[0] * 15]
+    assert rig.master.changes == []
+
+
+def test_replies_to_nothing_are_not_kept_without_end() -> None:
+    settings = replace(SETTINGS, nak_on_command_timeout=False, cmd_timeout=4.0)
+    rig = bench(False, 7, 8, dead=(8,), settings=settings)
+    for tns in range(200):
+        rig[7].outbox.append(Packet(8, 7, 0x4F, 0, tns))
+    rig.start()
+    # The reply that the master polls for never comes, by taking away the turn of replies.
+    rig[7].slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
+    rig.ask(7)
+    rig.run(3.9)
+    received = rig.master.counts()['replies_received']
+    assert received > MAX_KEPT
+    assert len(rig.master.link._line._forwards) == MAX_KEPT
+    assert rig.master.counts()['invalid_messages'] == received - MAX_KEPT
+    assert (2510, 7, 8, MAX_KEPT) in rig.master.numbers()

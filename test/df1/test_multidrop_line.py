@@ -28,7 +28,7 @@ from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -40,7 +40,7 @@ MASTER, SLAVES, ASKING = 5, (1, 2, 16), (1, 2)
 BAUD = 19200
 WORDS = 40
 FAMILY = PlcType.SLC
-DIALECT = DIALECTS[FAMILY]
+DIALECT = dialect_of(FAMILY)
 MODES = {
     'message': None,
     'single': PollingSettings(SLAVES),
@@ -93,13 +93,13 @@ class Rig:
         """Queue a random read or write from one node to another."""
         address = Address.parse(f'N7:{self.random.randrange(WORDS - 12)}', FAMILY)
         words = self.random.randint(1, 12)
-        body = DIALECT.read(address, words)
+        cmd, body = DIALECT.read(address, words)
         if self.random.random() < 0.5:
-            body = DIALECT.write(address, bytes(
+            cmd, body = DIALECT.write(address, bytes(
                 self.random.choice((0x00, 0x10, 0x55, 0xFF)) for _ in range(2 * words)))
         self.tns[src] = self.tns[src] + 1 & 0xFFFF
         node: Errands = self.nodes[src]
-        errand = node.add(Packet(dst, src, DIALECT.cmd, 0, self.tns[src], body))
+        errand = node.add(Packet(dst, src, cmd, 0, self.tns[src], body))
         if src == MASTER:
             self.line.wake(self.master.machine)
         return errand

@@ -247,16 +247,11 @@ def test_late_ack_of_an_overtaking_reply_does_not_acknowledge_the_next_message()
     assert said[1][1] == ENQ
 
 
-@pytest.mark.parametrize('disturbance', ['silence', 'nak'])
-def test_late_responses_after_a_retry_do_not_acknowledge_the_next_message(
-        disturbance: str) -> None:
+def test_late_responses_after_an_enquiry_do_not_acknowledge_the_next_message() -> None:
     peer = bench()
     peer.begin(COMMAND)
-    message = peer.said()
-    if disturbance == 'nak':
-        assert peer.hear(NAK) == message
-    else:
-        assert peer.wait(1.0) == [(1.0, ENQ)]
+    peer.said()
+    assert peer.wait(1.0) == [(1.0, ENQ)]
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
     peer.begin(later(COMMAND, 1))
@@ -266,6 +261,19 @@ def test_late_responses_after_a_retry_do_not_acknowledge_the_next_message(
     assert peer.wait(0.2) == [(0.1, peer.frame(later(COMMAND, 1)))]
     assert peer.wait(1.0) == [(0.9, ENQ)]
     assert peer.counts()['acks_received'] == 2
+
+
+def test_next_message_does_not_wait_long_after_a_nak() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    message = peer.said()
+    assert peer.hear(NAK) == message
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    peer.begin(later(COMMAND, 1))
+    assert peer.wait(0.09) == []
+    assert peer.hear(ACK) == b''  # to a NAK that only noise had made of the first ACK
+    assert peer.wait(0.02) == [(0.01, peer.frame(later(COMMAND, 1)))]
 
 
 def test_late_responses_after_a_failure_do_not_acknowledge_the_next_message() -> None:

@@ -27,7 +27,7 @@ from abdf1_ros.df1.peer import PeerSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -71,21 +71,21 @@ class End(PeerNode):
 
     def ask(self, other: End, count: int) -> None:
         """Queue as many random reads and writes of the other end's words."""
-        dialect = DIALECTS[other.table.plc_type]
+        dialect = dialect_of(other.table.plc_type)
         for _ in range(count):
             start = other.place(self._random.randrange(WORDS - 20))
             words = self._random.randint(1, 20)
             kind = self._random.randrange(3)
             if kind == 0:
-                body = dialect.read(start, words)
+                cmd, body = dialect.read(start, words)
             elif kind == 1:
-                body = dialect.write(start, bytes(
+                cmd, body = dialect.write(start, bytes(
                     self._random.choice((0x00, 0x10, 0x55, 0xFF)) for _ in range(2 * words)))
             else:
-                body = dialect.write_bits(
+                cmd, body = dialect.write_bits(
                     start, self._random.getrandbits(16), self._random.getrandbits(16))
             self._tns = self._tns + 1 & 0xFFFF
-            self.all.append(self.add(Packet(other.number, self.number, 0x0F, 0, self._tns, body)))
+            self.all.append(self.add(Packet(other.number, self.number, cmd, 0, self._tns, body)))
 
 
 class Rig:
@@ -163,13 +163,13 @@ def assert_recovers(rig: Rig) -> None:
     rig.line.noise = QUIET
     rig.line.run_for(1.0)
     for asking, serving in rig.both():
-        body = DIALECTS[serving.table.plc_type].read(serving.place(0), 20)
+        cmd, body = dialect_of(serving.table.plc_type).read(serving.place(0), 20)
         tns = asking.all[-1].command.tns + 1 & 0xFFFF
-        errand = asking.add(Packet(serving.number, asking.number, 0x0F, 0, tns, body))
+        errand = asking.add(Packet(serving.number, asking.number, cmd, 0, tns, body))
         rig.line.wake(asking.machine)
         rig.line.run(lambda errand=errand: errand.result is not None, rig.bound())
         assert isinstance(errand.result, Packet)
-        data = DIALECTS[serving.table.plc_type].read_data(
+        data = dialect_of(serving.table.plc_type).read_data(
             serving.place(0), 20, errand.result.data)
         assert data == serving.table.read(serving.place(0), 20)
         assert asking.stations[serving.number].active

@@ -20,7 +20,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MOST_QUEUED
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings, StandardPollingMaster
 from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
@@ -342,6 +342,33 @@ def test_reply_that_comes_after_its_time_is_stale() -> None:
     assert isinstance(errand.result, CommandTimeout)
     assert rig.master.counts()['stale_messages'] == 1
     assert rig.master.numbers() == [(2508,), (2510, 1, 5, errand.command.tns)]
+
+
+def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
+    rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, cmd_timeout=0.001))
+    rig[1].delay = 0.1  # the first reply comes late, on a line too slow for Cmd_Timeout
+    errands = [rig.ask(1) for _ in range(4)]
+    rig.start()
+    rig.line.run(lambda: ended(errands[0]), 2.0)
+    assert isinstance(errands[0].result, CommandTimeout)
+    rig[1].delay = 0.0
+    rig.run(1.0)
+    assert [errand.result for errand in errands[1:]] == [
+        errand.command.reply() for errand in errands[1:]]
+    assert rig.master.counts()['stale_messages'] == 1
+
+
+def test_station_that_never_stops_sending_does_not_hold_off_the_command_timeout() -> None:
+    rig = bench(PollingSettings((1,)), settings=replace(SETTINGS, cmd_timeout=0.001))
+    setattr(rig[1], '_execute', lambda command: replace(command.reply(), tns=0))
+    errand = rig.ask(1)
+    for _ in range(3 * MOST_QUEUED):
+        rig.message(1, 5)
+    rig.start()
+    rig.run(2.0)
+    assert isinstance(errand.result, CommandTimeout)
+    polled = [when for when in rig.master.times('P1') if when <= (errand.ended or 0.0)]
+    assert len(polled) == MOST_QUEUED + 1
 
 
 def test_next_command_may_leave_after_a_timeout() -> None:

@@ -28,11 +28,27 @@ def test_every_station_counts_as_active_at_start() -> None:
     assert [(station.number, station.active) for station in stations] == [(3, True), (9, True)]
 
 
-def test_station_is_taken_into_the_list_at_its_first_use() -> None:
+def test_stations_can_be_added() -> None:
     stations = ActiveStationList([9])
+    stations.lost(9, 1.0)
+    stations.lost(7, 1.0)
+    stations.add([3, 7, 9])
+    assert [(entry.number, entry.active) for entry in stations] == [
+        (3, True), (7, False), (9, False)]
+
+
+def test_station_outside_of_the_list_has_a_record_and_no_place_in_it() -> None:
+    told: list[Station] = []
+    stations = ActiveStationList([9], told.append)
     station = stations[3]
     assert station.active and stations[3] is station
-    assert [entry.number for entry in stations] == [3, 9]
+    stations.lost(3, 1.0)
+    assert not station.active
+    stations.heard(3, 2.0)
+    assert station.active and station.last_heard == 2.0
+    assert [entry.number for entry in stations] == [9]
+    assert stations.words()[0] == 1 << 9
+    assert told == []
 
 
 def test_changes_are_told_once() -> None:

@@ -190,6 +190,11 @@ def test_cell_that_is_much_too_long_is_refused(path: Path) -> None:
     assert problem.startswith('FILE: not a CSV file: field larger than field limit')
 
 
+def test_endless_file_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match='larger than 10 MB; is it a CSV file'):
+        read_rows('/dev/zero', KNOWN)
+
+
 @PROPERTY
 @given(content=st.one_of(
     st.binary(max_size=200),

@@ -17,11 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 import random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.forecast import block_time, longest_wait
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
@@ -29,6 +31,8 @@ from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES
 from abdf1_ros.driver.values import Values
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, store, stored
@@ -351,7 +355,8 @@ def test_unknown_when_the_reply_is_lost() -> None:
     bench.write(mapping, [1])
     bench.run(5.0)
     assert write_results(bench) == [
-        'unknown whether written: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
+        'unknown whether written: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive; '
+        'not read back: no row reads all of these words']
     assert stored(plc, 'N7:0') == b'\1\0'
 
 
@@ -363,15 +368,17 @@ def test_unknown_when_the_reply_does_not_come_in_time() -> None:
     bench.write(mapping, [1])
     bench.run(5.0)
     assert write_results(bench) == [
-        'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed Out']
+        'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed Out; '
+        'not read back: no row reads all of these words']
     assert bench.driver.stations[1].active
 
 
 def test_unknown_when_no_acknowledgement_comes() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
-    bench.far.say = lambda data: b''
     bench.open()
+    bench.run(0.5)
+    bench.far.say = lambda data: b''
     bench.write(mapping, [1])
     bench.run(5.0)
     assert bench.listener.outcomes() == [Outcome.UNKNOWN]
@@ -382,9 +389,11 @@ def test_unknown_when_the_port_is_lost_on_the_way() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
     bench.open()
+    bench.run(0.5)
     bench.write(mapping, [1])
     bench.lose_port('unplugged')
-    assert write_results(bench) == ['unknown whether written: port lost: unplugged']
+    assert write_results(bench) == ['unknown whether written: port lost: unplugged; not read '
+                                    'back: no row reads all of these words']
     bench.open()
     bench.run(5.0)
     assert len(bench.listener.results) == 1
@@ -394,6 +403,7 @@ def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
     mapping, waiting = make_mapping('N7:0', 'Write'), make_mapping('N7:1', 'Write')
     bench, _ = make_bench(mapping, waiting)
     bench.open()
+    bench.run(0.5)
     bench.write(mapping, [1])
     bench.write(waiting, [1])
 
@@ -403,7 +413,8 @@ def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
     bench.lose_port('internal error')
     assert sorted(write_results(bench)) == [
         'not written: not sent: port lost: internal error, see the log',
-        'unknown whether written: port lost: internal error, see the log']
+        'unknown whether written: port lost: internal error, see the log; not read back: no row '
+        'reads all of these words']
     assert not bench.driver.is_online
 
 
@@ -500,8 +511,33 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     assert point.error == 'STS F0 EXT STS 07: file has the wrong size'
     assert bench.listener.reasons == [('N9:12', point.error)]
     assert all(bench.driver.points[mapping].error is None for mapping in good)
+    assert sorted(block.span.words for block in bench.driver.blocks) == [1, 6]
     assert any(block.mappings == (bad,) for block in bench.driver.blocks)
-    assert len(bench.driver.blocks) <= 4
+
+
+def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> None:
+    mappings = [make_mapping(f'N9:{n}', plc='SLC') for n in range(8)]
+    bench = DriverBench(mappings)
+    plc = bench.plc(1, 'SLC', ('N9:0', 6))
+    bench.run(2.0)
+    assert len(bench.driver.blocks) == 3
+    plc.table.create(Address.parse('N9:0', PlcType.SLC), 8)
+    bench.run(2.0)
+    assert len(bench.driver.blocks) == 1
+    assert all(point.error is None for point in bench.driver.points.values())
+
+
+def test_slow_mapping_that_is_read_with_fast_ones_is_published_at_its_own_pace() -> None:
+    fast, slow = make_mapping('N7:0', period=100), make_mapping('N7:1', 'ReadWrite', period=1000)
+    bench, _ = make_bench(fast, slow)
+    bench.open()
+    bench.run(5.05)
+    assert len(bench.driver.blocks) == 1
+    assert len(bench.listener.values(fast)) == 51
+    assert len(bench.listener.values(slow)) == 6
+    bench.write(slow, [5])
+    bench.run(0.1)
+    assert bench.listener.values(slow)[6:] == [[5]]
 
 
 def test_slc_that_refuses_an_address() -> None:
@@ -640,16 +676,6 @@ def test_transaction_number_never_repeats_the_last_of_a_station() -> None:
         plcs[0].commands + plcs[1].commands, key=lambda entry: entry[0])]
     assert numbers[:4] == [0xFFFE, 0xFFFF, 0, 1]
     assert len(set(numbers)) == len(numbers)
-
-
-def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> None:
-    bench = DriverBench([make_mapping()])
-    driver = bench.driver
-    first = driver._next_tns(1)
-    for _ in range(0xFFFF):
-        driver._next_tns(2)
-    assert driver._next_tns(1) == (first + 1) & 0xFFFF
-    assert driver._next_tns(2) != driver._next_tns(2)
 
 
 class BadStation:
@@ -802,8 +828,60 @@ def test_stale_time_follows_the_period_or_the_line() -> None:
     assert scan == pytest.approx(
         sum(block.line_time + 0.02 for block in bench.driver.blocks))
     assert 0.4 < scan < 1.0
-    assert bench.driver.points[fast].stale_time == pytest.approx(5 * scan)
-    assert bench.driver.points[slow].stale_time == 5.0
+    times = {block.period: block_time(block) for block in bench.driver.blocks}
+    needed = times[0.01] / 0.01 + times[1.0] / 1.0
+    longest = max(times.values())
+    assert bench.driver.points[fast].stale_time == pytest.approx(5 * 0.01 * needed + longest)
+    assert bench.driver.points[slow].stale_time == pytest.approx(5 * (1.0 + scan) + longest)
+
+
+def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:
+    fast = make_mapping('N7:0', period=200)
+    slow = [make_mapping(f'N{file}:0', length=20, period=20_000) for file in range(9, 39)]
+    bench, _ = make_bench(fast, *slow, stale_after=3.0, network=Network(baud=9600))
+    assert bench.driver.expected_scan_time > 2.5
+    wait = max(map(block_time, bench.driver.blocks))
+    assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + wait)
+    assert wait < 0.2
+    assert bench.driver.points[slow[0]].stale_time == pytest.approx(60 + wait)
+
+
+def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> None:
+    fast, slow = make_mapping('N7:0', period=200), make_mapping('N7:1', period=400)
+    bench, _ = make_bench(fast, slow, stale_after=3.0)
+    block, = bench.driver.blocks
+    assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + block_time(block))
+    assert bench.driver.points[slow].stale_time == pytest.approx(1.2 + block_time(block))
+
+
+def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
+    fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
+    bench, plc = make_bench(fast, long)
+    bench.open()
+    job, = (job for job in bench.driver._scheduler.jobs if job.block.mappings == (long,))
+    bench.run_until(lambda: job.is_under_way)  # while the fast one has the line
+    bench.lose_port()
+    store(plc, 'N7:0', [1] * 250)
+    bench.run(60.0)
+    bench.open()
+    bench.run(0.5)
+    values = bench.listener.values(long)
+    assert values and all(entry == [1] * 250 for entry in values)
+    assert (bench.driver.longest_scan_time or 0) < 1
+
+
+def test_long_block_lets_others_go_between_its_packets() -> None:
+    fast, long = make_mapping('N9:0', period=300), make_mapping('N7:0', length=250, period=3000)
+    bench, plc = make_bench(fast, long, network=Network(baud=9600, timeout=500))
+    store(plc, 'N7:0', list(range(250)))
+    bench.open()
+    bench.run(10.0)
+    times = bench.listener.times(fast)
+    gaps = [later - earlier for earlier, later in pairwise(times)]
+    assert bench.listener.values(long) == [list(range(250))] * 4
+    wait = longest_wait(bench.driver.blocks)
+    assert max(gaps) <= 0.3 + wait
+    assert 2 * wait < max(map(block_time, bench.driver.blocks))
 
 
 def test_default_period_is_a_setting() -> None:
@@ -827,8 +905,8 @@ def test_scan_time_is_close_to_the_expected_one_on_a_saturated_line(baud: int) -
     assert bench.driver.scan_time == pytest.approx(expected, rel=0.03, abs=0.002)
 
 
-def test_driver_without_reads_rests_until_a_write_comes() -> None:
-    mapping = make_mapping('N7:0', 'Write')
+def test_driver_without_stations_rests_until_a_write_comes() -> None:
+    mapping = make_mapping('N7:0', 'Write', station=255)
     bench, plc = make_bench(mapping)
     bench.open()
     assert bench.driver.machine.deadline is None

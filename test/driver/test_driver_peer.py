@@ -28,9 +28,12 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Freshness, Outcome
+from abdf1_ros.driver.scaling import Scaling
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Mode
 import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
@@ -38,22 +41,28 @@ from support.peers import Errand
 from support.virtual_line import Noise, QUIET, VirtualLine
 
 US, PLC = 5, 1
-FILES = (('N7:0', 256), ('F8:0', 64), ('B3:0', 16), ('N9:0', 20))
+FILES = (('N7:0', 256), ('B3:0', 16), ('N9:0', 20))
+FLOATS = (('F8:0', 64),)
 
 
 class Bench:
     """The driver at one end, a simulated PLC at the other."""
 
     def __init__(self, mappings: Sequence[Mapping], *, family: str = 'PLC5', check: str = 'CRC',
-                 outstanding: int = 1, chunk: int = 1, first_tns: int = 0) -> None:
+                 outstanding: int = 1, chunk: int = 1, first_tns: int = 0,
+                 processor_period: float = 0.0) -> None:
         self.network = Network(mode='Peer', plc_type=family, error_code=check, baud=19200,
                                timeout=300, cmd_timeout=500)
         self.listener = Recorder(self.clock)
         self.driver = Driver(
             self.network, mappings,
-            DriverSettings(max_outstanding=outstanding, first_tns=first_tns), self.listener)
-        self.plc = simulated_plc(PLC, family, self.clock, *FILES, checksum=check)
-        self.far = Machine(self._far_end, checksum=self.network.checksum, duplex=Duplex.FULL)
+            DriverSettings(max_outstanding=outstanding, first_tns=first_tns,
+                           processor_period=processor_period), self.listener)
+        files = FILES if family == 'PLC3' else FILES + FLOATS
+        self.plc = simulated_plc(PLC, family, self.clock, *files, checksum=check)
+        self.plc.be_full_duplex()
+        self.far = Machine(self._far_end, checksum=self.network.checksum, duplex=Duplex.FULL,
+                           counters=self.plc.counters)
         self.line = VirtualLine(self.driver.machine, self.far, baud=19200, chunk=chunk)
         self.said: list[str] = []
         self._family = PlcType(family)
@@ -87,11 +96,11 @@ class Bench:
 
     def plc_reads(self, text: str, words: int) -> tuple[int, bytes]:
         """Return STS and the words that the PLC's own program reads from us."""
-        dialect = DIALECTS[self._family]
+        dialect = dialect_of(self._family)
         place = Address.parse(text, self._family)
         self._tns += 1
-        errand = Errand(Packet(
-            US, PLC, dialect.cmd, 0, self._tns, dialect.read(place, words)), self.clock)
+        cmd, body = dialect.read(place, words)
+        errand = Errand(Packet(US, PLC, cmd, 0, self._tns, body), self.clock)
         self.plc.outbox.append(errand)  # type: ignore[arg-type]
         self.line.wake(self.far)
         self.line.run(lambda: errand.result is not None, 5.0)
@@ -164,7 +173,7 @@ def test_write_that_the_plc_refuses() -> None:
     assert bench.driver.counters.error_messages_received == 1
 
 
-@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
 @pytest.mark.parametrize('check', ['CRC', 'BCC'])
 def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
     pushed = serve_row('N7:50', family, 4)
@@ -201,7 +210,7 @@ def test_message_to_what_is_not_served_is_refused() -> None:
     assert bench.driver.counters.error_messages_sent == 3
 
 
-@pytest.mark.parametrize('family', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
 def test_what_ros_writes_is_read_by_the_plc(family: str) -> None:
     words, bits = serve_row('N7:50', family, 4), serve_row('B3:5/4', family, 4)
     bench = Bench([words, bits, make_mapping(plc=family)], family=family)
@@ -229,6 +238,20 @@ def test_values_for_served_words_are_checked() -> None:
     bench.run(0.1)
     assert bench.listener.outcomes()[-1] is Outcome.WRITTEN
     assert bench.plc_reads('N7:50', 2) == (0, b'\0\0\x09\0')
+
+
+@pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
+def test_served_engineering_values(family: str) -> None:
+    mapping = serve_row('N7:50', family, 2, scaling=Scaling(0.5, -10.0), maximum=100.0)
+    bench = Bench([mapping], family=family)
+    bench.start()
+    bench.message('N7:50', 1, -1)
+    bench.run(0.5)
+    assert bench.listener.values(mapping) == [[-9.5, -10.5]]
+    bench.write(mapping, [100.0, -10.2])
+    assert bench.plc_reads('N7:50', 2) == (0, b'\xdc\0\0\0')
+    bench.write(mapping, [100.5, 0.0])
+    assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.REFUSED]
 
 
 @pytest.mark.parametrize('family', ['PLC5', 'SLC'])
@@ -345,9 +368,10 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
     machine.receive_data(ACK, 0.1)  # and its reply takes its time
     bench.driver.write(words, [7], 0.2)
     machine.wake(0.2)
-    dialect = DIALECTS[PlcType.PLC5]
+    dialect = dialect_of(PlcType.PLC5)
     place = Address.parse('N7:50', PlcType.PLC5)
-    command = Packet(US, PLC, dialect.cmd, 0, 1, dialect.read(place, 1))
+    cmd, body = dialect.read(place, 1)
+    command = Packet(US, PLC, cmd, 0, 1, body)
     machine.receive_data(message_frame(command.encode(), bench.network.checksum), 0.3)
     decoder = FrameDecoder(bench.network.checksum, Duplex.FULL)
     decoder.feed(machine.data_to_send())
@@ -356,3 +380,34 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
     assert isinstance(reply, Frame)
     assert dialect.read_data(place, 1, Packet.decode(reply.data).data) == b'\7\0'
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
+
+
+@pytest.mark.parametrize('outstanding', [1, 3])
+def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
+    word, lamp = make_mapping('N7:0', plc='SLC'), make_mapping('N7:1', 'Write', plc='SLC')
+    bench = Bench([word, lamp], family='SLC', outstanding=outstanding, processor_period=2.0)
+    bench.start()
+    bench.run(1.0)
+    health = bench.driver.health
+    assert health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
+    bench.plc.processor.setting = Setting.PROGRAM
+    bench.driver.request_counters(PLC)
+    bench.run(2.0)
+    identity = health.known(PLC).identity
+    assert identity is not None
+    assert identity.mode is Mode.REMOTE_PROGRAM
+    assert int(health.known(PLC).counters['messages sent']) > 0
+    assert health.counters_wanted == set()
+
+
+def test_peer_that_is_only_written_to_is_watched() -> None:
+    bench = Bench([make_mapping('N7:1', 'Write')])
+    bench.start()
+    bench.run(9.0)
+    assert bench.driver.counters.commands_sent == 5
+    bench.line.noise = Noise(lost=1.0)
+    bench.run(6.0)
+    assert bench.listener.changes == [(PLC, False)]
+    bench.line.noise = QUIET
+    bench.run(6.0)
+    assert bench.listener.changes == [(PLC, False), (PLC, True)]

@@ -29,7 +29,9 @@ from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
@@ -40,7 +42,7 @@ from support.virtual_line import char_time, Noise, QUIET, VirtualLine
 
 MASTER, US, PLC = 9, 3, 1
 SLC = PlcType.SLC
-DIALECT = DIALECTS[SLC]
+DIALECT = dialect_of(SLC)
 BAUD = 19200
 
 
@@ -77,10 +79,11 @@ class Bench:
         self.driver.write(mapping, values, self.line.now)
         self.line.wake(self.driver.machine)
 
-    def ask(self, body: bytes, station: int = US) -> Errand:
+    def ask(self, request: Request, station: int = US) -> Errand:
         """Let the master send a command."""
         self._tns += 1
-        return self.master.add(Packet(station, MASTER, DIALECT.cmd, 0, self._tns, body))
+        cmd, body = request
+        return self.master.add(Packet(station, MASTER, cmd, 0, self._tns, body))
 
     def master_reads(self, text: str, words: int) -> bytes:
         """Return words that the master reads from us."""
@@ -209,3 +212,30 @@ def test_settings_reach_the_slave() -> None:
     assert bench.driver.counters.polls_received > 0
     assert bench.driver.counters.eots_sent == 0
     assert bench.master.changes == [(US, False)]
+
+
+def test_processor_of_a_station_behind_the_master() -> None:
+    bench = Bench([make_mapping('N7:0', station=PLC, plc='SLC')],
+                  DriverSettings(processor_period=2.0))
+    bench.run(1.0)
+    assert bench.driver.health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
+    bench.plc.processor.setting = Setting.TEST
+    bench.driver.request_counters(PLC)
+    bench.run(3.0)
+    known = bench.driver.health.known(PLC)
+    assert known.processor == 'SLC 5/03 series A revision 1, REM TEST'
+    assert int(known.counters['polls received']) > 0
+
+
+def test_master_reads_and_resets_the_counters_that_we_show() -> None:
+    bench = Bench([serve_row('N7:50')])
+    assert bench.master_reads('N7:50', 1) == b'\0\0'
+    errands = [bench.ask((0x06, data))
+               for data in (b'\x01\0\0\x1A', b'\x07', b'\x01\0\0\x1A')]
+    bench.run(1.0)
+    replies = [errand.result for errand in errands]
+    assert [reply.sts for reply in replies if isinstance(reply, Packet)] == [0, 0, 0]
+    before, reset, after = (reply.data for reply in replies if isinstance(reply, Packet))
+    assert (int.from_bytes(before[4:6], 'little'), reset) == (2, b'')  # messages received
+    assert int.from_bytes(after[4:6], 'little') == 1  # the command that asks
+    assert bench.driver.counters.messages_received == 4

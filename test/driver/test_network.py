@@ -208,7 +208,9 @@ def test_com_port(path: Path, text: str, port: str) -> None:
     assert load(path, 'Com_Port', text).port == port
 
 
-@pytest.mark.parametrize('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³'])
+@pytest.mark.parametrize('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³',
+                                  'socket://', 'socket://host', 'rfc2217://host:99999',
+                                  'socket://:4001'])
 def test_bad_com_port(path: Path, text: str) -> None:
     fault, = faults(path, 'Com_Port', text)
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')

@@ -17,16 +17,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.line_model import LineModel
 from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.partition import Span
 from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import DIALECTS
 from abdf1_ros.pccc.server import Server
 from hypothesis import given
 from hypothesis import strategies as st
@@ -35,7 +38,8 @@ from support.mappings import make_mapping
 from support.properties import PROPERTY
 
 CHARACTER = 0.001
-PLANNER = Planner(Checksum.CRC, Duplex.HALF, CHARACTER, 0.1)
+LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(CHARACTER))
+PLANNER = Planner(LINE, 0.1)
 
 
 def plan(*mappings: Mapping) -> list[Block]:
@@ -67,14 +71,27 @@ def word_mappings(draw: st.DrawFn, most: int = 8, last: int = 250) -> list[Mappi
 def mixed_mappings(draw: st.DrawFn) -> list[Mapping]:
     texts = st.sampled_from([
         'N7:3', 'N7:9/4', 'N10:3', 'F8:0', 'F8:7', 'T4:0', 'T4:0.ACC', 'T4:3.PRE', 'T4:2/DN',
-        'C5:1', 'B3:0/15', 'ST9:0', 'ST9:3', 'S:4', 'R6:2.LEN'])
+        'C5:1', 'B3:0/15', 'ST9:0', 'ST9:3', 'S:4', 'R6:2.LEN', 'PD10:0.SP', 'PD10:0.KP',
+        'PD10:1.PV', 'PD10:0/MO', 'MG11:1'])
     entries = draw(st.lists(st.tuples(
         texts, st.sampled_from(['PLC5', 'SLC']), st.integers(1, 2), st.integers(1, 40),
         st.sampled_from([None, 0, 100, 500])), max_size=10))
     return [make_mapping(
         text, plc=plc, station=station, period=period, tag=f'm{number}',
-        length=1 if text.startswith('ST') else min(length, 3) if '/' in text else length)
-        for number, (text, plc, station, length, period) in enumerate(entries)]
+        length=min(length, _longest(text)))
+        for number, (text, plc, station, length, period) in enumerate(entries)
+        if plc == 'PLC5' or not text.startswith('PD')]
+
+
+def _longest(text: str) -> int:
+    """Return how many values there can be from an address on, without another kind between."""
+    if text.startswith('ST'):
+        return 1
+    return 3 if '/' in text else 11 if text.startswith('PD') else 40
+
+
+def period_of(mapping: Mapping) -> float:
+    return 0.1 if mapping.period is None else mapping.period / 1000
 
 
 def check_plan(mappings: Sequence[Mapping], blocks: Sequence[Block]) -> None:
@@ -83,26 +100,27 @@ def check_plan(mappings: Sequence[Mapping], blocks: Sequence[Block]) -> None:
     assert sorted(mapping.tag for mapping in served) == sorted(
         mapping.tag for mapping in mappings if mapping.reads)
     for block in blocks:
+        assert block.period == min(map(period_of, block.mappings))
         first = block.mappings[0]
-        limit = DIALECTS[first.plc_type].max_read(first.address.file_type)
+        limit = first.dialect.max_read(first.address.file_type)
         at = block.start.offset
         for request in block.requests:
             assert request.start.area == first.address.area
             assert request.start.offset == at
             assert 0 < request.words <= limit
             at += request.words
-        per_element = first.address.file_type.layout.words
-        if at - block.start.offset > 1:
+        per_element = first.address.layout.words
+        words = at - block.start.offset
+        if words > 1 and not block.start.is_value(words):
             assert block.start.offset % per_element == at % per_element == 0
         for mapping in block.mappings:
             assert (mapping.station, mapping.address.area) == (block.station, block.start.area)
             assert block.start.offset <= mapping.address.offset
             assert mapping.address.offset + mapping.codec.words <= at
-            assert block.period == (0.1 if mapping.period is None else mapping.period / 1000)
             if mapping.codec.words <= limit:
                 assert len(block.requests) == 1
         if len(block.requests) > 1:
-            assert len(block.mappings) == 1
+            assert len({mapping.codec.words for mapping in block.mappings}) == 1
 
 
 @PROPERTY
@@ -113,13 +131,12 @@ def test_every_word_is_covered_within_the_limits(mappings: list[Mapping]) -> Non
 
 @PROPERTY
 @given(mixed_mappings())
-def test_nothing_is_bridged_across_files_stations_and_periods(mappings: list[Mapping]) -> None:
+def test_nothing_is_bridged_across_files_stations_and_families(mappings: list[Mapping]) -> None:
     blocks = plan(*mappings)
     check_plan(mappings, blocks)
     for block in blocks:
-        assert len({(mapping.station, mapping.address.area, 100
-                     if mapping.period is None else mapping.period)
-                    for mapping in block.mappings}) == 1
+        assert {(mapping.station, mapping.address.area) for mapping in block.mappings} == {
+            (block.station, block.start.area)}
 
 
 def _partitions(items: list[Mapping]) -> Iterable[list[list[Mapping]]]:
@@ -165,8 +182,8 @@ def _frames_time(example: Mapping, first: int, words: int,
     table = DataTable(example.plc_type)
     start = example.address.at_offset(first)
     table.create(start, words)
-    dialect = DIALECTS[example.plc_type]
-    command = Packet(1, 2, dialect.cmd, 0, 0x0302, dialect.read(start, words))
+    cmd, body = example.dialect.read(start, words)
+    command = Packet(1, 2, cmd, 0, 0x0302, body)
     reply = Server(table).serve(command)
     assert reply.sts == 0
     characters = sum(map(len, (
@@ -177,18 +194,49 @@ def _frames_time(example: Mapping, first: int, words: int,
 
 @pytest.mark.parametrize('checksum', list(Checksum))
 @pytest.mark.parametrize('plc, text, length', [
-    ('PLC5', 'N7:0', 1), ('PLC5', 'N7:0', 110), ('PLC5', 'N7:3', 4), ('PLC5', 'F8:0', 55),
-    ('PLC5', 'F8:2', 1), ('PLC5', 'T4:0', 3), ('PLC5', 'T4:2.ACC', 1), ('PLC5', 'T4:0', 66),
+    ('PLC5', 'N7:0', 1), ('PLC5', 'N7:0', 110), ('PLC5', 'N7:3', 4), ('PLC5', 'F8:0', 58),
+    ('PLC5', 'F8:2', 1), ('PLC5', 'T4:0', 3), ('PLC5', 'T4:2.ACC', 1), ('PLC5', 'T4:0', 69),
+    ('PLC5', 'PD9:0.PV', 1), ('PLC5', 'MG9:0', 112),
     ('PLC5', 'ST9:0', 1), ('PLC5', 'C5:1', 30), ('SLC', 'N7:0', 1), ('SLC', 'N7:3', 118),
     ('SLC', 'F8:0', 9), ('SLC', 'T4:4', 9), ('SLC', 'ST9:1', 1), ('SLC', 'I:1.0', 4),
     ('SLC', 'L10:0', 20), ('PLC5', 'N7:300', 5)])
 def test_line_time_is_that_of_the_real_frames(
         checksum: Checksum, plc: str, text: str, length: int) -> None:
     mapping = make_mapping(text, plc=plc, length=length)
-    block, = Planner(checksum, Duplex.HALF, CHARACTER, 0.1).plan([mapping])
+    block, = Planner(replace(LINE, checksum=checksum), 0.1).plan([mapping])
     assert len(block.requests) == 1
     assert block.line_time == pytest.approx(_frames_time(
         mapping, mapping.address.offset, block.requests[0].words, checksum))
+
+
+def test_float_of_a_pid_is_read_alone_or_with_its_whole_element() -> None:
+    point, gain = make_mapping('PD9:1.SP'), make_mapping('PD9:1.KP')
+    mode, other = make_mapping('PD9:1/MO'), make_mapping('PD9:7.SP')
+    assert spans(plan(point)) == [('PD9:1.SP', 2)]
+    assert sorted(spans(plan(point, other))) == [('PD9:1.SP', 2), ('PD9:7.SP', 2)]
+    assert sorted(spans(plan(point, gain))) == [('PD9:1.KP', 2), ('PD9:1.SP', 2)]
+    assert spans(plan(point, make_mapping('PD9:1.SP', tag='again'))) == [('PD9:1.SP', 2)]
+    assert spans(plan(mode)) == [('PD9:1', 1)]
+    many = [make_mapping(f'PD9:1.{name}') for name in ('SP', 'KP', 'KI', 'KD', 'PV', 'ERR', 'OUT')]
+    assert spans(plan(*many)) == [('PD9:1', 82)]
+    assert spans(plan(make_mapping('PD9:1.SP', length=4))) == [('PD9:1', 82)]
+
+
+def test_halves_of_a_block_with_a_float_are_the_floats() -> None:
+    planner = Planner(LINE, 0.1)
+    block, = planner.plan([
+        make_mapping(f'PD9:1.{name}') for name in ('SP', 'KP', 'KI', 'KD', 'PV')])
+    halves = planner.split(block)
+    assert sorted(map(len, (half.mappings for half in halves))) == [2, 3]
+    assert {spans([part])[0][1] for half in halves for part in planner.split(half)} <= {2, 82}
+
+
+@pytest.mark.parametrize('name, limit', [
+    ('5/01', 41), ('ML1000', 41), ('ML1400', 103), ('5/05', 118)])
+def test_blocks_are_as_long_as_the_processor_takes_them(name: str, limit: int) -> None:
+    words = [make_mapping(f'N7:{n}', plc='SLC', processor=name) for n in range(limit + 1)]
+    assert spans(plan(*words[:limit])) == [('N7:0', limit)]
+    assert max(length for _, length in spans(plan(*words))) <= limit
 
 
 def test_neighbours_are_read_together() -> None:
@@ -217,10 +265,12 @@ def test_gap_is_bridged_exactly_while_that_is_cheaper(plc: str) -> None:
 @pytest.mark.parametrize('one, other', [
     (make_mapping('N7:0'), make_mapping('N10:1')),
     (make_mapping('N7:0'), make_mapping('N7:1', station=2)),
-    (make_mapping('N7:0'), make_mapping('N7:1', period=200)),
+    (make_mapping('N7:0', period=100), make_mapping('N7:25', period=10_000)),
     (make_mapping('N7:0'), make_mapping('N7:1', plc='SLC')),
     (make_mapping('I:1.0', plc='SLC'), make_mapping('I:2.0', plc='SLC')),
     (make_mapping('I:000'), make_mapping('O:001')),
+    (make_mapping('N7:0'), make_mapping('N7:1', access='WordRange')),
+    (make_mapping('000', plc='PLC2'), make_mapping('001', plc='PLC2', access='CIF')),
 ])
 def test_never_read_together(one: Mapping, other: Mapping) -> None:
     assert len(plan(one, other)) == 2
@@ -264,7 +314,20 @@ def test_long_mapping_is_a_block_of_its_own() -> None:
 def test_long_structures_are_split_between_elements() -> None:
     mapping = make_mapping('T4:0', length=100)
     block, = plan(mapping)
-    assert spans([block]) == [('T4:0', 66), ('T4:22', 36)]
+    assert spans([block]) == [('T4:0', 69), ('T4:23', 33)]
+
+
+@pytest.mark.parametrize('kind, requests', [
+    ('int32', [('N7:1', 102), ('N7:103', 18)]), ('float32', [('N7:1', 102), ('N7:103', 18)]),
+    ('uint16', [('N7:1', 103), ('N7:104', 17)])])
+def test_no_packet_ends_within_a_value(
+        kind: str, requests: list[tuple[str, int]], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(make_mapping(plc='SLC').dialect, 'max_read', lambda file_type: 103)
+    length = 60 if kind != 'uint16' else 120
+    mapping = make_mapping('N7:1', plc='SLC', length=length, kind=kind)
+    assert spans(plan(mapping)) == requests
+    halves = make_mapping('N7:1', plc='SLC', length=120)
+    assert set(spans(plan(halves, mapping))) >= set(requests)
 
 
 def test_one_member_is_read_alone_and_two_as_the_whole_element() -> None:
@@ -289,18 +352,103 @@ def test_words_of_a_mapping_in_the_data_of_its_block() -> None:
     first, last = make_mapping('F8:1', length=2), make_mapping('F8:5')
     block, = plan(last, first)
     data = bytes(range(2 * block.requests[0].words))
-    assert block.words_of(first, data) == data[:8]
-    assert block.words_of(last, data) == data[16:20]
+    assert data[block.slice_of(first)] == data[:8]
+    assert data[block.slice_of(last)] == data[16:20]
 
 
 @PROPERTY
 @given(word_mappings())
-def test_split_halves_a_block_until_every_mapping_is_alone(mappings: list[Mapping]) -> None:
-    todo = [block for block in plan(*mappings) if len(block.mappings) > 1]
+def test_split_halves_a_block_until_all_its_mappings_are_the_same_words(
+        mappings: list[Mapping]) -> None:
+    todo = plan(*mappings)
     for block in todo:
+        places = {(mapping.address.offset, mapping.codec.words) for mapping in block.mappings}
         halves = PLANNER.split(block)
-        assert [len(half.mappings) for half in halves] == [
-            len(block.mappings) // 2, -(-len(block.mappings) // 2)]
-        check_plan(block.mappings, halves)
-        assert all(half.period == block.period for half in halves)
-        todo += [half for half in halves if len(half.mappings) > 1]
+        assert len(halves) == (0 if len(places) == 1 else 2)
+        if halves:
+            check_plan(block.mappings, halves)
+            left, right = ({(mapping.address.offset, mapping.codec.words)
+                            for mapping in half.mappings} for half in halves)
+            assert len(left) == len(places) // 2
+            assert left.isdisjoint(right)
+            assert max(left) < min(right)
+        todo += halves
+
+
+# periods
+
+
+def test_slow_mapping_among_fast_ones_costs_nothing() -> None:
+    fast = [make_mapping('N7:0', period=100), make_mapping('N7:9', period=100)]
+    slow = make_mapping('N7:5', period=1000)
+    block, = plan(slow, *fast)
+    assert spans([block]) == [('N7:0', 10)]
+    assert block.period == 0.1
+
+
+def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() -> None:
+    """At a tenth of the rate, its words may cost a tenth of another transaction."""
+    def blocks(gap: int, period: int) -> int:
+        return len(plan(make_mapping('N7:0', period=100),
+                        make_mapping(f'N7:{gap}', period=period)))
+
+    def words(period: int) -> int:
+        return sum(blocks(gap, period) == 1 for gap in range(1, 60))
+
+    assert blocks(1, 10_000) == 2
+    assert 1 < words(1000) < words(500) < words(200) < words(100) < 40
+
+
+def test_on_a_full_line_periods_that_cannot_be_kept_make_no_difference() -> None:
+    others = [make_mapping(f'N{file}:0', length=100, period=0) for file in range(20, 30)]
+    blocks = plan(make_mapping('N7:0', period=0), make_mapping('N7:20', period=1000), *others)
+    assert len(blocks) == 11
+
+
+@PROPERTY
+@given(st.lists(st.tuples(st.integers(0, 200), st.sampled_from([100, 300, 1000])),
+                min_size=1, max_size=40))
+def test_mapping_is_read_as_often_as_it_wants(places: list[tuple[int, int]]) -> None:
+    mappings = [make_mapping(f'N7:{first}', period=period, tag=f'm{number}')
+                for number, (first, period) in enumerate(places)]
+    check_plan(mappings, plan(*mappings))
+
+
+# refusals
+
+
+@PROPERTY
+@given(word_mappings(last=60), st.lists(st.tuples(st.integers(0, 80), st.integers(1, 4)),
+                                        min_size=1, max_size=4))
+def test_no_plan_holds_what_was_refused(mappings: list[Mapping],
+                                        refused: list[tuple[int, int]]) -> None:
+    planner = Planner(LINE, 0.1)
+    place = plan(mappings[0])[0].place
+    bad = [Span(first, first + words) for first, words in refused]
+    for span in bad:
+        planner.refuse(place, span)
+    blocks = planner.plan(mappings)
+    check_plan(mappings, blocks)
+    for block in blocks:
+        if any(block.span.holds(span) for span in bad):
+            assert len({(mapping.address.offset, mapping.codec.words)
+                        for mapping in block.mappings}) == 1
+    for span in bad:
+        planner.allow(place, span)
+    assert planner.plan(mappings) == plan(*mappings)
+
+
+def test_good_mappings_are_read_together_on_both_sides_of_a_bad_one() -> None:
+    mappings = [make_mapping(f'N7:{n}') for n in range(10)]
+    planner = Planner(LINE, 0.1)
+    planner.refuse(plan(*mappings)[0].place, Span(4, 5))
+    assert sorted(spans(planner.plan(mappings))) == [('N7:0', 4), ('N7:4', 1), ('N7:5', 5)]
+
+
+def test_allowing_is_news_only_for_what_was_refused() -> None:
+    planner = Planner(LINE, 0.1)
+    place = plan(make_mapping())[0].place
+    planner.refuse(place, Span(4, 6))
+    assert not planner.allow(place, Span(5, 9))
+    assert planner.allow(place, Span(4, 6))
+    assert not planner.allow(place, Span(4, 6))

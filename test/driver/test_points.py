@@ -19,9 +19,9 @@ from __future__ import annotations
 from array import array
 
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, show, Write
+from abdf1_ros.driver.scaling import Scaling
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import DIALECTS
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 from hypothesis import given
@@ -58,6 +58,19 @@ def test_value_is_late_after_one_and_a_half_periods_where_periods_are_long() -> 
     assert slow.freshness(14.9) is Freshness.FRESH
     assert slow.freshness(15.1) is Freshness.LATE
     assert slow.freshness(30.1) is Freshness.STALE
+
+
+def test_interval_is_between_two_good_reads_without_a_failure() -> None:
+    new = point('Change')
+    new.update(b'\1\0', 3.0)
+    assert new.interval is None
+    new.update(b'\1\0', 3.25)
+    assert new.interval == 0.25
+    new.fail('no reply')
+    new.update(b'\1\0', 9.0)
+    assert new.interval is None
+    new.update(b'\1\0', 9.5)
+    assert new.interval == 0.5
 
 
 def test_failure_outweighs_age_and_ends_with_the_next_good_read() -> None:
@@ -110,10 +123,24 @@ def test_bits_that_are_not_ours_are_not_a_change_of_value() -> None:
     assert bits.update(b'\x11\xff', 1.0) is None
 
 
+def test_engineering_values_are_published() -> None:
+    level = ReadPoint(make_mapping(length=2, scaling=Scaling(0.5, -10.0)), 0.1, 0.6)
+    assert level.update(b'\x03\0\xff\xff', 0.0) == array('f', [-8.5, -10.5])
+
+
+def test_change_is_one_of_the_raw_value() -> None:
+    scaling = Scaling(0.001, 1e6)  # too fine for float32 to show every step
+    mapping = make_mapping(kind='int32', publish='Change', scaling=scaling)
+    fine = ReadPoint(mapping, 0.1, 0.6)
+    first = fine.update(b'\1\0\0\0', 0.0)
+    assert fine.update(b'\1\0\0\0', 1.0) is None
+    assert fine.update(b'\2\0\0\0', 2.0) == first == array('f', [1e6])
+
+
 def commands(text: str, values: list[float] | str, plc: str = 'PLC5', length: int = 1,
              kind: str | None = None) -> list[str]:
     mapping = make_mapping(text, 'Write', plc=plc, length=length, kind=kind)
-    return [command.hex(' ') for command in Write(mapping, values, 0.0).commands]
+    return [data.hex(' ') for _, data in Write(mapping, values, 0.0).commands]
 
 
 @pytest.mark.parametrize('plc, text, length, values, expected', [
@@ -122,7 +149,15 @@ def commands(text: str, values: list[float] | str, plc: str = 'PLC5', length: in
     ('PLC5', 'N7:300', 2, [1, -1],
      ['67 00 00 02 00 07 00 07 ff 2c 01 95 09 42 01 00 ff ff']),
     ('PLC5', 'F8:1', 1, [1.5], ['67 00 00 01 00 07 00 08 01 96 09 94 08 00 00 c0 3f']),
+    ('PLC5', 'PD12:10.SP', 1, [42.5],
+     ['67 00 00 01 00 0f 00 0c 0a 02 96 09 94 08 00 00 2a 42']),
+    ('PLC5', 'PD12:10.KP', 2, [1.0, 2.0],
+     ['67 00 00 01 00 0f 00 0c 0a 04 96 09 94 08 00 00 80 3f',
+      '67 00 00 01 00 0f 00 0c 0a 06 96 09 94 08 00 00 00 40']),
+    ('PLC5', 'SC9:1.PRE', 1, [7], ['67 00 00 01 00 0f 00 09 01 01 93 09 42 07 00']),
     # Protected typed logical write: FNC AA, size, file, type, element, sub-element, data.
+    ('SLC', 'PD10:1.KC', 2, [1, 2],
+     ['aa 02 0a 93 01 03 01 00', 'aa 02 0a 93 01 04 02 00']),
     ('SLC', 'N7:3', 2, [1, -1], ['aa 04 07 89 03 00 01 00 ff ff']),
     ('SLC', 'F8:4', 1, [1.5], ['aa 04 08 8a 04 00 00 00 c0 3f']),
     ('SLC', 'L10:2', 1, [-2], ['aa 04 0a 91 02 00 fe ff ff ff']),
@@ -143,6 +178,7 @@ def test_bytes_of_a_write_of_words(
      ['26 07 00 03 00 ff 3f 00 c0', '26 07 00 03 01 fc ff 02 00']),
     ('I:017/12', 1, [1], ['26 07 00 01 0f ff fb 00 04']),
     ('T4:7/DN', 1, [1], ['26 0f 00 04 07 00 ff df 00 20']),
+    ('MG9:3/TO', 1, [1], ['26 0f 00 09 03 00 ff fe 00 01']),
 ])
 def test_bits_of_a_plc5_are_a_read_modify_write(
         text: str, length: int, values: list[float], expected: list[str]) -> None:
@@ -201,8 +237,7 @@ def test_plc_holds_what_was_written_and_nothing_else_changes(
 def _serve_all(table: DataTable, write: Write) -> None:
     from abdf1_ros.df1.packet import Packet
 
-    for number, data in enumerate(write.commands):
-        cmd = DIALECTS[table.plc_type].cmd
+    for number, (cmd, data) in enumerate(write.commands):
         assert Server(table).serve(Packet(1, 5, cmd, 0, number, data)).sts == 0
 
 
@@ -215,7 +250,7 @@ def test_string_is_written_whole() -> None:
 
 
 @PROPERTY
-@given(st.sampled_from(list(DIALECTS)), st.integers(0, 15), st.integers(1, 40),
+@given(st.sampled_from((PlcType.PLC5, PlcType.SLC)), st.integers(0, 15), st.integers(1, 40),
        st.data())
 def test_bit_writes_touch_only_their_bits(
         plc_type: PlcType, bit: int, length: int, data: st.DataObject) -> None:
@@ -262,6 +297,83 @@ def test_limit_in_the_message_is_the_limit_of_the_file() -> None:
         Write(mapping, [1234568], 0.0)
 
 
+@pytest.mark.parametrize('plc, kind, expected', [
+    ('SLC', 'int32', 'aa 04 07 89 00 00 01 00 02 00'),
+    ('SLC', 'float32', 'aa 04 07 89 00 00 80 47 00 01'),
+    ('PLC5', 'uint32', '67 00 00 02 00 07 00 07 00 95 09 42 01 00 02 00')])
+def test_bytes_of_a_write_with_the_high_word_first(
+        plc: str, kind: str, expected: str) -> None:
+    mapping = make_mapping(command='Write', plc=plc, kind=kind, word_order='High')
+    (_, command), = Write(mapping, [0x10002], 0.0).commands
+    assert command.hex(' ') == expected
+
+
+@pytest.mark.parametrize('plc, expected', [
+    ('SLC', 'aa 06 0a 8e 02 00 44 4f 00 44 00 00'),
+    ('PLC5', '67 00 00 03 00 07 00 0a 02 97 09 42 44 4f 00 44 00 00')])
+def test_bytes_of_a_string_over_words(plc: str, expected: str) -> None:
+    mapping = make_mapping('A10:2', 'Write', plc=plc, length=3, kind='string')
+    (_, command), = Write(mapping, 'ODD', 0.0).commands
+    assert command.hex(' ') == expected
+
+
+@pytest.mark.parametrize('values, raw, command', [
+    ([-10.0, 12.75], [0, 46], 'aa 04 07 89 00 00 00 00 2e 00'),  # 45.5 becomes the even 46
+    ([-10.5, 12.7], [-1, 45], 'aa 04 07 89 00 00 ff ff 2d 00')])
+def test_nearest_raw_values_are_written(
+        values: list[float], raw: list[int], command: str) -> None:
+    mapping = make_mapping(
+        command='Write', plc='SLC', length=2, scaling=Scaling(0.5, -10.0))
+    write = Write(mapping, array('f', values), 0.0)
+    assert (write.raw, write.value) == (raw, show(values))
+    assert [data.hex(' ') for _, data in write.commands] == [command]
+
+
+@PROPERTY
+@given(st.sampled_from(['int16', 'uint16']), st.integers(0, 65535),
+       st.floats(0.001, 1000.0) | st.floats(-1000.0, -0.001), st.floats(-1000.0, 1000.0))
+def test_word_comes_back_from_the_value_that_was_published(
+        kind: str, word: int, scale: float, offset: float) -> None:
+    mapping = make_mapping(command='ReadWrite', plc='SLC', kind=kind,
+                           scaling=Scaling(scale, offset))
+    words = word.to_bytes(2, 'little')
+    values = ReadPoint(mapping, 0.1, 0.6).update(words, 0.0)
+    assert values is not None
+    (_, command), = Write(mapping, values, 0.0).commands
+    assert command[-2:] == words
+
+
+@pytest.mark.parametrize('values, error', [
+    ([0.3, 10.0], None), ([0.2, 0.3], 'value 0.2 at index 0 is outside Min 0.3, Max 10.1'),
+    ([1, 10.2], 'value 10.2 at index 1 is outside Min 0.3, Max 10.1'),
+    ([1, 10.1], 'value 10.2 at index 1, the nearest that can be written, is outside Min 0.3, '
+                'Max 10.1'),
+    ([1, -2e5], 'value -200000 at index 1 is outside -9830.4 to 9830.1, the range of int16 with '
+                'Scale 0.3, Offset 0'),
+    ([1], '1 values, the mapping has 2'),
+    ('1', "'1' is no int16")])
+def test_limits_of_engineering_values(values: list[float] | str, error: str | None) -> None:
+    mapping = make_mapping(command='Write', length=2, minimum=0.3, maximum=10.1,
+                           scaling=Scaling(0.3))
+    written = values if isinstance(values, str) else array('f', values)
+    if error is None:
+        assert Write(mapping, written, 0.0).raw == [1, 33]
+        return
+    with pytest.raises(FormatError) as caught:
+        Write(mapping, written, 0.0)
+    assert str(caught.value) == error
+
+
+@pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('kind, value', [('int32', 70000), ('float32', 0.5)])
+def test_no_packet_ends_within_a_value(plc: str, kind: str, value: float) -> None:
+    mapping = make_mapping('N7:1', 'Write', plc=plc, length=120, kind=kind)
+    write = Write(mapping, [value] * 120, 0.0)
+    assert len(write.commands) == 3
+    one = make_mapping('N7:1', 'Write', plc=plc, kind=kind).codec.encode([value])
+    assert all(data.endswith(one) for _, data in write.commands)
+
+
 @pytest.mark.parametrize('text, pulse', [
     ('B3:0/1', True), ('T4:0/DN', True), ('N7:0', False), ('B3:0', False), ('F8:0', False)])
 def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
@@ -277,10 +389,23 @@ def test_result_of_a_write() -> None:
 
 
 @pytest.mark.parametrize('values, text', [
-    ([1, 0, 1], '[1, 0, 1]'), ([], '[]'), ("it's", '"it\'s"'), ([0.1, -2.5], '[0.1, -2.5]'),
+    ([1, 0, 1], '[1, 0, 1]'), ([], '[]'), ("it's", '"it\'s"'),
+    ('\x1b[2J\r\n\0\x9bä', r"'\x1b[2J\r\n\x00\x9bä'"), ([0.1, -2.5], '[0.1, -2.5]'),
     (array('f', [0.1]), '[0.1]'), ([1234567, -2147483648], '[1234567, -2147483648]'),
+    ('a' * 100, repr('a' * 100)), ('a' * 102, repr('a' * 100) + ' and 2 more characters'),
     ([4294967295], '[4294967295]'), (array('f', [1234567, 0.3]), '[1234567, 0.3]'),
     (list(range(16)), str(list(range(16)))),
     (list(range(18)), str(list(range(16)))[:-1] + ', and 2 more]')])
 def test_values_as_text(values: list[float] | str, text: str) -> None:
     assert show(values) == text
+
+
+def test_read_of_a_faster_block_is_for_a_point_when_its_period_has_passed() -> None:
+    point = ReadPoint(make_mapping(), 1.0, 3.0)
+    assert point.is_due(0.0, 0.1)  # the first
+    point.update(bytes(2), 0.0)
+    assert [point.is_due(now, 0.1) for now in (0.1, 0.9, 0.96, 1.0, 2.0)] == [
+        False, False, True, True, True]
+    assert point.is_due(0.2, 1.0)  # a read of its own
+    point.fail('lost')
+    assert point.is_due(0.1, 0.1)

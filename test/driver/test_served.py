@@ -23,9 +23,10 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.served import Served, served_problems
-from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import DIALECTS
+from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
@@ -42,9 +43,11 @@ BAD_FILE = {'PLC5': (0xF0, b'\x06'), 'SLC': (0x10, b'')}
 ILLEGAL = (0x10, b'')
 
 
-def row(text: str, plc: str = 'PLC5', length: int = 1, kind: str | None = None) -> Mapping:
+def row(text: str, plc: str = 'PLC5', length: int = 1, kind: str | None = None,
+        word_order: str = 'Low') -> Mapping:
     """Return a Serve row."""
-    return make_mapping(text, 'Serve', station=STATION, plc=plc, length=length, kind=kind)
+    return make_mapping(text, 'Serve', station=STATION, plc=plc, length=length, kind=kind,
+                        word_order=word_order)
 
 
 class Bench:
@@ -55,13 +58,13 @@ class Bench:
         self.published: list[tuple[Mapping, bytes]] = []
         self.served = Served(
             self.plc, mappings, lambda mapping, words: self.published.append((mapping, words)))
-        self._dialect = DIALECTS.get(self.plc, DIALECTS[PlcType.PLC5])
+        self._dialect = dialect_of(self.plc)
         self._tns = 0
 
     def _place(self, text: str) -> Address:
         return Address.parse(text, self.plc)
 
-    def ask(self, data: bytes, cmd: int = 0x0F) -> tuple[int, bytes]:
+    def ask(self, cmd: int, data: bytes) -> tuple[int, bytes]:
         """Return STS and data of the reply to any command."""
         self._tns += 1
         reply = self.served.serve(Packet(STATION, 1, cmd, 0, self._tns, data))
@@ -71,22 +74,22 @@ class Bench:
     def read(self, text: str, words: int = 1) -> bytes:
         """Return words that the other end reads."""
         place = self._place(text)
-        sts, data = self.ask(self._dialect.read(place, words))
+        sts, data = self.ask(*self._dialect.read(place, words))
         assert sts == 0, (sts, data)
         return self._dialect.read_data(place, words, data)
 
     def refused_read(self, text: str, words: int = 1) -> tuple[int, bytes]:
         """Return what the other end is told that reads what it must not."""
-        return self.ask(self._dialect.read(self._place(text), words))
+        return self.ask(*self._dialect.read(self._place(text), words))
 
     def write(self, text: str, *words: int) -> tuple[int, bytes]:
         """Let the other end write words; return STS and data."""
         data = b''.join(word.to_bytes(2, 'little') for word in words)
-        return self.ask(self._dialect.write(self._place(text), data))
+        return self.ask(*self._dialect.write(self._place(text), data))
 
     def write_bits(self, text: str, mask: int, bits: int) -> tuple[int, bytes]:
         """Let the other end write bits of a word; return STS and data."""
-        return self.ask(self._dialect.write_bits(self._place(text), mask, bits))
+        return self.ask(*self._dialect.write_bits(self._place(text), mask, bits))
 
     def heard(self) -> list[tuple[str, list[int]]]:
         """Return, once, name and values of all that was published."""
@@ -176,18 +179,18 @@ def test_files_without_a_mapping_are_not_there(plc: str, text: str) -> None:
 def test_without_rows_only_diagnostics_are_served(plc: str) -> None:
     bench = Bench(plc)
     assert bench.refused_read('N7:0') == BAD_FILE[plc]
-    assert bench.ask(b'\0hello', 0x06) == (0, b'hello')
-    assert bench.ask(b'\3', 0x06) == (0, diagnostics.identity(PlcType(plc)))
+    assert bench.ask(0x06, b'\0hello') == (0, b'hello')
+    assert bench.ask(0x06, b'\3') == (0, EmulatedProcessor(PlcType(plc)).encode())
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
 @pytest.mark.parametrize(('cmd', 'data'), [
-    (0x0F, b''), (0x0F, b'\x80\x06'), (0x0F, b'\x3A\x06'), (0x0F, b'\x01'), (0x07, b'\0\1'),
-    (0x01, b'\x11\0\2'), (0x08, b'\0\0\0\0'), (0x06, b'\x07'), (0x06, b''), (0x2F, b'\xA2'),
+    (0x0F, b''), (0x0F, b'\x80\x06'), (0x0F, b'\x3A\x06'), (0x0F, b'\x03'), (0x07, b'\0\1'),
+    (0x03, b'\x11\0\2'), (0x06, b'\x07'), (0x06, b''), (0x2F, b'\xA2'),
     (0x0A, b'racom'), (0x0B, b'racom'), (0x3F, bytes(200))])
 def test_other_commands_are_illegal(plc: str, cmd: int, data: bytes) -> None:
     bench = Bench(plc, row('N7:0', plc, 2))
-    assert bench.ask(data, cmd) == ILLEGAL
+    assert bench.ask(cmd, data) == ILLEGAL
     assert bench.published == []
 
 
@@ -195,18 +198,61 @@ def test_each_family_refuses_the_commands_of_the_other() -> None:
     for ours, theirs in (FAMILIES, reversed(FAMILIES)):
         place = Address.parse('N7:0', PlcType(theirs))
         bench = Bench(ours, row('N7:0', ours, 2))
-        dialect = DIALECTS[PlcType(theirs)]
-        assert bench.ask(dialect.read(place, 1)) == ILLEGAL
-        assert bench.ask(dialect.write(place, b'\1\0')) == ILLEGAL
-        assert bench.ask(dialect.write_bits(place, 1, 1)) == ILLEGAL
+        dialect = dialect_of(PlcType(theirs))
+        assert bench.ask(*dialect.read(place, 1)) == ILLEGAL
+        assert bench.ask(*dialect.write(place, b'\1\0')) == ILLEGAL
+        assert bench.ask(*dialect.write_bits(place, 1, 1)) == ILLEGAL
         assert bench.published == []
 
 
+@pytest.mark.parametrize(('plc', 'text', 'next_text', 'beyond'), [
+    ('PLC2', '050', '052', '054'), ('PLC3', 'N7:50', 'N7:52', 'N7:54'),
+    ('PLC3', 'E3.1.8.10.0.5', 'B10:7', 'B10:9')])
+def test_words_of_a_plc2_and_a_plc3(plc: str, text: str, next_text: str, beyond: str) -> None:
+    mapping = row(text, plc, 4)
+    bench = Bench(plc, mapping)
+    bench.served.store(mapping, [1, 2, 3, 4])
+    assert bench.read(text, 4) == b'\1\0\2\0\3\0\4\0'
+    assert bench.write(next_text, 0x1010) == (0, b'')
+    assert bench.heard() == [(mapping.name, [1, 2, 0x1010, 4])]
+    assert bench.write_bits(text, 0x8001, 0x8000) == (0, b'')
+    assert bench.published == [(mapping, b'\0\x80\2\0\x10\x10\4\0')]
+    assert bench.refused_read(beyond) == bench.write(next_text, 1, 2, 3) == (0x50, b'')
+
+
 @pytest.mark.parametrize('plc', ['PLC2', 'PLC3'])
-def test_family_that_is_not_emulated_answers_that_it_cannot(plc: str) -> None:
-    bench = Bench(plc)
-    assert bench.ask(b'\x68\0\0\1\0\7\0\7\0\1\0') == ILLEGAL
-    assert bench.ask(b'\x01\0', 0x01) == ILLEGAL
+def test_without_rows_a_plc2_or_plc3_has_no_words(plc: str) -> None:
+    assert Bench(plc).refused_read('020' if plc == 'PLC2' else 'N7:0') == (0x50, b'')
+
+
+def test_bits_of_a_plc2() -> None:
+    mapping = row('050/07', 'PLC2', 4)
+    bench = Bench('PLC2', mapping)
+    bench.served.store(mapping, [1, 0, 1, 1])
+    assert bench.read('050') == b'\x80\x06'
+    assert bench.write_bits('050', 0x0100, 0x0100) == (0, b'')
+    assert bench.heard() == [(mapping.name, [1, 1, 1, 1])]
+
+
+def test_word_range_of_several_words_is_published_once_and_all_or_nothing() -> None:
+    mapping = row('N7:0', length=4)
+    bench = Bench('PLC5', mapping)
+    words = dialect_of(PlcType.PLC5, Access.WORD_RANGE)
+    place = Address.parse('N7:0', PlcType.PLC5)
+    assert bench.ask(*words.write(place, b'\1\0\2\0\3\0')) == (0, b'')
+    assert bench.heard() == [(mapping.name, [1, 2, 3, 0])]
+    assert bench.ask(*words.write(place, bytes(10))) == (0xF0, b'\x0A')
+    assert bench.heard() == []
+
+
+@pytest.mark.parametrize(('plc', 'file', 'place'), [
+    ('PLC5', 'N7:0', b'\2\0'), ('SLC', 'N9:0', b'\1\0')])  # a byte address, and a word's
+def test_plc2_commands_reach_the_compatibility_file(plc: str, file: str, place: bytes) -> None:
+    published: list[bytes] = []
+    served = Served(PlcType(plc), [row(file, plc, 4)],
+                    lambda mapping, words: published.append(words))
+    reply = served.serve(Packet(STATION, 7, 0x08, 0, 1, place + b'\x34\x12'))
+    assert (reply.sts, published) == (0, [b'\0\0\x34\x12\0\0\0\0'])
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
@@ -256,6 +302,27 @@ def test_string(plc: str) -> None:
     words = bench.read('ST9:1', 42)
     assert mapping.codec.decode(words) == 'Tank 4'
     assert bench.refused_read('ST9:0', 42) == BAD_WORDS[plc]
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_string_over_words(plc: str) -> None:
+    mapping = row('A10:1', plc, 3, 'string')
+    bench = Bench(plc, mapping)
+    bench.served.store(mapping, 'abc')
+    assert bench.read('A10:1', 3) == b'ba\0c\0\0'
+    assert bench.write('A10:2', 0x7879) == (0, b'')
+    assert bench.published == [(mapping, b'bayx\0\0')]
+    assert mapping.codec.decode(b'bayx\0\0') == 'abxy'
+
+
+@pytest.mark.parametrize('plc', FAMILIES)
+def test_high_word_first(plc: str) -> None:
+    mapping = row('N7:50', plc, kind='int32', word_order='High')
+    bench = Bench(plc, mapping)
+    bench.served.store(mapping, [0x10002])
+    assert bench.read('N7:50', 2) == b'\1\0\2\0'
+    assert bench.write('N7:51', 7) == (0, b'')
+    assert bench.heard() == [(mapping.name, [0x10007])]
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
@@ -311,16 +378,17 @@ def test_bits_that_the_other_end_writes(plc: str) -> None:
 def test_command_for_several_words_is_published_once_and_all_or_nothing() -> None:
     slc = Bench('SLC', row('B3:0', 'SLC', 2))
     masked = bytes.fromhex('AB 04 03 85 00 00 0F 00 FF 00 FF 00')
-    assert slc.ask(masked) == (0, b'')
+    assert slc.ask(0x0F, masked) == (0, b'')
     assert slc.heard() == [('B3:0_5_Serve_2', [0x0F, 0x0F])]
-    assert slc.ask(bytes.fromhex('AB 04 03 85 01 00 0F 00 00 00 00 00')) == BAD_WORDS['SLC']
+    assert slc.ask(0x0F, bytes.fromhex('AB 04 03 85 01 00 0F 00 00 00 00 00')) == BAD_WORDS['SLC']
     assert slc.heard() == []
     plc5 = Bench('PLC5', row('B3:0', length=2))
     sets = '07 00 03 {:02X} FF FF 01 00'
     both = bytes.fromhex('26' + sets.format(0) + sets.format(1))
-    assert plc5.ask(both) == (0, b'')
+    assert plc5.ask(0x0F, both) == (0, b'')
     assert plc5.heard() == [('B3:0_5_Serve_2', [1, 1])]
-    assert plc5.ask(bytes.fromhex('26' + sets.format(1) + sets.format(2))) == BAD_WORDS['PLC5']
+    beyond = bytes.fromhex('26' + sets.format(1) + sets.format(2))
+    assert plc5.ask(0x0F, beyond) == BAD_WORDS['PLC5']
     assert plc5.heard() == []
 
 
@@ -344,7 +412,7 @@ def test_any_command_is_answered(plc: str) -> None:
 @PROPERTY
 def test_any_bytes_are_answered(cmd: int, data: bytes, plc: str) -> None:
     bench = Bench(plc, row('N7:0', plc, 20))
-    sts, _ = bench.ask(data, cmd)
+    sts, _ = bench.ask(cmd, data)
     assert sts in (0, 0x10, 0x50, 0xF0)
 
 
@@ -384,11 +452,16 @@ def test_serve_rows_of_one_file_have_one_type() -> None:
         'map.csv:2: Item: 1, B9:0 does not fit an earlier Serve row: file 9 is of type N already']
 
 
-@pytest.mark.parametrize('plc', ['PLC2', 'PLC3'])
-def test_plc_types_that_cannot_be_emulated(plc: str) -> None:
+@pytest.mark.parametrize(('plc', 'text'), [('PLC2', '020'), ('PLC3', 'N7:0')])
+def test_every_plc_type_can_be_emulated(plc: str, text: str) -> None:
     network = Network(mode='Peer', plc_type=plc)
-    assert texts(make_mapping('N7:0'), network=network) == []
+    assert texts(row(text, plc), network=network) == []
     assert len(texts(row('N7:0'), network=network)) == 1
+
+
+def test_files_of_a_plc3_are_numbered_in_each_section() -> None:
+    network = Network(mode='Peer', plc_type='PLC3')
+    assert texts(row('N9:0', 'PLC3'), row('B9:0', 'PLC3'), network=network) == []
 
 
 def test_problems_go_with_their_rows() -> None:

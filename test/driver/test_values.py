@@ -21,9 +21,10 @@ import math
 import struct
 from typing import Any
 
-from abdf1_ros.driver.values import Codec, types_of, ValueType
+from abdf1_ros.driver.values import Codec, types_of, ValueType, WordOrder
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -43,10 +44,12 @@ _WORD_TYPES = [kind for kind in _NUMBERS if kind is not ValueType.BOOL]
 
 @pytest.mark.parametrize('kind', _WORD_TYPES)
 def test_values_survive_a_round_trip(kind: ValueType) -> None:
+    orders = list(WordOrder) if kind.words == 2 else [WordOrder.LOW]
+
     @PROPERTY
-    @given(st.lists(_NUMBERS[kind], min_size=1, max_size=20))
-    def check(values: list[float]) -> None:
-        codec = Codec(kind, len(values))
+    @given(st.lists(_NUMBERS[kind], min_size=1, max_size=20), st.sampled_from(orders))
+    def check(values: list[float], order: WordOrder) -> None:
+        codec = Codec(kind, len(values), word_order=order)
         codec.check(values)
         words = codec.encode(values)
         assert len(words) == 2 * codec.words
@@ -78,11 +81,11 @@ def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
 @PROPERTY
 @given(st.text(st.characters(max_codepoint=255), max_size=82))
 def test_strings_survive_a_round_trip(text: str) -> None:
-    codec = Codec(ValueType.STRING, 1)
-    codec.check(text)
-    words = codec.encode(text)
-    assert len(words) == 84 == 2 * codec.words
-    assert codec.decode(words) == text
+    for codec in (Codec(ValueType.STRING, 1), Codec(ValueType.STRING, 41, packed=True)):
+        codec.check(text)
+        words = codec.encode(text)
+        assert len(words) == 2 * codec.words
+        assert codec.decode(words) == (text.rstrip('\0') if codec.packed else text)
 
 
 @pytest.mark.parametrize('kind', list(ValueType))
@@ -115,6 +118,16 @@ def test_order_of_bytes_and_words(kind: ValueType, words: str, values: list[floa
     assert codec.encode(values) == bytes.fromhex(words)
 
 
+@pytest.mark.parametrize('kind, words, values', [
+    (ValueType.INT32, '01 00 02 00 ff ff fe ff', [0x10002, -2]),
+    (ValueType.UINT32, '01 00 02 00 ff ff fe ff', [0x10002, 2**32 - 2]),
+    (ValueType.FLOAT32, 'c0 3f 00 00 7a 44 00 00', [1.5, 1000.0])])
+def test_high_word_first(kind: ValueType, words: str, values: list[float]) -> None:
+    codec = Codec(kind, len(values), word_order=WordOrder.HIGH)
+    assert list(codec.decode(bytes.fromhex(words))) == values
+    assert codec.encode(values) == bytes.fromhex(words)
+
+
 def test_infinity_and_nan_that_a_plc_holds_are_passed_on() -> None:
     words = struct.pack('<3f', math.inf, -math.inf, math.nan)
     values = Codec(ValueType.FLOAT32, 3).decode(words)
@@ -130,34 +143,12 @@ def test_word_that_is_not_bcd(word: str, text: str) -> None:
         Codec(ValueType.BCD16, 2).decode(bytes.fromhex('34 12' + word))
 
 
-@pytest.mark.parametrize('words, text', [
-    ('05 00', '\0' * 5), ('00 00', ''),
-    ('03 00 62 61 00 63', 'abc'),  # the first character is the high byte of the first word
-    ('04 00 62 61 64 63', 'abcd'),
-    ('01 00 62 61 64 63', 'a'), ('01 00 00 e4', 'ä')])
-def test_string_of_a_plc(words: str, text: str) -> None:
-    data = bytes.fromhex(words).ljust(84, b'\0')
-    assert Codec(ValueType.STRING, 1).decode(data) == text
-
-
-@pytest.mark.parametrize('text, words', [
-    ('', '00 00 00 00'), ('a', '01 00 00 61'), ('abc', '03 00 62 61 00 63')])
-def test_string_for_a_plc(text: str, words: str) -> None:
-    assert Codec(ValueType.STRING, 1).encode(text) == bytes.fromhex(words).ljust(84, b'\0')
-
-
-def test_string_length_that_no_plc_has() -> None:
-    with pytest.raises(FormatError, match='^string length 83 is more than 82$'):
-        Codec(ValueType.STRING, 1).decode(b'\x53\0' + bytes(82))
-    assert len(Codec(ValueType.STRING, 1).decode(b'\x52\0' + bytes(82))) == 82
-
-
-@pytest.mark.parametrize('text, error', [
-    ('x' * 83, '83 characters, a PLC string has 82'),
-    ('5 \u20ac', "character '\u20ac' does not exist in a PLC")])
-def test_string_that_cannot_be_written(text: str, error: str) -> None:
+@pytest.mark.parametrize('codec, error', [
+    (Codec(ValueType.STRING, 1), '83 characters, a PLC string has 82'),
+    (Codec(ValueType.STRING, 3, packed=True), '83 characters, the mapping has room for 6')])
+def test_string_that_cannot_be_written(codec: Codec, error: str) -> None:
     with pytest.raises(FormatError) as caught:
-        Codec(ValueType.STRING, 1).check(text)
+        codec.check('x' * 83)
     assert str(caught.value) == error
 
 
@@ -209,18 +200,41 @@ def test_words_that_elements_take(kind: ValueType, length: int, bit: int, words:
     assert Codec(kind, length, bit).words == words
 
 
+@pytest.mark.parametrize('codec, words', [
+    (Codec(ValueType.BOOL, 20), 1), (Codec(ValueType.BCD16, 3), 1),
+    (Codec(ValueType.INT32, 3), 2), (Codec(ValueType.FLOAT32, 3), 2),
+    (Codec(ValueType.STRING, 1), 42), (Codec(ValueType.STRING, 9, packed=True), 1)])
+def test_words_of_one_value(codec: Codec, words: int) -> None:
+    assert codec.element_words == words
+    assert Codec(ValueType.STRING, 9, packed=True).words == 9
+
+
 def test_bits_across_words() -> None:
     codec = Codec(ValueType.BOOL, 4, 14)
     assert list(codec.decode(bytes.fromhex('00 40 02 00'))) == [1, 0, 0, 1]
     assert codec.bit_changes([1, 0, 0, 1]) == [(0xC000, 0x4000), (0x0003, 0x0002)]
 
 
-@pytest.mark.parametrize('file_type, natural', [
-    (FileType.INTEGER, 'int16'), (FileType.BINARY, 'uint16'), (FileType.INPUT, 'uint16'),
-    (FileType.OUTPUT, 'uint16'), (FileType.STATUS, 'uint16'), (FileType.BCD, 'uint16'),
-    (FileType.ASCII, 'uint16'), (FileType.FLOAT, 'float32'), (FileType.LONG, 'int32'),
-    (FileType.TIMER, 'int16'), (FileType.COUNTER, 'int16'), (FileType.CONTROL, 'int16'),
-    (FileType.STRING, 'string')])
-def test_natural_type_of_a_file(file_type: FileType, natural: str) -> None:
-    assert types_of(file_type)[0].value == natural
-    assert ValueType.BOOL not in types_of(file_type)
+@pytest.mark.parametrize('text, family, natural', [
+    ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:000', 'PLC5', 'uint16'),
+    ('O:000', 'PLC5', 'uint16'), ('S:0', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'uint16'),
+    ('A9:0', 'PLC5', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L9:0', 'SLC', 'int32'),
+    ('T4:0.ACC', 'PLC5', 'int16'), ('C5:0.ACC', 'PLC5', 'int16'), ('R6:0.LEN', 'PLC5', 'int16'),
+    ('ST9:0', 'PLC5', 'string'), ('PD9:0.SP', 'PLC5', 'float32'), ('PD9:0', 'PLC5', 'int16'),
+    ('PD9:0.50', 'PLC5', 'int16'), ('PD9:0.SPS', 'SLC', 'int16'), ('MG9:0.ERR', 'PLC5', 'int16'),
+    ('BT9:0.RLEN', 'PLC5', 'int16'), ('SC9:0.TIM', 'PLC5', 'int16')])
+def test_natural_type_of_a_place(text: str, family: str, natural: str) -> None:
+    types = types_of(Address.parse(text, PlcType(family)))
+    assert types[0].value == natural
+    assert ValueType.BOOL not in types
+
+
+@pytest.mark.parametrize('text', ['N7:0/3', 'T4:0/DN', 'PD9:0/INI', 'O:000/17'])
+def test_bits_are_bool_only(text: str) -> None:
+    assert types_of(Address.parse(text, PlcType.PLC5)) == (ValueType.BOOL,)
+
+
+def test_words_and_floats_of_structures_are_nothing_else() -> None:
+    assert types_of(Address.parse('PD9:0.SP', PlcType.PLC5)) == (ValueType.FLOAT32,)
+    assert types_of(Address.parse('T4:0.ACC', PlcType.SLC)) == (
+        ValueType.INT16, ValueType.UINT16)

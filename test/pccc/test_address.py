@@ -17,8 +17,10 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address, Area
+from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -80,7 +82,7 @@ def test_long_files_are_of_the_slc_family_only() -> None:
     '', ' ', 'N', 'N7', 'N7:', ':0', '7:0', 'X7:0', 'NN7:0', 'N7:0:1', 'N7:0/', 'N7:0.', 'N7:-1',
     'N7:0 /1', 'N7:0.1', 'N7:0.ACC', 'N7:0/DN', 'N7/3', 'T4/3', 'B3/DN', 'F8:0/1', 'L:0', 'ST:0',
     'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN', 'T4:0.LEN',
-    'R6:0.ACC', 'N7:123456', 'N1234:0', 'ST9:0.1', 'PD9:0', '%N7:0', 'N7:0\n1', '##N7:0',
+    'R6:0.ACC', 'N7:123456', 'N1234:0', 'ST9:0.1', 'X9:0', '%N7:0', 'N7:0\n1', '##N7:0',
 ])
 def test_what_is_no_address(family: PlcType, text: str) -> None:
     with pytest.raises(AddressSyntaxError):
@@ -118,6 +120,10 @@ def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
 @pytest.mark.parametrize(('family', 'last', 'beyond'), [
     (PLC5, 'N999:999', 'N999:1000'), (SLC, 'N255:255', 'N255:256'),
     (SLC, 'N255:0', 'N256:0'), (PLC5, 'S:127', 'S:128'), (PLC5, 'ST9:779', 'ST9:780'),
+    (PLC5, 'PD9:398', 'PD9:399'), (PLC5, 'MG9:584', 'MG9:585'),
+    (SLC, 'PD9:255', 'PD9:256'), (SLC, 'PD9:0.22', 'PD9:0.23'), (SLC, 'MG9:0.24', 'MG9:0.25'),
+    (PLC5, 'PD9:0.80', 'PD9:0.82'), (PLC5, 'MG9:0.55', 'MG9:0.56'),
+    (PLC5, 'BT9:999.5', 'BT9:0.6'),
     (PLC5, 'I:277', 'I:300'), (PLC5, 'I:277/17', 'I:277/20'), (SLC, 'I:30', 'I:31'),
     (SLC, 'I:0.255', 'I:0.256'), (PLC5, 'B3/15999', 'B3/16000'), (SLC, 'B3/4095', 'B3/4096'),
     (SLC, 'I1:0', 'I2:0'), (PLC5, 'O0:0', 'O1:0'), (PLC5, 'N3:0', 'N2:0'),
@@ -146,12 +152,14 @@ def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
 texts = st.builds(
     '{}{}{}{}{}{}{}'.format,
     st.sampled_from(['', '', '#']),
-    st.sampled_from(['N', 'B', 'T', 'C', 'R', 'S', 'I', 'O', 'F', 'ST', 'A', 'D', 'L', 'X']),
+    st.sampled_from(['N', 'B', 'T', 'C', 'R', 'S', 'I', 'O', 'F', 'ST', 'A', 'D', 'L', 'X', 'PD',
+                     'MG', 'BT', 'SC']),
     st.sampled_from(['', '', '0', '1', '2', '3', '7', '9', '255', '300']),
     st.sampled_from([':', ':', ';', '/']),
     st.integers(0, 300),
-    st.sampled_from(['', '', '.0', '.1', '.2', '.9', '.ACC', '.PRE', '.LEN', '.CON', '.DN']),
-    st.sampled_from(['', '', '/0', '/07', '/15', '/17', '/DN', '/EN', '/FD', '/ACC']))
+    st.sampled_from(['', '', '.0', '.1', '.2', '.9', '.3', '.26', '.ACC', '.PRE', '.LEN', '.CON',
+                     '.DN', '.SP', '.ERR']),
+    st.sampled_from(['', '', '/0', '/07', '/15', '/17', '/DN', '/EN', '/FD', '/ACC', '/INI']))
 
 
 @PROPERTY
@@ -165,25 +173,113 @@ def test_parse_and_str_are_inverse(text: str, family: PlcType) -> None:
     assert Address.parse(str(address).lower(), family) == address
 
 
-@PROPERTY
-@given(FAMILIES, st.sampled_from(FileType), st.integers(3, 255), st.integers(0, 127),
-       st.one_of(st.none(), st.integers(0, 15)), st.integers(0, 2))
-def test_every_address_is_read_back(family: PlcType, kind: FileType, file: int, element: int,
-                                    bit: int | None, word: int) -> None:
-    if family is PLC5 and kind is FileType.LONG:
-        return
-    if kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS):
-        file = kind.layout.default_file or 0
+@st.composite
+def addresses(draw: st.DrawFn) -> Address:
+    """Return any place of any file type."""
+    family = draw(FAMILIES)
+    kind = draw(st.sampled_from(file_types_of(family)))
+    layout = layout_of(kind, family)
+    fixed = kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS)
+    file = kind.default_file if fixed else draw(st.integers(3, 255))
     slot = kind.is_io and family is SLC
-    address = Address(
-        family, kind, file, element % 31 if slot else element,
-        word if kind.is_structure or slot else 0, bit if kind.has_bits else None)
-    assert Address.parse(str(address), family) == address
+    words = 256 if slot else layout.words if kind.is_structure else 1
+    word = draw(st.integers(0, words - 1).filter(layout.value_words))
+    bits = st.one_of(st.none(), st.integers(0, 15))
+    bit = draw(bits) if kind.has_bits and layout.value_words(word) == 1 else None
+    assert file is not None
+    return Address(family, kind, file, draw(st.integers(0, 30 if slot else 127)), word, bit)
 
 
 @PROPERTY
-@given(st.one_of(st.text(max_size=20), st.text('NBTSIO0123456789:;./#$ACDN \u0663', max_size=14)),
-       FAMILIES)
+@given(addresses())
+def test_every_address_is_read_back(address: Address) -> None:
+    assert Address.parse(str(address), address.plc_type) == address
+
+
+@pytest.mark.parametrize('family', BOTH)
+def test_every_member_has_its_name_in_text(family: PlcType) -> None:
+    for kind in file_types_of(family):
+        for name, member in layout_of(kind, family).members.items():
+            if name == 'CON':
+                continue  # T4:1 is that already
+            sign = '.' if member.bit is None else '/'
+            address = Address.parse(f'{kind.value}10:1.{name}', family)
+            assert (address.word, address.bit) == (member.word, member.bit)
+            assert str(address) == f'{kind.value}10:1{sign}{name}'
+            assert Address.parse(str(address), family) == address
+
+
+@pytest.mark.parametrize(('family', 'text', 'word', 'bit', 'shown'), [
+    (PLC5, 'PD12:10.SP', 2, None, 'PD12:10.SP'), (PLC5, 'PD12:10.26', 26, None, 'PD12:10.PV'),
+    (PLC5, 'PD10:0.50', 50, None, 'PD10:0.50'), (PLC5, 'PD10:0.81/3', 81, 3, 'PD10:0.81/3'),
+    (PLC5, 'PD10:0/MO', 0, 1, 'PD10:0/MO'), (PLC5, 'PD10:0/INI', 1, 12, 'PD10:0/INI'),
+    (PLC5, 'PD10:0.1/INI', 1, 12, 'PD10:0/INI'), (PLC5, 'PD10:0.1/12', 1, 12, 'PD10:0/INI'),
+    (PLC5, 'MG9:2.DLEN', 3, None, 'MG9:2.DLEN'), (PLC5, 'MG9:2/5', 0, 5, 'MG9:2/DN'),
+    (PLC5, 'BT11:0.RGS', 5, None, 'BT11:0.RGS'), (PLC5, 'bt11:0.to', 0, 8, 'BT11:0/TO'),
+    (PLC5, 'SC13:0.TIM', 2, None, 'SC13:0.TIM'), (PLC5, 'SC13:4/FS', 0, 14, 'SC13:4/FS'),
+    (SLC, 'PD10:0.SPS', 2, None, 'PD10:0.SPS'), (SLC, 'PD10:0.2', 2, None, 'PD10:0.SPS'),
+    (SLC, 'PD10:0.22', 22, None, 'PD10:0.22'), (SLC, 'PD10:0/AM', 0, 1, 'PD10:0/AM'),
+    (SLC, 'PD10:0.3/2', 3, 2, 'PD10:0.3/2'), (SLC, 'MG11:0/DN', 17, 13, 'MG11:0/DN'),
+    (SLC, 'MG11:0.17/13', 17, 13, 'MG11:0/DN'), (SLC, 'MG11:0.ERR', 18, None, 'MG11:0.ERR'),
+    (SLC, 'MG11:0.16/15', 16, 15, 'MG11:0.16/15')])
+def test_members_of_large_structures(family: PlcType, text: str, word: int, bit: int | None,
+                                     shown: str) -> None:
+    address = Address.parse(text, family)
+    assert (address.word, address.bit, str(address)) == (word, bit, shown)
+
+
+@pytest.mark.parametrize(('text', 'reason'), [
+    ('PD10:0.3', 'word 3 is the second half of a float32; write the first, 2'),
+    ('PD10:0.SP/3', 'PD10:0.SP is a float32, which has no bits to address'),
+    ('PD10:0.2/3', 'PD10:0.SP is a float32, which has no bits to address'),
+    ('PD10:0.2/EN', 'EN is no member here'), ('PD10:0.1/EN', 'EN is no member here'),
+    ('PD10:0.SP/INI', 'INI is no member here'), ('PD10:0.SPS', 'SPS is no member here'),
+    ('BT9:0.ACC', 'ACC is no member here'), ('PD:0', 'give the file number, as in PD9:0'),
+    ('SC:0', 'give the file number')])
+def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
+    with pytest.raises(AddressSyntaxError, match=f'^{reason}'):
+        Address.parse(text, PLC5)
+
+
+@pytest.mark.parametrize(('letters', 'family'), [
+    ('L', PLC5), ('BT', SLC), ('SC', SLC), ('X', PLC5), ('X', SLC)])
+def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None:
+    known = ', '.join(kind.value for kind in file_types_of(family))
+    with pytest.raises(AddressSyntaxError, match=(
+            f'^{family.value} has no {letters} files; file types: {known}$')):
+        Address.parse(f'{letters}9:0', family)
+
+
+@pytest.mark.parametrize(('text', 'element', 'bit', 'shown'), [
+    ('I:5', 5, None, 'I:5'), ('o:0/3', 0, 3, 'O:0/3'), ('I1:300/15', 300, 15, 'I:300/15'),
+    ('I:7935', 7935, None, 'I:7935')])
+def test_flat_io_counts_the_words_of_the_image(text: str, element: int, bit: int | None,
+                                               shown: str) -> None:
+    address = Address.parse(text, SLC, Access.FLAT)
+    assert (address.element, address.word, address.bit) == (element, 0, bit)
+    assert address.is_flat
+    assert (address.offset, address.area_size) == (element, 7936)
+    assert str(address) == shown
+    assert Address.parse(shown, SLC, Access.FLAT) == address
+    assert address.area != Address.parse('I:0', SLC).area
+    assert address.at_offset(9).offset == 9
+
+
+def test_access_flat_changes_no_other_address() -> None:
+    for text in ('N7:3', 'T4:0/DN', 'PD9:0.4'):
+        assert Address.parse(text, SLC, Access.FLAT) == Address.parse(text, SLC)
+
+
+def test_flat_io_has_no_words_of_slots() -> None:
+    with pytest.raises(AddressSyntaxError, match='^with access Flat write the word'):
+        Address.parse('I:1.0', SLC, Access.FLAT)
+    with pytest.raises(AddressRangeError, match='^elements of I run from 0 to 7935$'):
+        Address.parse('I:7936', SLC, Access.FLAT)
+
+
+@PROPERTY
+@given(st.one_of(
+    st.text(max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), FAMILIES)
 def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) -> None:
     try:
         address = Address.parse(text, family)
@@ -194,8 +290,8 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
 
 
 @PROPERTY
-@given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS']), FAMILIES,
-       st.integers(0, 255))
+@given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS', 'PD9:3', 'MG9:1']),
+       FAMILIES, st.integers(0, 255))
 def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: int) -> None:
     address = Address.parse(text, family)
     assert address.at_offset(address.offset) == address
@@ -207,7 +303,9 @@ def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: in
 @pytest.mark.parametrize(('text', 'family', 'offset', 'size'), [
     ('N7:5', SLC, 5, 256), ('N7:5', PLC5, 5, 1000), ('T4:2.ACC', SLC, 8, 768),
     ('F8:3', PLC5, 6, 2000), ('ST9:1', SLC, 42, 256 * 42), ('I:3.2', SLC, 2, 256),
-    ('I:012', PLC5, 10, 192), ('S:1', PLC5, 1, 128), ('L9:2', SLC, 4, 512)])
+    ('I:012', PLC5, 10, 192), ('S:1', PLC5, 1, 128), ('L9:2', SLC, 4, 512),
+    ('PD9:2.SP', PLC5, 166, 399 * 82), ('PD9:2.SPS', SLC, 48, 256 * 23),
+    ('BT9:1.RGS', PLC5, 11, 6000), ('MG9:1/TO', PLC5, 56, 585 * 56)])
 def test_offset_counts_words(text: str, family: PlcType, offset: int, size: int) -> None:
     address = Address.parse(text, family)
     assert (address.offset, address.area_size) == (offset, size)

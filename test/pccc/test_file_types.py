@@ -16,67 +16,144 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.file_types import BY_SLC_CODE, FileType, Member, PlcType
+from abdf1_ros.pccc.file_types import (
+    BY_SLC_CODE,
+    file_types_of,
+    FileType,
+    Layout,
+    layout_of,
+    PlcType,
+)
+from abdf1_ros.pccc.typed_data import TypedData
 import pytest
+
+PLC5, SLC = PlcType.PLC5, PlcType.SLC
 
 
 @pytest.mark.parametrize(('letters', 'file'), [
     ('O', 0), ('I', 1), ('S', 2), ('B', 3), ('T', 4), ('C', 5), ('R', 6), ('N', 7), ('F', 8),
-    ('ST', None), ('A', None), ('D', None), ('L', None)])
+    ('ST', None), ('A', None), ('D', None), ('L', None), ('PD', None), ('MG', None),
+    ('BT', None), ('SC', None)])
 def test_default_files_are_those_of_the_specification(letters: str, file: int | None) -> None:
-    assert FileType(letters).layout.default_file == file
+    assert FileType(letters).default_file == file
 
 
 @pytest.mark.parametrize(('letters', 'code', 'words'), [
     ('S', 0x84, 1), ('B', 0x85, 1), ('T', 0x86, 3), ('C', 0x87, 3), ('R', 0x88, 3),
     ('N', 0x89, 1), ('F', 0x8A, 2), ('O', 0x8B, 1), ('I', 0x8C, 1), ('ST', 0x8D, 42),
-    ('A', 0x8E, 1), ('D', 0x8F, 1), ('L', 0x91, 2)])
+    ('A', 0x8E, 1), ('D', 0x8F, 1), ('L', 0x91, 2), ('MG', 0x92, 25), ('PD', 0x93, 23)])
 def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
     kind = FileType(letters)
-    assert (kind.layout.slc_code, kind.layout.words) == (code, words)
+    layout = layout_of(kind, SLC)
+    assert (layout.code, layout.words, layout.wire_words) == (code, words, words)
     assert BY_SLC_CODE[code] is kind
 
 
-def test_every_file_type_has_its_own_slc_code() -> None:
-    assert len(BY_SLC_CODE) == len(FileType) == 13
+def test_every_file_type_of_an_slc_has_its_own_code() -> None:
+    assert len(BY_SLC_CODE) == len(file_types_of(SLC)) == 15
 
 
-@pytest.mark.parametrize(('letters', 'type_id', 'size'), [
-    ('N', 4, 2), ('B', 4, 2), ('T', 5, 10), ('C', 6, 6), ('R', 7, 6), ('F', 8, 4), ('ST', 3, 84)])
-def test_plc5_types_and_element_sizes(letters: str, type_id: int, size: int) -> None:
-    layout = FileType(letters).layout
-    assert layout.plc5_id == type_id
-    assert 2 * (layout.plc5_words or layout.words) == size
+@pytest.mark.parametrize(('letters', 'descriptor', 'words', 'size'), [
+    ('N', '42', 1, 2), ('B', '42', 1, 2), ('A', '42', 1, 2), ('D', '42', 1, 2),
+    ('S', '42', 1, 2), ('I', '42', 1, 2), ('O', '42', 1, 2), ('T', '59 0A', 3, 10),
+    ('C', '66', 3, 6), ('R', '76', 3, 6), ('F', '94 08', 2, 4), ('ST', '39 54', 42, 84),
+    ('PD', '99 15 A4', 82, 164), ('MG', '99 16 70', 56, 112), ('SC', '96 1D', 3, 6),
+    ('BT', '99 20 0C', 6, 12)])
+def test_plc5_descriptors_and_element_sizes(letters: str, descriptor: str, words: int,
+                                            size: int) -> None:
+    layout = layout_of(FileType(letters), PLC5)
+    assert (layout.words, 2 * layout.wire_words) == (words, size)
+    encoded = TypedData(layout.code, 2 * layout.wire_words, bytes(4 * size)).encode()
+    assert encoded.endswith(bytes.fromhex(descriptor) + bytes(4 * size))
 
 
-def test_plc5_has_no_long_files() -> None:
-    assert FileType.LONG.layout.plc5_id is None
-
-
-@pytest.mark.parametrize(('letters', 'members'), [
-    ('T', {'CON': (0, None), 'PRE': (1, None), 'ACC': (2, None), 'EN': (0, 15), 'TT': (0, 14),
-           'DN': (0, 13)}),
-    ('C', {'CON': (0, None), 'PRE': (1, None), 'ACC': (2, None), 'CU': (0, 15), 'CD': (0, 14),
-           'DN': (0, 13), 'OV': (0, 12), 'UN': (0, 11), 'UA': (0, 10)}),
-    ('R', {'CON': (0, None), 'LEN': (1, None), 'POS': (2, None), 'EN': (0, 15), 'EU': (0, 14),
-           'DN': (0, 13), 'EM': (0, 12), 'ER': (0, 11), 'UL': (0, 10), 'IN': (0, 9),
-           'FD': (0, 8)}),
-    ('N', {})])
-def test_members(letters: str, members: dict[str, tuple[int, int | None]]) -> None:
-    assert FileType(letters).layout.members == {
-        name: Member(word, bit) for name, (word, bit) in members.items()}
+@pytest.mark.parametrize(('family', 'missing'), [
+    (PLC5, {'L'}), (SLC, {'BT', 'SC'}),
+    (PlcType.PLC3, {'R', 'F', 'ST', 'L', 'PD', 'MG', 'BT', 'SC'})])
+def test_file_types_that_a_family_does_not_have(family: PlcType, missing: set[str]) -> None:
+    assert {kind.value for kind in FileType} - {
+        kind.value for kind in file_types_of(family)} == missing
+    for letters in missing:
+        with pytest.raises(KeyError):
+            layout_of(FileType(letters), family)
 
 
 def test_kinds_of_files() -> None:
     assert {kind.value for kind in FileType if kind.is_io} == {'I', 'O'}
-    assert {kind.value for kind in FileType if kind.is_structure} == {'T', 'C', 'R'}
+    assert {kind.value for kind in FileType if kind.is_structure} == {
+        'T', 'C', 'R', 'PD', 'MG', 'BT', 'SC'}
     assert {kind.value for kind in FileType if not kind.has_bits} == {'F', 'ST', 'L'}
 
 
-def test_control_word_of_structures_belongs_to_the_processor() -> None:
-    for kind in FileType:
-        assert kind.layout.control_words == (frozenset((0,)) if kind.is_structure else set())
+@pytest.mark.parametrize('family', PlcType)
+def test_members_are_those_of_structures_and_lie_inside(family: PlcType) -> None:
+    for kind in file_types_of(family):
+        layout = layout_of(kind, family)
+        assert bool(layout.members) is kind.is_structure
+        ends = [member.word + member.words for member in layout.members.values()]
+        assert max(ends, default=0) <= layout.words
 
 
-def test_families_are_those_of_the_specification() -> None:
-    assert [family.value for family in PlcType] == ['PLC2', 'PLC3', 'PLC5', 'SLC']
+@pytest.mark.parametrize('family', PlcType)
+def test_members_do_not_share_bits_or_words(family: PlcType) -> None:
+    for kind in file_types_of(family):
+        members = layout_of(kind, family).members.values()
+        places = [(member.word, member.bit) for member in members]
+        assert len(set(places)) == len(places)
+        values = [member.word + n for member in members if member.bit is None
+                  for n in range(member.words)]
+        assert len(set(values)) == len(values)
+
+
+def test_value_words_tell_floats_and_their_halves_from_words() -> None:
+    pid = layout_of(FileType.PID, PLC5)
+    assert [pid.value_words(word) for word in range(6)] == [1, 1, 2, 0, 2, 0]
+    assert [pid.value_words(word) for word in (48, 49, 50, 81)] == [2, 0, 1, 1]
+    assert {layout_of(FileType.PID, SLC).value_words(word) for word in range(23)} == {1}
+
+
+@pytest.mark.parametrize('family', PlcType)
+def test_whole_control_words_are_never_written(family: PlcType) -> None:
+    for kind in file_types_of(family):
+        layout = layout_of(kind, family)
+        flagged = {member.word for member in layout.members.values() if member.bit is not None}
+        assert bool(flagged) is kind.is_structure
+        assert not any(layout.may_write(word) for word in flagged)
+
+
+def test_everything_of_a_plain_file_may_be_written() -> None:
+    assert Layout().may_write(0)
+    assert Layout().may_write(0, 15)
+
+
+def writable(letters: str, family: PlcType) -> str:
+    """Return the names of what may be written."""
+    members = layout_of(FileType(letters), family).members
+    layout = layout_of(FileType(letters), family)
+    return ' '.join(name for name, member in members.items()
+                    if layout.may_write(member.word, member.bit))
+
+
+@pytest.mark.parametrize(('letters', 'family', 'names'), [
+    ('T', PLC5, 'PRE ACC EN TT DN'), ('T', SLC, 'PRE ACC EN TT DN'),
+    ('C', SLC, 'PRE ACC CU CD DN OV UN UA'), ('R', PLC5, 'LEN POS EN EU DN EM ER UL IN FD'),
+    ('BT', PLC5, 'CO TO'), ('MG', PLC5, 'TO CO'), ('MG', SLC, ''), ('SC', PLC5, 'PRE'),
+    ('PD', PLC5, 'CT CL PVT DO SWM CA MO PE SP KP KI KD BIAS MAXS MINS DB SO MAXO MINO UPD '
+                 'PVH PVL DVP DVN PVDB DVDB MAXI MINI'),
+    ('PD', SLC, 'OL CM AM TM SPS KC TI TD MAXS MINS CVH CVL')])
+def test_what_may_be_written(letters: str, family: PlcType, names: str) -> None:
+    assert writable(letters, family) == names
+
+
+@pytest.mark.parametrize(('letters', 'family', 'word', 'bit'), [
+    ('T', PLC5, 0, 3), ('MG', PLC5, 0, 15), ('MG', PLC5, 4, None), ('PD', PLC5, 1, 12),
+    ('PD', PLC5, 50, None), ('PD', PLC5, 81, 0), ('PD', SLC, 10, None), ('PD', SLC, 17, None),
+    ('MG', SLC, 16, 15)])
+def test_what_has_no_name_is_internal(letters: str, family: PlcType, word: int,
+                                      bit: int | None) -> None:
+    assert not layout_of(FileType(letters), family).may_write(word, bit)
+
+
+def test_both_words_and_single_bits_of_a_writable_value_may_be_written() -> None:
+    assert layout_of(FileType.TIMER, PLC5).may_write(1, 7)
+    assert layout_of(FileType.PID, PLC5).may_write(3)

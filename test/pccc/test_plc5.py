@@ -57,7 +57,12 @@ def test_address_in_logical_binary(address: SystemAddress, encoded: str) -> None
     ('07 FF 00 00 FF 07 00 FF 1E 00', SystemAddress(7, 30)),
     ('00 24 4E 31 30 3A 33 36 30 00', SystemAddress(10, 360)),
     ('00 24 54 34 3A 32 2E 41 43 43 00', SystemAddress(4, 2, 2)),
-    ('00 24 49 3A 30 31 37 00', SystemAddress(1, 0o17))])
+    ('00 24 49 3A 30 31 37 00', SystemAddress(1, 0o17)),
+    (b'\0$PD12:10.SP\0', SystemAddress(12, 10, 2)), (b'\0$PD12:10\0', SystemAddress(12, 10)),
+    (b'\0$PD12:10.50\0', SystemAddress(12, 10, 50)), (b'\0$BT9:3.RGS\0', SystemAddress(9, 3, 5)),
+    (b'\0$MG9:3.DLEN\0', SystemAddress(9, 3, 3)), (b'\0$SC9:3.TIM\0', SystemAddress(9, 3, 2)),
+    (b'\0$ST9:3\0', SystemAddress(9, 3)), (b'\0$R6:3.POS\0', SystemAddress(6, 3, 2)),
+    (b'\0$D9:3\0', SystemAddress(9, 3)), (b'\0$#N7:3\0', SystemAddress(7, 3))])
 def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
     reader = parameters(encoded)
     assert SystemAddress.read(reader) == address
@@ -70,6 +75,12 @@ def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
     '00 24 4E 37 3A 30 2F 31 00', '00 24 FF 37 3A 30 00'])
 def test_what_is_no_address(encoded: str) -> None:
     with pytest.raises(FormatError):
+        SystemAddress.read(parameters(encoded))
+
+
+@pytest.mark.parametrize('encoded', ['04 1E 00', '05 00 1E 00', '0D 00 02 01 00', '01 00 00'])
+def test_address_without_a_file_is_refused(encoded: str) -> None:
+    with pytest.raises(FormatError, match='^address mask 0. names no file$'):
         SystemAddress.read(parameters(encoded))
 
 
@@ -101,6 +112,10 @@ def test_read_modify_write_takes_243_bytes() -> None:
     assert len(ReadModifyWrite(fits).encode()) == 1 + 29 * 8 + 11
     with pytest.raises(FormatError, match='243'):
         ReadModifyWrite((*[short] * 28, long, long)).encode()
+    body = b''.join(entry.encode() for entry in fits)
+    assert ReadModifyWrite.read(Reader(body)).sets == fits
+    with pytest.raises(FormatError, match='^244 bytes of words to modify, 243 are allowed$'):
+        ReadModifyWrite.read(Reader(body + b'\0'))
 
 
 @pytest.mark.parametrize('entry', commands(*COMMANDS), ids=lambda entry: entry.name)

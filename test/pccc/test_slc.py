@@ -16,9 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_types import BY_SLC_CODE, FileType
 from abdf1_ros.pccc.slc import (
+    FLAT_CODES,
     LogicalAddress,
     LogicalRead,
     LogicalWrite,
@@ -32,40 +37,49 @@ import pytest
 from support.properties import PROPERTY
 from support.vectors import commands, Vector
 
-COMMANDS: dict[int, type[LogicalRead | LogicalWrite | MaskedWrite]] = {
-    0xA2: LogicalRead, 0xAA: LogicalWrite, 0xAB: MaskedWrite}
+Command = LogicalRead | LogicalWrite | MaskedWrite
+
+READERS: dict[int, Callable[[Reader], Command]] = {
+    0xA1: partial(LogicalRead.read, is_short=True), 0xA2: LogicalRead.read,
+    0xA9: partial(LogicalWrite.read, is_short=True), 0xAA: LogicalWrite.read,
+    0xAB: MaskedWrite.read}
 
 levels = st.integers(0, 0xFFFF)
-addresses = st.builds(LogicalAddress, levels, st.integers(0, 255), levels, levels)
+places = levels, st.integers(0, 255), levels
+addresses = st.builds(LogicalAddress, *places, levels)
+short_addresses = st.builds(LogicalAddress, *places, st.none())
 
 
 @pytest.mark.parametrize(('command', 'encoded'), [
     (LogicalRead(LogicalAddress(7, 0x89, 0, 0), 20), 'A2 14 07 89 00 00'),
     (LogicalRead(LogicalAddress(10, 0x89, 300, 0), 2), 'A2 02 0A 89 FF 2C 01 00'),
     (LogicalRead(LogicalAddress(255, 0x89, 254, 255), 255), 'A2 FF FF FF 00 89 FE FF FF 00'),
+    (LogicalRead(LogicalAddress(7, 0x89, 1, None), 2), 'A1 02 07 89 01'),
+    (LogicalWrite(LogicalAddress(7, 0x89, 300, None), b'\x09\x00'),
+     'A9 02 07 89 FF 2C 01 09 00'),
     (LogicalWrite(LogicalAddress(4, 0x86, 0, 1), b'\x2C\x01'), 'AA 02 04 86 00 01 2C 01'),
     (MaskedWrite(LogicalAddress(3, 0x85, 4, 0), 0x0108, b'\x00\x01'),
      'AB 02 03 85 04 00 08 01 00 01'),
 ])
-def test_encode_and_read(command: LogicalRead | LogicalWrite | MaskedWrite, encoded: str) -> None:
+def test_encode_and_read(command: Command, encoded: str) -> None:
     data = bytes.fromhex(encoded)
     assert command.encode() == data
     reader = Reader(data[1:])
-    assert COMMANDS[data[0]].read(reader) == command
+    assert READERS[data[0]](reader) == command
     assert reader.is_empty
 
 
-@pytest.mark.parametrize('entry', commands(*COMMANDS), ids=lambda entry: entry.name)
+@pytest.mark.parametrize('entry', commands(*READERS), ids=lambda entry: entry.name)
 def test_command_of_every_vector(entry: Vector) -> None:
     data = entry.packet.data
     reader = Reader(data[1:])
-    command = COMMANDS[data[0]].read(reader)
+    command = READERS[data[0]](reader)
     assert reader.is_empty
     assert command.encode() == data
 
 
 def test_vectors_have_every_command() -> None:
-    assert {entry.fnc for entry in commands(*COMMANDS)} == set(COMMANDS)
+    assert {entry.fnc for entry in commands(*READERS)} == set(READERS)
 
 
 @PROPERTY
@@ -78,33 +92,48 @@ def test_commands_are_read_back(address: LogicalAddress, size: int, mask: int,
 
 
 @PROPERTY
-@given(st.sampled_from(sorted(COMMANDS)), st.binary(max_size=20))
+@given(short_addresses, st.integers(0, 255), st.binary(max_size=255))
+def test_short_commands_are_read_back(address: LogicalAddress, size: int, data: bytes) -> None:
+    for command in (LogicalRead(address, size), LogicalWrite(address, data)):
+        encoded = command.encode()
+        assert READERS[encoded[0]](Reader(encoded[1:])) == command
+
+
+@PROPERTY
+@given(st.sampled_from(sorted(READERS)), st.binary(max_size=20))
 def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
     reader = Reader(data)
     try:
-        command = COMMANDS[fnc].read(reader)
+        command = READERS[fnc](reader)
     except FormatError:
         return
     assert reader.is_empty
-    assert COMMANDS[fnc].read(Reader(command.encode()[1:])) == command
+    assert READERS[fnc](Reader(command.encode()[1:])) == command
 
 
 @pytest.mark.parametrize(('fnc', 'encoded'), [
-    (0xA2, ''), (0xA2, '02 07 89 00'), (0xA2, '02 07 89 00 00 01'), (0xA2, '02 07 89 FF 2C'),
+    (0xA1, '02 07 89'), (0xA1, '02 07 89 00 01'), (0xA9, '02 07 89 00 01'),
+    (0xA9, '02 07 89 00 01 02 03'), (0xA2, ''), (0xA2, '02 07 89 00'),
+    (0xA2, '02 07 89 00 00 01'), (0xA2, '02 07 89 FF 2C'),
     (0xAA, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01'), (0xAA, '02 07 89 00 00 01 02 03'),
     (0xAB, '02 07 89 00 00 08 00 08'), (0xAB, '04 07 89 00 00 08 00 08 00'),
     (0xAB, '02 07 89 00 00 08')])
 def test_sizes_that_do_not_add_up(fnc: int, encoded: str) -> None:
     with pytest.raises(FormatError):
-        COMMANDS[fnc].read(Reader(bytes.fromhex(encoded)))
+        READERS[fnc](Reader(bytes.fromhex(encoded)))
 
 
 @pytest.mark.parametrize(('fnc', 'encoded'), [
     (0xA2, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01 02'),
     (0xAB, '02 07 89 00 00 08 00 08 00')])
 def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str) -> None:
-    padded = COMMANDS[fnc].read(Reader(bytes.fromhex(encoded + ' 00 00')))
-    assert padded == COMMANDS[fnc].read(Reader(bytes.fromhex(encoded)))
+    padded = READERS[fnc](Reader(bytes.fromhex(encoded + ' 00 00')))
+    assert padded == READERS[fnc](Reader(bytes.fromhex(encoded)))
+
+
+def test_flat_codes_are_those_of_the_images() -> None:
+    assert FLAT_CODES == {FileType.OUTPUT: 0x82, FileType.INPUT: 0x83}
+    assert not FLAT_CODES.values() & BY_SLC_CODE.keys()
 
 
 def test_limits_of_the_manual() -> None:

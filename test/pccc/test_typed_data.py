@@ -66,14 +66,14 @@ def test_example_of_the_manual_with_a_padded_size() -> None:
     assert TypedData.decode(bytes.fromhex('9A 09 15 00 42') + data) == TypedData(4, 2, data)
 
 
-def test_bytes_behind_an_array_are_passed_over() -> None:
+def test_padding_behind_an_array_is_passed_over() -> None:
     assert TypedData.decode(bytes.fromhex('93 09 42 D2 04 00 00')) == TypedData(4, 2, b'\xD2\x04')
 
 
 @pytest.mark.parametrize('encoded', [
     '', '93', '93 09', '93 09 42 D2', '99 09', '99 09 05 42 D2 04', '9A 09 03', '42 D2',
     '42 D2 04 00', '40 D2', '90 09 42', '94 09 42 D2 04 00', '91 09 40', '9F 09 01', 'FF',
-    '93 09 40 D2 04'])
+    '93 09 40 D2 04', '93 09 42 D2 04 00 01', '93 09 42 D2 04 FF'])
 def test_what_does_not_add_up_is_a_format_error(encoded: str) -> None:
     with pytest.raises(FormatError):
         TypedData.decode(bytes.fromhex(encoded))

@@ -24,7 +24,7 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.slave import Station as LineStation
 from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
@@ -104,7 +104,7 @@ def store(plc: SimulatedPlc, text: str, values: Sequence[float] | str) -> None:
     """Put values of the natural type into a PLC's table."""
     address = Address.parse(text, plc.table.plc_type)
     if address.bit is None:
-        codec = Codec(types_of(address.file_type)[0], len(values))
+        codec = Codec(types_of(address)[0], len(values))
         plc.table.write(address, codec.encode(values))
         return
     assert not isinstance(values, str)
@@ -144,10 +144,12 @@ class DriverBench:
     """
 
     def __init__(self, mappings: Sequence[Mapping], *, network: Network | None = None,
-                 settings: DriverSettings | None = None, start: bool = True) -> None:
+                 settings: DriverSettings | None = None, start: bool = True,
+                 listener: Listener | None = None) -> None:
         self.network = network or Network(baud=115200, timeout=200)
         self.listener = Recorder(self.clock)
-        self.driver = Driver(self.network, mappings, settings or DriverSettings(), self.listener)
+        self.driver = Driver(
+            self.network, mappings, settings or DriverSettings(), listener or self.listener)
         self._stations: list[LineStation] = []
         self.far = _FarEnd(self._stations, self.network)
         self.line = VirtualLine(

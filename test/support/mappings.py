@@ -20,11 +20,16 @@ import math
 from pathlib import Path
 import tempfile
 
-from abdf1_ros.driver.mapping import COLUMNS, Command, load_mappings, Mapping, Publish
-from abdf1_ros.driver.values import types_of, ValueType
+from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.mapping import Command, Mapping, Publish
+from abdf1_ros.driver.scaling import Scaling
+from abdf1_ros.driver.values import types_of, ValueType, WordOrder
 from abdf1_ros.errors import Problem
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
 
 HEADER = ','.join(COLUMNS)
 
@@ -33,15 +38,19 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
                  plc: str = 'PLC5', length: int = 1, kind: str | None = None,
                  period: int | None = None, publish: str = 'Always', tag: str | None = None,
                  topic: str | None = None, minimum: float = -math.inf,
-                 maximum: float = math.inf, item: int = 1) -> Mapping:
+                 maximum: float = math.inf, item: int = 1, word_order: str = 'Low',
+                 scaling: Scaling | None = None, access: str | None = None,
+                 processor: str | None = None) -> Mapping:
     """Return what a row of these cells becomes; its name is the address unless told."""
-    address = Address.parse(text, PlcType(plc))
-    natural = ValueType.BOOL if address.bit is not None else types_of(address.file_type)[0]
+    way = Access(access) if access else None
+    address = Address.parse(text, PlcType(plc), way)
+    natural = types_of(address)[0]
     name = tag or f'{text}_{station}_{command}_{length}'
     return Mapping(
         item, item + 1, name, name, Command(command), address, station, PlcType(plc), length,
         ValueType(kind) if kind else natural, topic or name, period, Publish(publish),
-        minimum, maximum)
+        minimum, maximum, word_order=WordOrder(word_order), scaling=scaling,
+        access=way, processor=Processor(processor) if processor else None)
 
 
 def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:
@@ -55,3 +64,36 @@ def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], 
 def load_rows(*rows: str) -> tuple[list[Mapping], list[Problem]]:
     """Return what ``load_mappings`` makes of data rows with all columns in their order."""
     return load_text('\n'.join([HEADER, *rows]))
+
+
+GOOD = {'Tag': 'a', 'Command': 'ReadWrite', 'Address': 'N7:0', 'Station': '1',
+        'PLC_Type': 'PLC5'}
+
+
+def row(**cells: str) -> str:
+    """Return a row of these cells beside good ones."""
+    return ','.join((GOOD | cells).get(column, '') for column in COLUMNS)
+
+
+def one(**cells: str) -> Mapping:
+    """Return the mapping of such a row, which has to be good."""
+    mappings, problems = load_rows(row(**cells))
+    assert problems == []
+    return mappings[0]
+
+
+def faults(*rows: str) -> list[str]:
+    """Return the faults of rows as text, without the name of the file."""
+    _, problems = load_rows(*rows)
+    return [str(problem).split('map.csv:', 1)[1] for problem in problems]
+
+
+def fault(**cells: str) -> str:
+    """Return the one fault of a row."""
+    text, = faults(row(**cells))
+    return text
+
+
+def slc(**cells: str) -> str:
+    """Return a row of an SLC."""
+    return row(**{'PLC_Type': 'SLC', 'Command': 'Read'} | cells)

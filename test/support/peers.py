@@ -93,6 +93,7 @@ class PeerNode:
 
     def add(self, command: Packet) -> Errand:
         """Queue a command."""
+        self.stations.add((command.dst,))
         errand = Errand(command, self.clock)
         self.errands.append(errand)
         return errand

@@ -37,6 +37,10 @@ class Pty:
         name.symlink_to(os.ttyname(self._slave))
         self._is_open = True
 
+    def fileno(self) -> int:
+        """Return the descriptor of our end."""
+        return self._master
+
     def write(self, data: bytes) -> None:
         """Say something."""
         os.write(self._master, data)

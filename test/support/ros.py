@@ -64,13 +64,14 @@ _Result = TypeVar('_Result')
 
 
 class Process:
-    """A module of the package as a process; everything it says is kept, line by line."""
+    """A module of the package, or a file, as a process; all it says is kept, line by line."""
 
-    def __init__(self, module: str, *args: str) -> None:
+    def __init__(self, module: str | Path, *args: str) -> None:
         self.lines: list[str] = []
         self._said = threading.Condition()
+        program = [module] if isinstance(module, Path) else ['-m', f'abdf1_ros.{module}']
         self._process = subprocess.Popen(
-            [sys.executable, '-m', f'abdf1_ros.{module}', *args], text=True,
+            [sys.executable, *program, *args], text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self._readers = [
             threading.Thread(target=self._read, args=(stream,))
@@ -92,6 +93,11 @@ class Process:
         """Return all that it has said."""
         with self._said:
             return '\n'.join(self.lines)
+
+    @property
+    def number(self) -> int:
+        """Return the number that the operating system has for it."""
+        return self._process.pid
 
     @property
     def is_running(self) -> bool:
@@ -118,13 +124,13 @@ class Process:
         assert line is not None, f'nothing with {texts} in:\n{self.text}'
         return line
 
-    def say(self, line: str) -> None:
-        """Give a line to its standard input, and wait for the answer that contains it."""
+    def say(self, line: str) -> str:
+        """Give a line to its standard input; return the answer of the simulator to it."""
         after = len(self.lines)
         assert self._process.stdin is not None
         self._process.stdin.write(f'{line}\n')
         self._process.stdin.flush()
-        self.wait_for('simulator: station', after=after)
+        return self.wait_for('simulator: station', after=after)
 
     def send(self, *numbers: signal.Signals) -> None:
         """Send signals, one straight after the other."""

@@ -96,6 +96,7 @@ class MasterScript:
               station: int | None = None) -> None:
         """Carry out the first part of a transaction."""
         self._command, self._station, self._result = command, station, None
+        self.stations.add((command.dst if station is None else station,))
         if not self._started:
             self._started = True
             self.machine.start(self.now)

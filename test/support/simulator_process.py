@@ -34,13 +34,17 @@ from support.ros import Process, ros_args, write_csv
 NET_HEADER = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout'
 NET_ROW = '2,2,500,115200,200'
 
-MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Type,Period,Publish,Min,Max'
+MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Type,Period,Publish,Min,Max,' \
+    'Scale,Offset,Word_Order'
 MAP_ROWS = (
     'bits,Read,B3:0/2,1,PLC5,6,,,,,',
     'door,Read,I:017/12,1,PLC5,,,,,,',
     'rack,Read,I:017,1,PLC5,,,,,,',
     'speeds,Read,N7:0,1,PLC5,2,,,,,',
     'levels,ReadWrite,F8:0,1,PLC5,3,,,,-50,150',
+    'temperatures,ReadWrite,N7:4,1,PLC5,2,,,,-40,125,0.1,-40',
+    'weight,ReadWrite,N7:6,1,PLC5,,uint32,,,,,0.5,,High',
+    'label,ReadWrite,A10:0,1,PLC5,3,string',
     'timer,Read,T4:1,1,PLC5,3,,,,,',
     'timer/done,Read,T4:1/DN,1,PLC5,,,,,,',
     'counts,Read,C5:0,1,PLC5,6,,,,,',
@@ -69,7 +73,9 @@ SIMULATOR_ROWS = (
     '1,PLC5,B3:0/2,6,1 0 0 1 1 0,,',
     '1,PLC5,B3:4,1,65521,,',
     '1,PLC5,N7:0,16,1200 -800,,',
+    '1,PLC5,N7:4,4,615 0 1 2,,',
     '1,PLC5,F8:0,8,12.5 40.25 -3.5,,',
+    '1,PLC5,A10:0,3,24930 25344 0,,',
     '1,PLC5,T4:0,9,,,',
     '1,PLC5,T4:1.PRE,2,500 120,,',
     '1,PLC5,T4:1/DN,1,1,,',
@@ -99,6 +105,9 @@ READS: dict[str, tuple[Any, str, list[float] | str]] = {
     'rack': (UInt16MultiArray, 'I:017', [1 << 0o12]),
     'speeds': (Int16MultiArray, 'N7:0', [1200, -800]),
     'levels': (Float32MultiArray, 'F8:0', [12.5, 40.25, -3.5]),
+    'temperatures': (Float32MultiArray, 'N7:4', [21.5, -40.0]),
+    'weight': (Float32MultiArray, 'N7:6', [32769.0]),
+    'label': (String, '', 'abc'),
     'timer': (Int16MultiArray, 'T4:1', [1 << 13, 500, 120]),
     'timer/done': (UInt8MultiArray, 'T4:1/DN', [1]),
     'counts': (Int16MultiArray, 'C5:0', [0, 0, 0, 0, 9, 8]),
@@ -117,8 +126,8 @@ READS: dict[str, tuple[Any, str, list[float] | str]] = {
     'recipe': (Int16MultiArray, 'N7:10', [101, 102, 103, 104]),
     'heartbeat': (Int16MultiArray, 'N7:60', [7]),
 }
-WRITES = {'levels', 'flags', 'preset', 'lamp', 'total', 'name', 'digits', 'setpoint', 'recipe',
-          'reset'}
+WRITES = {'levels', 'temperatures', 'weight', 'label', 'flags', 'preset', 'lamp', 'total', 'name',
+          'digits', 'setpoint', 'recipe', 'reset'}
 
 STATUSES = ['link', 'counters', 'station 1', 'station 2', 'mappings', 'writes']
 

@@ -26,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import heapq
 from random import Random
+from typing import Protocol
 
 from abdf1_ros.df1.machine import Machine
 
@@ -56,6 +57,17 @@ class Noise:
             return bytes((random.randrange(256), byte))
         return bytes((byte,))
 
+    def damage(self, data: bytes, random: Random) -> bytes:
+        """Return what arrives in place of ``data``."""
+        return b''.join(self.bytes_for(byte, random) for byte in data)
+
+
+class Damage(Protocol):
+    """Anything that does something to what is on the line."""
+
+    def damage(self, data: bytes, random: Random) -> bytes:
+        """Return what arrives in place of ``data``."""
+
 
 QUIET = Noise()
 
@@ -71,7 +83,7 @@ class VirtualLine:
     """
 
     def __init__(self, *machines: Machine, baud: int = 19200, propagation: float = 0.0,
-                 chunk: int = 1, noise: Noise = QUIET, seed: int = 0) -> None:
+                 chunk: int = 1, noise: Damage = QUIET, seed: int = 0) -> None:
         self.now = 0.0
         self.noise = noise
         self.char_time = char_time(baud)
@@ -150,7 +162,7 @@ class VirtualLine:
             part = data[at:at + self._chunk]
             here = start + (at + len(part)) * self.char_time + self._propagation
             if self.noise is not QUIET:
-                part = b''.join(self.noise.bytes_for(byte, self._random) for byte in part)
+                part = self.noise.damage(part, self._random)
             if part:
                 self._count += 1  # keeps the order of what arrives at one instant
                 heapq.heappush(self._arrivals, (here, self._count, receiver, part))

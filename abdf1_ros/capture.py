@@ -1,0 +1,162 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Captures: what has been on a line, as text that can be sent to somebody else.
+
+A capture is ASCII, one line for each chunk of bytes as it was read or written::
+
+    # abdf1_ros capture 1
+    # begun: 2026-03-01T14:05:09.120+01:00
+    # baud: 19200
+    # check: CRC
+    # duplex: half
+    0.000000 > 10 05 01 FF
+    0.004210 < 10 04
+
+The first line gives the version of the format. Other lines with ``#`` are settings, "name:
+value", or remarks, and may stand anywhere. A chunk has the seconds since ``begun``, its
+direction (``>`` sent by whoever has recorded it, or by the first port of a tap; ``<`` received,
+or sent by the second port; ``?`` not known), and its bytes in hexadecimal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from enum import Enum
+import math
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+from abdf1_ros.errors import Problem
+from abdf1_ros.text import printable
+
+VERSION = 1
+_MAGIC = '# abdf1_ros capture'
+_FIRST_LINE = f'{_MAGIC} {VERSION}'
+
+
+class Direction(Enum):
+    """Which way a chunk went; the value is how a capture writes it."""
+
+    OUT = '>'
+    IN = '<'
+    UNKNOWN = '?'
+
+    @property
+    def opposite(self) -> Direction:
+        """Return the other way."""
+        return {Direction.OUT: Direction.IN, Direction.IN: Direction.OUT}.get(self, self)
+
+
+class Chunk(NamedTuple):
+    """Bytes as they were read or written; ``time`` in seconds, None where nobody noted it."""
+
+    time: float | None
+    direction: Direction
+    data: bytes
+
+    def __str__(self) -> str:
+        """Return the line of a capture."""
+        return f'{self.time or 0.0:.6f} {self.direction.value} {self.data.hex(" ").upper()}'
+
+
+class CaptureWriter:
+    """
+    Write a capture to ``path``, and begin anew when it has become too long.
+
+    ``limit`` is the most bytes on the disk: at half of it the file is renamed to ``<path>.1``,
+    in place of an older one, as is a capture that is there already. Every line is handed to the
+    operating system at once. Raises OSError, also where ``path`` is something else than a
+    capture, which is left alone.
+    """
+
+    def __init__(self, path: Path, limit: float = math.inf,
+                 settings: Mapping[str, str] | None = None) -> None:
+        self.path = path
+        self._limit = limit / 2
+        self._head = '\n'.join([_FIRST_LINE, *(
+            f'# {name}: {printable(value)}' for name, value in (settings or {}).items())])
+        self._written = 0
+        if path.exists() and not _is_capture(path):
+            raise OSError(f'{path} is there and is no capture; give another name')
+        self._file = self._begin()
+
+    def write(self, chunk: Chunk) -> None:
+        """Write a chunk."""
+        line = str(chunk)
+        if self._written + len(line) + 1 > self._limit:
+            self._file.close()
+            self._file = self._begin()
+        self._put(line)
+
+    def close(self) -> None:
+        """End the capture."""
+        self._file.close()
+
+    def _begin(self) -> TextIO:
+        if self.path.exists():
+            self.path.replace(f'{self.path}.1')
+        self._file = self.path.open(
+            'w', encoding='ascii', errors='backslashreplace', buffering=1)
+        self._written = 0
+        self._put(self._head)
+        return self._file
+
+    def _put(self, text: str) -> None:
+        self._written += self._file.write(f'{text}\n')
+
+
+def _is_capture(path: Path) -> bool:
+    """Tell whether a file may be put aside: a capture, or one with nothing in it."""
+    if not path.is_file():
+        return False
+    with path.open('rb') as file:
+        return file.readline(100).startswith(_MAGIC.encode()) or path.stat().st_size == 0
+
+
+def is_capture_line(line: str) -> bool:
+    """Tell whether ``line`` is the first of a capture, of whatever version."""
+    return line.startswith(_MAGIC)
+
+
+def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> Iterator[Chunk]:
+    """
+    Yield the chunks of a capture, and put its settings into ``settings`` as they come.
+
+    ``name`` is the file's in the Problem that is raised for a line that is none.
+    """
+    for number, text in enumerate(lines, 1):
+        line = text.strip()
+        if number == 1 and line != _FIRST_LINE:
+            raise Problem(f'{name}:1', f'"{line}" should be "{_FIRST_LINE}"')
+        if line.startswith('#'):
+            key, colon, value = line[1:].partition(':')
+            if colon:
+                settings[key.strip()] = value.strip()
+        elif line:
+            yield _chunk(line, f'{name}:{number}')
+
+
+def _chunk(line: str, where: str) -> Chunk:
+    time, _, rest = line.partition(' ')
+    direction, _, data = rest.partition(' ')
+    try:
+        chunk = Chunk(float(time), Direction(direction), bytes.fromhex(data))
+    except ValueError:
+        raise Problem(where, f'"{line[:60]}" should be seconds, ">", "<" or "?", and bytes, as '
+                      'in 0.004210 < 10 04') from None
+    if chunk.time is None or not math.isfinite(chunk.time):
+        raise Problem(where, f'"{time}" is no number of seconds')
+    return chunk

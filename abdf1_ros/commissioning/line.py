@@ -1,0 +1,51 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The line that the options of ``plc`` describe."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.driver.network import load_network, make_network, Network
+from abdf1_ros.errors import ConfigurationError, Problem
+
+# Somebody waits in front of the screen: a Timeout of 1000 ms, the default of a net CSV, is long.
+DEFAULTS = Network(timeout=300)
+
+MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer'}
+
+# Options that stand for a column of the net CSV.
+_COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
+            'timeout': 'timeout', 'own_station': 'station'}
+
+
+def network_of(options: argparse.Namespace) -> Network:
+    """Return the line of the options; raises ConfigurationError with every fault."""
+    base = load_network(options.net) if options.net else DEFAULTS
+    given = {column: (str(value), f'--{option.replace("_", "-")}')
+             for option, column in _COLUMNS.items()
+             if (value := getattr(options, option)) is not None}
+    network = make_network(given, base)
+    if not options.net and not options.port:
+        raise ConfigurationError([Problem(
+            '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])
+    mode = MODES[options.duplex] if options.duplex else network.mode
+    if mode == 'Slave':
+        raise ConfigurationError([Problem(
+            options.net, 'Mode Slave: somebody else is the master of this line; plc can only '
+            'be a master (--duplex half) or have the PLC for itself (--duplex full)')])
+    return replace(network, mode=mode, polling=DEFAULTS.polling)

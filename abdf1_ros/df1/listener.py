@@ -1,0 +1,102 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A decoder for a line of somebody else's, which finds out what is spoken there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Code, Duplex, FrameDecoder, Symbol
+
+# One in 256 wrong frames has what looks like a good BCC, so one alone proves nothing.
+_BCC_FRAMES = 2
+
+
+@dataclass(slots=True)
+class LineKind:
+    """Check and discipline of a line, None while nobody knows; both directions share one."""
+
+    checksum: Checksum | None = None
+    duplex: Duplex | None = None
+
+
+class ListeningDecoder(FrameDecoder):
+    """
+    A frame decoder that finds check and duplex by itself, where ``kind`` does not have them.
+
+    DLE SOH and DLE EOT exist in half duplex only (M 2-6); a message that neither came before is
+    taken for full duplex until one of them comes. A frame whose CRC is right settles the check
+    for CRC, two with a right BCC settle it for BCC. Until then a frame is given out when the
+    byte behind its BCC is there, which may be the second byte of a CRC.
+    """
+
+    def __init__(self, kind: LineKind) -> None:
+        super().__init__(kind.checksum or Checksum.CRC, kind.duplex or Duplex.HALF)
+        self._kind = kind
+        self._duplex_given = kind.duplex is not None
+        self._bcc_frames = 0
+
+    @property
+    def checksum(self) -> Checksum:
+        """Return the check that the last frame was read with."""
+        return self._checksum
+
+    def finish(self) -> Symbol | None:
+        """Return a frame that waits for a second check byte which will not come."""
+        waits = self._step == self._check and len(self._buffer) == 1
+        if not waits or self._kind.checksum is not None or not self._matches(Checksum.BCC):
+            return None
+        self._checksum = Checksum.BCC
+        return super()._check()
+
+    def _begin(self, code: int) -> Symbol | None:
+        kind = self._kind
+        if not self._duplex_given:
+            if code in (Code.SOH, Code.EOT):
+                kind.duplex = Duplex.HALF
+            elif code == Code.STX and kind.duplex is None:
+                kind.duplex = Duplex.FULL
+        self._duplex = kind.duplex or Duplex.HALF
+        return super()._begin(code)
+
+    def _poll_check(self) -> Symbol | None:
+        poll = super()._poll_check()
+        if not self._duplex_given and getattr(poll, 'valid', False):
+            self._kind.duplex = Duplex.HALF
+        return poll
+
+    def _check(self) -> Symbol | None:
+        if self._kind.checksum is not None:
+            self._checksum = self._kind.checksum
+        elif len(self._buffer) < Checksum.CRC.size:
+            return None
+        else:
+            self._find_checksum()
+        return super()._check()
+
+    def _find_checksum(self) -> None:
+        self._checksum = Checksum.CRC
+        if self._matches(Checksum.CRC):
+            self._kind.checksum = Checksum.CRC
+        elif self._matches(Checksum.BCC):
+            self._checksum = Checksum.BCC
+            self._bcc_frames += 1
+            if self._bcc_frames == _BCC_FRAMES:
+                self._kind.checksum = Checksum.BCC
+
+    def _matches(self, checksum: Checksum) -> bool:
+        check = checksum.encode(checksum.of_message(self._data, self._station))
+        return self._buffer.startswith(check)

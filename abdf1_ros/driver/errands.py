@@ -1,0 +1,130 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A line for errands: things done once, one after the other, without mappings or periods.
+
+It is the same link, with the same rules, that the driver reads and writes over.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container, Generator, Iterable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import Task
+from abdf1_ros.driver.job_tasks import JobTasks, Steps
+from abdf1_ros.driver.links import DriverSettings, make_link
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.served import Served
+from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
+from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.file_types import PlcType
+
+_Result = TypeVar('_Result')
+
+Order = Generator[Request, Packet, _Result]
+"""Yields requests, is sent the replies, and returns a result; ``transactions`` has such."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Errand:
+    """An order for a station, and who wants to know how it ends."""
+
+    station: int
+    order: Order[Any]
+    succeed: Callable[[Any], None]
+    fail: Callable[[Exception], None]
+
+    def steps(self) -> Steps:
+        """Carry out the order and report its end."""
+        try:
+            result = yield from self.order
+        except Abdf1Error as error:
+            self.fail(error)
+        else:
+            self.succeed(result)
+
+
+class Errands:
+    """
+    Carry out orders over the line of ``network``; ``machine`` is to be run on its port.
+
+    Stations that are ``absent`` get one try each until they answer, all others every retry of
+    the network. ``first_tns`` should be random, or we may be taken for whoever was here before
+    us. Commands that come for us are refused, but for an echo and the diagnostic status.
+    """
+
+    def __init__(self, network: Network, absent: Iterable[int] = (), first_tns: int = 0) -> None:
+        self.counters = Counters()
+        self.stations = ActiveStationList(absent)
+        for station in self.stations:
+            self.stations.lost(station.number, 0.0)
+        self.machine = Machine(
+            lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
+            timing=network.timing, counters=self.counters,
+            forget_on_send=network.mode == 'Master')
+        self._tasks = JobTasks(network.station, first_tns)
+        self._waiting: deque[_Errand] = deque()
+        served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)
+        # Without DLE NAK, which would make other stations of a line in use drop their replies.
+        self._link = make_link(network, DriverSettings(nak_on_command_timeout=False),
+                               self.machine, self.stations, served.serve, lambda event: None)
+
+    def add(self, station: int, order: Order[_Result], succeed: Callable[[_Result], None],
+            fail: Callable[[Exception], None]) -> None:
+        """
+        Ask for an order to be carried out; may be called from any thread, then wake the link.
+
+        Exactly one of ``succeed`` and ``fail`` is called, in the link thread.
+        """
+        self._waiting.append(_Errand(station, order, succeed, fail))
+
+    def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
+        """Return the next command of the order under way, or the first of the next one."""
+        under_way = self._tasks.waiting(busy)
+        if under_way is not None:
+            return self._tasks.take(under_way)
+        if not self._waiting:
+            return None
+        errand = self._waiting.popleft()
+        return self._tasks.start(errand.station, errand.steps())
+
+    def next_due(self) -> float | None:
+        """Return None: nothing comes by itself."""
+        return None
+
+    def expire(self, now: float) -> None:
+        """Do nothing: orders wait as long as they have to."""
+
+    def _run(self) -> Procedure:
+        try:
+            yield from self._link.run(self)
+        except PortLost as error:
+            self._end(error)
+            raise
+
+    def _end(self, error: LinkError) -> None:
+        """Leave no order without an end."""
+        self._tasks.fail(error)
+        while self._waiting:
+            error = PortLost(*error.args)
+            error.sent = False
+            self._waiting.popleft().fail(error)

@@ -1,0 +1,98 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a line will be able to do, told before anything is connected.
+
+It is the line model of the planner, and an assumption: how long a station takes to answer. A
+transaction has two answers (M 14-2): to the command, and to the poll, or in full duplex the
+reply. PLCs serve the port once in a program scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from abdf1_ros.driver.line_model import LineModel
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import BAUD_RATES, Network
+from abdf1_ros.driver.planner import Block, Planner
+
+USUAL_RESPONSE_TIME = 0.01
+_ANSWERS = 2
+
+# A read without a period takes what the others leave, but has its turn at least in so many
+# times the time in which everything could be read once.
+PATIENCE = 4
+
+
+def line_model(network: Network) -> LineModel:
+    """Return the line of a net CSV."""
+    return LineModel(network.checksum, network.duplex, network.timing)
+
+
+def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> float:
+    """Return the seconds that a block takes when each answer takes ``response_time`` s."""
+    return block.line_time + _ANSWERS * response_time * len(block.requests)
+
+
+def scan_time(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
+    """Return the seconds that it takes to read every block once."""
+    return sum(block_time(block, response_time) for block in blocks)
+
+
+def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
+    """
+    Return the part of the line's time that is needed to keep every period; above 1 they slip.
+
+    Blocks without a period take what is left and are not counted.
+    """
+    return sum(block_time(block, response_time) / block.period
+               for block in blocks if block.period)
+
+
+def intervals(blocks: Iterable[Block],
+              response_time: float = USUAL_RESPONSE_TIME) -> dict[float, float]:
+    """
+    Return the seconds from one read to the next to be expected of blocks, by their period (s).
+
+    That is the period, as far as the line allows. Where it does not, all become longer by the
+    factor of its load, but none by more than a scan time: that is what ``ReadQueue`` gives.
+    """
+    blocks = list(blocks)
+    once, needed = scan_time(blocks, response_time), load(blocks, response_time)
+    unlimited = scan_time((block for block in blocks if not block.period), response_time)
+    wanted = {block.period: block.period or PATIENCE * once for block in blocks}
+    if unlimited and needed < 1:
+        wanted[0.0] = min(wanted[0.0], unlimited / (1 - needed))
+    stretch = max(1.0, needed + unlimited / wanted[0.0] if unlimited else needed)
+    return {period: min(stretch * time, time + once) for period, time in wanted.items()}
+
+
+def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
+    """Return the seconds that the longest of all transactions has the line."""
+    return max((block_time(block, response_time) / len(block.requests) for block in blocks),
+               default=0.0)
+
+
+def needed_baud(network: Network, mappings: Iterable[Mapping], default_period: float,
+                response_time: float = USUAL_RESPONSE_TIME) -> int | None:
+    """Return the lowest baud rate at which every period can be kept; None: not at any."""
+    mappings = list(mappings)
+    for baud in BAUD_RATES:
+        planner = Planner(line_model(replace(network, baud=baud)), default_period)
+        if load(planner.plan(mappings), response_time) <= 1:
+            return baud
+    return None

@@ -1,0 +1,273 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The slow jobs of a driver: who is there, in which mode, and whether it is still there.
+
+A station is asked for its diagnostic status at the start, when it comes back, and every
+``processor_period``; one that nothing is read from gets an echo when it has not been heard for a
+while, or nobody would notice its silence. Link counters are read on request only.
+
+None of these delays a read that is due by more than one transaction: after one of them, every
+read that was due at that moment goes first. They count neither as reads nor in scan times. What
+a station refuses is no fault of it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+import math
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.job_tasks import Steps
+from abdf1_ros.driver.scheduler import Scheduler
+from abdf1_ros.driver.transactions import echo, identify
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.link_counters import counter_request, decode_counters, layout_of
+from abdf1_ros.pccc.status import check_status
+
+# So long (s) a station may be silent before it gets an echo, and between two of them.
+ECHO_PERIOD = 2.0
+
+# A station that answers everything but this is asked more rarely, by so many periods: each time
+# costs Cmd_Timeout, and in Mode Master mostly a DLE NAK.
+_UNANSWERED = 30
+
+_NOT_ASKED = 'unknown (not asked yet)'
+
+
+class Kind(Enum):
+    """What a check is for."""
+
+    ECHO = 'echo'
+    STATUS = 'diagnostic status'
+    COUNTERS = 'link counters'
+
+
+@dataclass(eq=False, slots=True)
+class Check:
+    """
+    One slow job: ``due`` is the clock value (s) from which it wants the line.
+
+    It is infinite while the job is under way, and while there is no station to ask.
+    ``period`` is in seconds, infinite for a job that is done once.
+    """
+
+    station: int
+    kind: Kind
+    period: float
+    due: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class StationHealth:
+    """
+    What a station has said of itself.
+
+    ``processor`` is one line for people, also where there is no ``identity``. ``told`` is the
+    clock value (s) of the last diagnostic status. ``counters`` are the link counters as last
+    read; where there was no answer to that, the reason is in ``no_counters``.
+    """
+
+    processor: str = _NOT_ASKED
+    identity: Identity | None = None
+    told: float | None = None
+    counters: Mapping[str, str] = field(default_factory=dict)
+    no_counters: str = ''
+
+
+class Health:
+    """
+    The checks of all ``stations``, of which only the ones in ``read`` have reads of their own.
+
+    ``period`` is the seconds between two questions for the diagnostic status, 0 for never.
+    ``link_failed`` takes note of a transaction without a reply. Only ``request_counters`` may
+    be called from another thread; ``known`` gives values that never change.
+    """
+
+    def __init__(self, stations: ActiveStationList, read: Container[int], period: float,
+                 scheduler: Scheduler, link_failed: Callable[[int, LinkError], None],
+                 clock: Callable[[], float]) -> None:
+        self.counters_wanted: set[int] = set()
+        self._stations = stations
+        self._scheduler = scheduler
+        self._link_failed = link_failed
+        self._clock = clock
+        self._known: dict[int, StationHealth] = {}
+        self._requests: deque[int] = deque()
+        self._checks = [Check(station.number, Kind.STATUS, period)
+                        for station in stations if period]
+        self._checks += [Check(station.number, Kind.ECHO, ECHO_PERIOD)
+                         for station in stations if station.number not in read]
+        self._next_due = 0.0
+        self._last_start = -math.inf
+
+    def known(self, station: int) -> StationHealth:
+        """Return what a station has said."""
+        return self._known.get(station, StationHealth())
+
+    def request_counters(self, station: int) -> None:
+        """
+        Ask for the link counters of a station; may be called from any thread.
+
+        It is in ``counters_wanted`` until there is an answer, or none to be expected.
+        """
+        self.counters_wanted.add(station)
+        self._requests.append(station)
+
+    def begin(self, now: float) -> None:
+        """Ask everybody anew: the port has been opened."""
+        for check in self._checks:
+            check.due = now
+        self._plan()
+
+    def end(self, reason: str) -> None:
+        """Forget what depends on the port, which is lost."""
+        for station in self._stations:
+            self._forget(station.number, reason)
+        self._requests.clear()
+        for number in tuple(self.counters_wanted):
+            self._take_counters(number, {}, reason)
+
+    def came_back(self, station: int, now: float) -> None:
+        """Ask a station that has been away; it may be another one by now."""
+        self._ask_status(station, now)
+
+    def went_away(self, station: int) -> None:
+        """Forget what a station has said that does not answer any more."""
+        self._forget(station, 'the station does not answer')
+        self._ask_status(station, math.inf)
+
+    def next_due(self) -> float | None:
+        """Return when the next check is due (clock value in s), None for never."""
+        return None if math.isinf(self._next_due) else self._next_due
+
+    def next_check(self, now: float, busy: Container[int] = ()) -> Check | None:
+        """Return the next check that is due and may go before a read, not of a busy station."""
+        while self._requests:
+            self._add_request(self._requests.popleft(), now)
+        if now < self._next_due or self._scheduler.is_read_due(self._last_start):
+            return None
+        for check in sorted(self._checks, key=lambda check: check.due):
+            if check.due <= now and check.station not in busy:
+                check.due = self._wanted_from(check, now)
+                if check.due <= now:
+                    return self._start(check, now)
+        self._plan()
+        return None
+
+    def _start(self, check: Check, now: float) -> Check:
+        check.due = math.inf
+        self._last_start = now
+        self._scheduler.check_goes()
+        self._plan()
+        return check
+
+    def steps(self, check: Check) -> Steps:
+        """Ask, and take the answer."""
+        next_due = self._clock() + check.period
+        try:
+            yield from self._question(check)
+        except (FormatError, RemoteError) as error:
+            self._take_refusal(check, str(error))
+        except LinkError as error:
+            self._link_failed(check.station, error)
+            if check.kind is Kind.COUNTERS or self.known(check.station).identity is None:
+                self._take_refusal(check, str(error))
+                next_due += check.period * _UNANSWERED
+        finally:
+            self._finish(check, next_due)
+
+    def _question(self, check: Check) -> Steps:
+        station, known = check.station, self.known(check.station)
+        if check.kind is Kind.ECHO:
+            yield from echo(b'')
+        elif check.kind is Kind.STATUS:
+            identity = yield from identify()
+            self._known[station] = replace(
+                known, processor=str(identity), identity=identity, told=self._clock())
+        else:
+            request = counter_request(known.identity).encode()
+            reply = check_status((yield diagnostics.CMD, request))
+            self._take_counters(station, decode_counters(reply, layout_of(known.identity)))
+
+    def _take_refusal(self, check: Check, reason: str) -> None:
+        if check.kind is Kind.STATUS:
+            self._known[check.station] = replace(
+                self.known(check.station), processor=f'unknown ({reason})', identity=None,
+                told=None)
+        elif check.kind is Kind.COUNTERS:
+            self._take_counters(check.station, {}, reason)
+
+    def _take_counters(self, station: int, counters: Mapping[str, str],
+                       reason: str = '') -> None:
+        """Keep the answer to a request, or why there is none."""
+        self._known[station] = replace(
+            self.known(station), counters=counters, no_counters=reason)
+        self.counters_wanted.discard(station)
+
+    def _finish(self, check: Check, next_due: float) -> None:
+        """Have the check done again when due; that of an absent station when it is back."""
+        if check.kind is Kind.COUNTERS:
+            self._checks.remove(check)
+        elif self._stations[check.station].active:
+            check.due = next_due
+        elif check.kind is Kind.ECHO:
+            now = self._clock()
+            self._scheduler.probe_failed(now)
+            check.due = now + check.period
+        self._plan()
+
+    def _wanted_from(self, check: Check, now: float) -> float:
+        """Return the clock value (s) from which a check that is due wants the line."""
+        station = self._stations[check.station]
+        if not station.active:
+            return self._scheduler.probe_from(now) if check.kind is Kind.ECHO else math.inf
+        if check.kind is Kind.ECHO and station.last_heard is not None:
+            return station.last_heard + check.period
+        return check.due
+
+    def _add_request(self, station: int, now: float) -> None:
+        check = Check(station, Kind.COUNTERS, math.inf, now)
+        if not self._stations[station].active:
+            self._take_counters(station, {}, 'the station does not answer')
+        elif not any(other.station == station and other.kind is Kind.COUNTERS
+                     for other in self._checks):
+            self._checks.append(check)
+            self._plan()
+
+    def _forget(self, station: int, reason: str) -> None:
+        """Drop what a station has said, and end the requests that it will not answer."""
+        known = self.known(station)
+        self._known[station] = StationHealth(
+            counters=known.counters, no_counters=known.no_counters)
+        for check in [check for check in self._checks if check.station == station
+                      and check.kind is Kind.COUNTERS and not math.isinf(check.due)]:
+            self._take_counters(station, {}, reason)
+            self._checks.remove(check)
+        self._plan()
+
+    def _ask_status(self, station: int, due: float) -> None:
+        for check in self._checks:
+            if check.kind is Kind.STATUS and check.station == station:
+                check.due = due
+        self._plan()
+
+    def _plan(self) -> None:
+        self._next_due = min((check.due for check in self._checks), default=math.inf)

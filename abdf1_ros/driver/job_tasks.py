@@ -1,0 +1,126 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Jobs under way: each is a task for the link, one command after the other.
+
+A job is a generator that yields requests and is sent the replies; where there is none, the
+error is raised in it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container, Generator
+from inspect import GEN_CLOSED, getgeneratorstate
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import LinkError
+from abdf1_ros.pccc.dialect import Request
+
+Steps = Generator[Request, Packet, None]
+
+
+class JobTasks:
+    """
+    All jobs under way, and the transaction numbers of their commands.
+
+    ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts
+    the replies.
+    """
+
+    def __init__(self, station: int, first_tns: int) -> None:
+        self.transactions = 0
+        self._station = station
+        self._tns = first_tns
+        self._last_tns: dict[int, int] = {}
+        self._tasks: set[JobTask] = set()
+        self._waiting: deque[JobTask] = deque()
+
+    def start(self, station: int, steps: Steps) -> JobTask:
+        """Return the task of a new job, with its first command."""
+        task = JobTask(self, station, steps)
+        self._tasks.add(task)
+        return task
+
+    def waiting(self, busy: Container[int]) -> JobTask | None:
+        """Return a task whose next command waits to be sent, but not to a ``busy`` station."""
+        return next((task for task in self._waiting if task.station not in busy), None)
+
+    def take(self, task: JobTask) -> JobTask:
+        """Return a waiting task that is now to be sent."""
+        self._waiting.remove(task)
+        return task
+
+    def fail(self, error: LinkError) -> None:
+        """End every job with ``error``."""
+        for task in list(self._tasks):
+            task.fail(error)
+        self._waiting.clear()
+
+    def new_command(self, station: int, request: Request) -> Packet:
+        """Return the command for a request, with a transaction number of its own."""
+        cmd, data = request
+        return Packet(station, self._station, cmd, 0, self._next_tns(station), data)
+
+    def advanced(self, task: JobTask, is_done: bool) -> None:
+        """Take note that a task has its next command ready, or is done."""
+        if is_done:
+            self._tasks.discard(task)
+        else:
+            self._waiting.append(task)
+
+    def _next_tns(self, station: int) -> int:
+        """Return the next transaction number, never the one this station had last."""
+        self._tns = self._tns + 1 & 0xFFFF
+        if self._tns == self._last_tns.get(station):
+            self._tns = self._tns + 1 & 0xFFFF
+        self._last_tns[station] = self._tns
+        return self._tns
+
+
+class JobTask:
+    """A job as the link sees it."""
+
+    def __init__(self, tasks: JobTasks, station: int, steps: Steps) -> None:
+        self.sent = False
+        self.station = station
+        self._tasks = tasks
+        self._steps = steps
+        self.command = tasks.new_command(station, next(steps))
+
+    def reply(self, packet: Packet) -> None:
+        """Take the reply and go on to the next request."""
+        self._tasks.transactions += 1
+        self._advance(lambda: self._steps.send(packet))
+
+    def fail(self, error: LinkError) -> None:
+        """Raise ``error`` in the job, unless it has ended."""
+        if getgeneratorstate(self._steps) == GEN_CLOSED:  # by the garbage collector, with the line
+            return
+        error.sent = self.sent
+        self._advance(lambda: self._steps.throw(error))
+
+    def _advance(self, resume: Callable[[], Request]) -> None:
+        try:
+            request = resume()
+        except StopIteration:
+            self._tasks.advanced(self, is_done=True)
+            return
+        except Exception:  # a bug has ended the job
+            self._tasks.advanced(self, is_done=True)
+            raise
+        self.sent = False
+        self.command = self._tasks.new_command(self.station, request)
+        self._tasks.advanced(self, is_done=False)

@@ -1,0 +1,66 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a transaction costs on the line: the model that plans and forecasts are made with.
+
+It counts the characters of the real frames. What it does not know is the data of a reply, of
+which one byte in 256 has to be doubled (M 2-7), and how long a station thinks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.packet import HEADER_SIZE
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Dialect
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One read command: ``words`` words from ``start`` on."""
+
+    start: Address
+    words: int
+
+
+@dataclass(frozen=True, slots=True)
+class LineModel:
+    """A line with this check, discipline and timing."""
+
+    checksum: Checksum
+    duplex: Duplex
+    timing: LineTiming
+
+    def read_time(self, dialect: Dialect, request: Request, station: int = 0) -> float:
+        """Return the seconds that a read takes of a station that answers at once."""
+        _, body = dialect.read(request.start, request.words)
+        command = bytes(HEADER_SIZE) + body
+        reply_size = HEADER_SIZE + dialect.reply_size(request.start, request.words)
+        # Of a frame only the size counts, so the check need not be that of its data.
+        sent = len(frames.stuff(command)) + len(frames.ACK)
+        if self.duplex is Duplex.HALF:
+            sent += len(frames.master_frame(station, b'', self.checksum))
+            sent += len(frames.poll_frame(station))
+            transmissions = 3
+        else:
+            sent += len(frames.message_frame(b'', self.checksum))
+            transmissions = 2
+        received = reply_size + len(frames.message_frame(b'', self.checksum)) + len(frames.ACK)
+        return (sent + received) * self.timing.char_time + transmissions * self.timing.tx_delay

@@ -1,0 +1,266 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One row of the map CSV: its cells checked, alone and against each other (S0, "Mapping")."""
+
+from __future__ import annotations
+
+from enum import Enum
+import math
+import re
+from typing import TypeVar
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.driver.columns import MAP_COLUMNS
+from abdf1_ros.driver.csv_table import Row, whole_number
+from abdf1_ros.driver.mapping import Command, Mapping, Publish
+from abdf1_ros.driver.names import MAX_LENGTH, sanitise
+from abdf1_ros.driver.scaling import Scaling
+from abdf1_ros.driver.structures import type_fault, write_fault
+from abdf1_ros.driver.values import types_of, ValueType, WordOrder
+from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.messages import Message
+from abdf1_ros.pccc.access import Access, accesses_of
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor
+
+_NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)
+_MAX_STATION = 254
+_MAX_PERIOD = 86_400_000
+_PLC_TYPE_NAMES = tuple(entry.value for entry in PlcType)
+
+_Choice = TypeVar('_Choice', bound=Enum)
+
+
+def read_mapping(row: Row) -> Mapping:
+    """Check one row by itself; raise ConfigurationError with every fault of it."""
+    reader = RowReader(row)
+    mapping = reader.read()
+    if mapping is None:
+        raise ConfigurationError(reader.problems)
+    return mapping
+
+
+class RowReader:
+    """Check one row by itself, collecting every fault of it in ``problems``."""
+
+    def __init__(self, row: Row) -> None:
+        self._row = row
+        self.problems: list[Problem] = []
+
+    def read(self) -> Mapping | None:
+        """Return the mapping, or None when the row has faults."""
+        for column in _NEEDED:
+            if not self._row.get(column):
+                self._fault(column, f'{column} is missing')
+        if self.problems:
+            return None
+        name = self._name('Tag', self._row.get('Tag'))
+        topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
+        command = self._choice('Command', Command, None)
+        # 255 is everybody, who may be written to but cannot answer.
+        last_station = BROADCAST if command is Command.WRITE else _MAX_STATION
+        station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
+                               _MAX_STATION + 1)
+        plc_type = self._plc_type()
+        length = self._number('Length', 1, 65535, 1)
+        period = self._number('Period', 0, _MAX_PERIOD, None)
+        publish = self._choice('Publish', Publish, Publish.ALWAYS)
+        minimum = self._decimal('Min', -math.inf)
+        maximum = self._decimal('Max', math.inf)
+        word_order = self._choice('Word_Order', WordOrder, WordOrder.LOW)
+        scaling = self._scaling()
+        value_type = self._choice('Type', ValueType, None) if self._row.get('Type') else None
+        access = self._access(plc_type, command) if plc_type else None
+        address = self._address(plc_type, access) if plc_type else None
+        processor = self._processor(plc_type, command, address) if plc_type else None
+        if (self.problems or not name or not topic or not command or not publish
+                or not plc_type or not address or not word_order or station is None
+                or length is None):
+            return None
+        mapping = Mapping(
+            self._row.item, self._row.line, self._row.get('Tag'), name, command, address,
+            station, plc_type, length, value_type or _natural_type(address), topic,
+            period, publish, minimum, maximum, word_order, scaling, access, processor)
+        self._check(mapping)
+        return None if self.problems else mapping
+
+    def _fault(self, column: str, text: str, message: Message | None = None,
+               *args: object) -> None:
+        full = (self._row.item, *args) if message else ()
+        head = f'Item: {self._row.item}, ' if message is None else ''
+        self.problems.append(
+            Problem(self._row.where(column), f'{head}{text}', message, full))
+
+    def _name(self, column: str, text: str) -> str:
+        name = sanitise(text)
+        if not name:
+            self._fault(column, f'{column} = "{text}" has no letter, digit or underscore')
+        elif len(name) > MAX_LENGTH:
+            self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
+        return name
+
+    def _choice(self, column: str, kind: type[_Choice],
+                default: _Choice | None) -> _Choice | None:
+        text = self._row.get(column)
+        if not text and default is not None:
+            return default
+        for entry in kind:
+            if entry.value.lower() == text.lower():
+                return entry
+        right = ', '.join(entry.value for entry in kind)
+        self._fault(column, f'{column} = "{text}" should be one of {right}')
+        return None
+
+    def _number(self, column: str, low: int, high: int, default: int | None,
+                message: Message | None = None, *args: object) -> int | None:
+        text = self._row.get(column)
+        if not text:
+            return default
+        value = whole_number(text)
+        if value is not None and low <= value <= high:
+            return value
+        right = f'{column} = "{text}" should be a whole number from {low} to {high}'
+        self._fault(column, right, message, text, *args)
+        return None
+
+    def _decimal(self, column: str, default: float) -> float:
+        text = self._row.get(column)
+        try:
+            value = float(text.replace(',', '.')) if text else default
+        except ValueError:
+            value = math.nan
+        if re.fullmatch(r'[+-]?[0-9]+,[0-9]{3}', text):
+            self._fault(column, f'{column} = "{text}" could be two numbers; write '
+                                f'{text.replace(",", "")} or {text.replace(",", ".")}')
+        elif math.isnan(value) or (text and math.isinf(value)):
+            self._fault(column, f'{column} = "{text}" should be a number')
+        return value
+
+    def _scaling(self) -> Scaling | None:
+        if not self._row.get('Scale') and not self._row.get('Offset'):
+            return None
+        scaling = Scaling(self._decimal('Scale', 1.0), self._decimal('Offset', 0.0))
+        if scaling.scale == 0:
+            self._fault('Scale', 'Scale should not be 0')
+        return scaling
+
+    def _plc_type(self) -> PlcType | None:
+        text = self._row.get('PLC_Type')
+        kind = next((entry for entry in PlcType if entry.value == text.upper()), None)
+        if kind is None:
+            self._fault('PLC_Type', 'a MicroLogix is SLC', Message.ERR_BAD_PLC_TYPE, text,
+                        *_PLC_TYPE_NAMES)
+        return kind
+
+    def _access(self, plc_type: PlcType, command: Command | None) -> Access | None:
+        text = self._row.get('Access')
+        ways = accesses_of(plc_type)
+        if not text:
+            return ways[0]
+        access = next((way for way in ways if way.value.lower() == text.lower()), None)
+        if access is None:
+            right = ', '.join(way.value for way in ways)
+            self._fault('Access', f'Access = "{text}" of a {plc_type.value} should be one of '
+                                  f'{right}')
+        elif command is Command.SERVE:
+            self._fault('Access', 'a Serve row answers every access; leave the cell empty')
+        return access
+
+    def _processor(self, plc_type: PlcType, command: Command | None,
+                   address: Address | None) -> Processor | None:
+        if not self._row.get('Processor'):
+            return None
+        if plc_type is not PlcType.SLC or command is Command.SERVE:
+            self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write; '
+                                     'leave the cell empty')
+            return None
+        processor = self._choice('Processor', Processor, None)
+        if processor and address and not processor.has_file(address.file, address.file_type):
+            self._fault('Address', f'{processor.value} has no file '
+                                   f'{address.file_type.value}{address.file}')
+        return processor
+
+    def _address(self, plc_type: PlcType, access: Access | None) -> Address | None:
+        text = self._row.get('Address')
+        try:
+            return Address.parse(text, plc_type, access)
+        except AddressSyntaxError as error:
+            self._fault('Address', str(error), Message.ERR_ADDRESS_SYNTAX, text)
+        except AddressRangeError as error:
+            self._fault('Address', str(error), Message.ERR_ADDRESS_RANGE, text,
+                        self._row.get('Length') or 1)
+        return None
+
+    def _check(self, mapping: Mapping) -> None:
+        """Check what concerns more than one column."""
+        self._check_type(mapping)
+        if self.problems:
+            return
+        self._check_values(mapping)
+        self._check_extent(mapping)
+        if mapping.writes and not self.problems:
+            self._check_write(mapping)
+        if mapping.minimum > mapping.maximum:
+            self._fault('Min', 'Min is greater than Max')
+
+    def _check_type(self, mapping: Mapping) -> None:
+        types = types_of(mapping.address)
+        if mapping.type not in types:
+            right = ', '.join(entry.value for entry in types)
+            hint = '; a bool needs a bit address such as B3:0/5' \
+                if mapping.type is ValueType.BOOL else ''
+            self._fault('Type', f'{mapping.address} can be {right}{hint}')
+        if mapping.address.file_type is FileType.STRING and mapping.length != 1:
+            self._fault('Length', 'a string mapping has Length 1')
+
+    def _check_values(self, mapping: Mapping) -> None:
+        """Check how raw values become those of the topic."""
+        if mapping.word_order is WordOrder.HIGH and (
+                mapping.type.words != 2 or _natural_type(mapping.address).words != 1):
+            self._fault('Word_Order', 'Word_Order High is for int32, uint32 and float32 over '
+                                      'words of 16 bits such as N7:0, not for '
+                                      f'{mapping.type.value} at {mapping.address}')
+        fault = mapping.scaling and mapping.scaling.fault(mapping.type)
+        if fault:
+            self._fault('Scale' if self._row.get('Scale') else 'Offset', fault)
+
+    def _check_extent(self, mapping: Mapping) -> None:
+        address, words = mapping.address, mapping.codec.words
+        details = (self._row.get('Address'), mapping.length)
+        if address.file_type.is_structure and mapping.type is ValueType.BOOL and words > 1:
+            self._fault('Length', 'bits of a structure end with their word',
+                        Message.ERR_ADDRESS_RANGE, *details)
+        elif address.offset + words > address.area_size:
+            last = address.at_offset(address.area_size - 1)
+            self._fault('Length', f'the last word there can be is {last}',
+                        Message.ERR_ADDRESS_RANGE, *details)
+        elif fault := type_fault(address, mapping.type, mapping.length):
+            self._fault('Length', fault)
+
+    def _check_write(self, mapping: Mapping) -> None:
+        address = mapping.address
+        if mapping.type is ValueType.BOOL and not mapping.serves \
+                and not mapping.dialect.writes_bits:
+            self._fault('Address', f'Access {self._row.get("Access")} has no command that '
+                                   'changes single bits; write the whole word, or only read')
+        fault = write_fault(address, mapping.type, mapping.length)
+        if fault:
+            self._fault('Address', fault)
+
+
+def _natural_type(address: Address) -> ValueType:
+    return types_of(address)[0]

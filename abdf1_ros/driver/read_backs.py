@@ -1,0 +1,106 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a PLC holds after a write that it has not confirmed: the next read of the words tells.
+
+The one result of such a write waits for that read, but no longer than a write may wait for the
+line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.planner import Block
+from abdf1_ros.driver.points import Write, WriteResult
+from abdf1_ros.driver.transactions import Ending
+
+
+@dataclass(frozen=True, slots=True)
+class _Doubt:
+    """A write with an unsure ``ending``, which came at the clock value ``since`` (s)."""
+
+    write: Write
+    ending: Ending
+    since: float
+
+
+class ReadBacks:
+    """
+    The writes that wait to be read back, for ``patience`` seconds at most.
+
+    ``report`` gets their results. All of it belongs to the link thread.
+    """
+
+    def __init__(self, patience: float, report: Callable[[WriteResult], None]) -> None:
+        self._patience = patience
+        self._report = report
+        self._doubts: list[_Doubt] = []
+
+    def add(self, write: Write, ending: Ending, blocks: Iterable[Block], now: float) -> None:
+        """Take a write that has ended; where none of ``blocks`` shows it, that is its result."""
+        doubt = _Doubt(write, ending, now)
+        if any(_shows(block, write.mapping) for block in blocks):
+            self._doubts.append(doubt)
+        else:
+            self._tell(doubt, 'not read back: no row reads all of these words', now)
+
+    def read(self, block: Block, data: bytes, started: float, now: float) -> None:
+        """Compare what a block holds that was read from ``started`` (clock value in s) on."""
+        for doubt in self._doubts[:]:
+            mapping = doubt.write.mapping
+            if started >= doubt.since and _shows(block, mapping):
+                is_held = doubt.write.is_held(data[block.slice_of(mapping)])
+                which = 'the value' if is_held else 'another value'
+                self._end(doubt, f'read back: the PLC holds {which}', now)
+
+    def overtaken(self, newer: Write, now: float) -> None:
+        """End those whose words ``newer``, which goes out now, will change."""
+        for doubt in self._doubts[:]:
+            if doubt.write.overlaps(newer):
+                self._end(doubt, 'not read back: a newer write of these words has gone out', now)
+
+    def expire(self, now: float) -> None:
+        """End those that have waited too long."""
+        for doubt in self._doubts[:]:
+            if now >= doubt.since + self._patience:
+                self._end(doubt, f'not read back within {self._patience:g} s', now)
+
+    def next_due(self) -> float | None:
+        """Return when the first will have waited too long (clock value in s), None for never."""
+        return self._doubts[0].since + self._patience if self._doubts else None
+
+    def end(self, now: float) -> None:
+        """End all: there is no line any more."""
+        for doubt in self._doubts[:]:
+            self._end(doubt, 'not read back before the line went down', now)
+
+    def _end(self, doubt: _Doubt, finding: str, now: float) -> None:
+        self._doubts.remove(doubt)
+        self._tell(doubt, finding, now)
+
+    def _tell(self, doubt: _Doubt, finding: str, now: float) -> None:
+        ending = doubt.ending
+        self._report(doubt.write.result(ending.outcome, f'{ending.detail}; {finding}', now))
+
+
+def _shows(block: Block, mapping: Mapping) -> bool:
+    """Tell whether all words of a mapping are in a block."""
+    first = mapping.address.offset
+    return (block.station, block.start.area) == (mapping.station, mapping.address.area) \
+        and block.start.offset <= first \
+        and first + mapping.codec.words <= block.start.offset + block.words

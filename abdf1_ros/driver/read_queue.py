@@ -1,0 +1,205 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Which reads are due, and which of them goes first.
+
+The one with the earliest deadline, which is its due time and a period: so each is read within
+its period as long as the line is fast enough. When it is not, and one is late by more than its
+period, three of four turns are for the one that is the most periods late. So all periods become
+longer by about the same factor: slow reads, many as they may be, do not make fast ones as slow
+as themselves. The fourth turn is still for the earliest deadline: a period that no line can do
+does not shut out the others.
+
+A block of several packets is in the queue for each of them, so it keeps nobody waiting for
+longer than one. A read without a period is due again as soon as it has begun. It takes what the
+others leave: its period counts as four times what it takes to read everything once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Sequence
+import heapq
+import itertools
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.forecast import PATIENCE, scan_time
+from abdf1_ros.driver.planner import Block
+from abdf1_ros.driver.points import ReadPoint, Write
+from abdf1_ros.driver.transactions import read_packet
+from abdf1_ros.pccc.dialect import Request
+
+_TURNS = 4
+_MOST_ENTRIES = 4  # for each read
+
+
+class ReadJob:
+    """
+    A block to be read again and again, and the points it serves.
+
+    ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
+    between its last two good reads and ``longest`` the greatest of these; an outage of the
+    station does not count. ``is_hastened`` tells that a write has changed what it shows.
+    ``started`` is when the read under way or the last one began. ``ticket`` is the queue's: the
+    entry that counts.
+    """
+
+    def __init__(self, block: Block, points: Sequence[ReadPoint]) -> None:
+        self.block = block
+        self.points = tuple(points)
+        # Needed at every read, and always the same.
+        self._commands = block.commands()
+        self.slices = [block.slice_of(point.mapping) for point in points]
+        self.due = 0.0
+        self.interval: float | None = None
+        self.longest: float | None = None
+        self.is_hastened = False
+        self.started = 0.0
+        self.ticket = 0
+        self._last_done: float | None = None
+        self._packets: list[bytes] = []
+
+    @property
+    def station(self) -> int:
+        """Return the station to read from."""
+        return self.block.station
+
+    @property
+    def is_under_way(self) -> bool:
+        """Tell whether there are packets already, and more to come."""
+        return bool(self._packets)
+
+    def read_on(self, now: float) -> Generator[Request, Packet, bytes | None]:
+        """
+        Read one packet; return all words after the last, None before.
+
+        Raises like ``read_packet``; the next read then begins anew.
+        """
+        packets, self._packets = self._packets, []
+        number = len(packets)
+        if not number:
+            self.started = now
+        packets.append((yield from read_packet(self.block, number, self._commands[number])))
+        if len(packets) == len(self._commands):
+            return b''.join(packets)
+        self._packets = packets
+        return None
+
+    def done(self, now: float) -> None:
+        """Take note of a good read."""
+        self.is_hastened = False
+        if self._last_done is not None:
+            self.interval = now - self._last_done
+            self.longest = max(self.interval, self.longest or 0.0)
+        self._last_done = now
+
+    def interrupted(self) -> None:
+        """Take note that there are no good reads for the time being."""
+        self.interval = self._last_done = None
+        self._packets = []
+
+    def covers(self, write: Write) -> bool:
+        """Tell whether the block shows what ``write`` has changed."""
+        mapping, start = write.mapping, self.block.start
+        if (self.station, start.area) != (mapping.station, mapping.address.area):
+            return False
+        end = start.offset + sum(request.words for request in self.block.requests)
+        first = mapping.address.offset
+        return first < end and start.offset < first + mapping.codec.words
+
+
+_Entry = tuple[float, int, ReadJob]
+"""When a job is due, the ticket of the entry, and the job."""
+
+
+class ReadQueue:
+    """
+    All read jobs, those of one period in the order in which they are due.
+
+    ``jobs`` are all of them, also those that nobody has put here and those that were taken.
+    """
+
+    def __init__(self) -> None:
+        self.jobs: set[ReadJob] = set()
+        self._scan_time = 0.0
+        self._heaps: dict[float, list[_Entry]] = {}
+        self._tickets = itertools.count(1)
+        self._turn = 0
+
+    def __bool__(self) -> bool:
+        """Tell whether a job waits, due or not."""
+        return any(self._heaps.values())
+
+    def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
+        """Forget ``old`` jobs and add ``new`` ones, all due at once."""
+        added = list(new)
+        self.jobs.difference_update(old)
+        self.jobs.update(added)
+        self._scan_time = scan_time(job.block for job in self.jobs)
+        for job in added:
+            self.put(job, now)
+
+    def put(self, job: ReadJob, due: float) -> None:
+        """Let a job wait, from now on due at ``due``."""
+        job.due, job.ticket = due, next(self._tickets)
+        heap = self._heaps.setdefault(job.block.period, [])
+        heapq.heappush(heap, (due, job.ticket, job))
+        if len(heap) > _MOST_ENTRIES * len(self.jobs):
+            # Writes hasten slow reads, whose old entries would stay until they had been due.
+            heap[:] = filter(self._counts, heap)
+            heapq.heapify(heap)
+
+    def take(self, now: float) -> ReadJob | None:
+        """Return the job that goes next and let it wait no more; None: none is due."""
+        heap = self._next_heap(now)
+        self._turn = (self._turn + 1) % _TURNS
+        return None if heap is None else heapq.heappop(heap)[2]
+
+    def first(self, now: float) -> ReadJob | None:
+        """Return the job that goes next; None: none is due."""
+        heap = self._next_heap(now)
+        return None if heap is None else heap[0][2]
+
+    def next_due(self) -> float | None:
+        """Return when the next job is due (clock value in s), None for never."""
+        return min((heap[0][0] for heap in self._clean_heaps()), default=None)
+
+    def _next_heap(self, now: float) -> list[_Entry] | None:
+        """Return the heap that begins with the job to go next."""
+        due = [heap for heap in self._clean_heaps() if heap[0][0] <= now]
+        if len(due) < 2:
+            return due[0] if due else None
+        latest = max(due, key=lambda heap: self._periods_late(heap[0], now))
+        if self._turn and self._periods_late(latest[0], now) > 1:
+            return latest
+        return min(due, key=lambda heap: heap[0][0] + self._period(heap[0][2]))
+
+    def _period(self, job: ReadJob) -> float:
+        return job.block.period or PATIENCE * self._scan_time
+
+    def _periods_late(self, entry: _Entry, now: float) -> float:
+        due, _, job = entry
+        return (now - due) / self._period(job)
+
+    def _clean_heaps(self) -> list[list[_Entry]]:
+        """Return the heaps that are not empty, each beginning with an entry that counts."""
+        for heap in self._heaps.values():
+            while heap and not self._counts(heap[0]):
+                heapq.heappop(heap)
+        return [heap for heap in self._heaps.values() if heap]
+
+    def _counts(self, entry: _Entry) -> bool:
+        """Tell whether no later entry has replaced this one, nor other jobs its job."""
+        _, ticket, job = entry
+        return ticket == job.ticket and job in self.jobs

@@ -1,0 +1,114 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What to read instead of a block that a station refuses.
+
+A block is refused as a whole for one address that the station does not have: that of a
+mapping, or of a gap that was bridged. It is divided until the parts are good or can be divided
+no more. What has been found is then known to the planner, and all mappings of the block are
+planned anew: the good ones together, and never again with the bad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from abdf1_ros.driver.partition import Span
+from abdf1_ros.driver.planner import Block, Planner
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Blocks, and those that take their place."""
+
+    old: Sequence[Block]
+    new: Sequence[Block]
+
+
+class _Search:
+    """The search for what is refused of one block."""
+
+    def __init__(self, block: Block) -> None:
+        self.mappings = block.mappings
+        self.parts = [block]
+        self._open = 1
+        self._divided: list[tuple[Span, Span]] = []  # what was refused, and where it was cut
+        self._refused: list[Span] = []
+
+    def divide(self, block: Block, halves: Sequence[Block]) -> None:
+        """Put the halves of a refused block in its place."""
+        left, right = (half.span for half in halves)
+        gap = Span(left.end - 1, right.first + 1)  # with the word on each side of it
+        self._divided.append((block.span, gap if gap.words > 1 else block.span))
+        self.parts.remove(block)
+        self.parts += halves
+        self._open += 1
+
+    def settle(self, block: Block, is_refused: bool) -> bool:
+        """Take note of the end of one branch; return whether it was the last."""
+        if is_refused:
+            self._refused.append(block.span)
+        self._open -= 1
+        return self._open == 0
+
+    def findings(self) -> list[Span]:
+        """Return the spans that cannot be read; a gap where both sides of it are good."""
+        found = list(self._refused)
+        smaller = list(self._refused)
+        for span, gap in reversed(self._divided):  # parts before the whole
+            if not any(span.holds(other) for other in smaller):
+                found.append(gap)
+            smaller.append(span)
+        return found
+
+
+class Refusals:
+    """Tell the blocks to read after a refusal, and teach ``planner`` what comes of it."""
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner = planner
+        self._searches: dict[Block, _Search] = {}
+
+    def refused(self, block: Block) -> Change | None:
+        """Take note that a station has refused a block; None: read it again all the same."""
+        search = self._searches.pop(block, None)
+        halves = self._planner.split(block)
+        if not halves:
+            return self._settle(search, block, is_refused=True) if search else None
+        search = search or _Search(block)
+        search.divide(block, halves)
+        for half in halves:
+            self._searches[half] = search
+        return Change([block], halves)
+
+    def recovered(self, block: Block, blocks: Iterable[Block]) -> Change | None:
+        """Take note of a good read after a bad one; ``blocks`` are all that are read."""
+        search = self._searches.pop(block, None)
+        if search is not None:
+            return self._settle(search, block, is_refused=False)
+        if not self._planner.allow(block.place, block.span):
+            return None
+        old = [other for other in blocks
+               if other.place == block.place and other not in self._searches]
+        return Change(old, self._planner.plan(
+            mapping for other in old for mapping in other.mappings))
+
+    def _settle(self, search: _Search, block: Block, is_refused: bool) -> Change | None:
+        if not search.settle(block, is_refused):
+            return None
+        for span in search.findings():
+            self._planner.refuse(block.place, span)
+        return Change(search.parts, self._planner.plan(search.mappings))

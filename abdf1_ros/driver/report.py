@@ -1,0 +1,228 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What two checked files will make of a line: the read plan, its times, and what is odd about it.
+
+All times are forecasts (see ``forecast``), in seconds. A remark is something that the node runs
+with and that somebody will still wonder about at the machine.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.driver import forecast
+from abdf1_ros.driver.line_model import Request
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.planner import Block, Place, Planner
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address
+
+_HIGH_LOAD = 0.8
+_WORTH_SAVING = 0.05  # of the scan time
+_NAMED_TAGS = 3
+
+
+class Kind(Enum):
+    """What a remark is about; the value is what programs see."""
+
+    STATION = 'station'
+    PERIOD = 'period'
+    LOAD = 'load'
+    GAP = 'gap'
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Something odd; ``station`` is the one that it is about, None for the line."""
+
+    kind: Kind
+    text: str
+    station: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """
+    The read plan of a line.
+
+    ``default_period`` is for mappings without Period, ``response_time`` what a station takes for
+    each answer, both in seconds.
+    """
+
+    network: Network
+    mappings: tuple[Mapping, ...]
+    blocks: tuple[Block, ...]
+    default_period: float
+    response_time: float
+
+    @property
+    def scan_time(self) -> float:
+        """Return the seconds that it takes to read every block once."""
+        return forecast.scan_time(self.blocks, self.response_time)
+
+    @property
+    def load(self) -> float:
+        """Return the part of the line's time that the periods need."""
+        return forecast.load(self.blocks, self.response_time)
+
+    def time(self, block: Block) -> float:
+        """Return the seconds that a block takes, answers included."""
+        return forecast.block_time(block, self.response_time)
+
+    def needed_baud(self) -> int | None:
+        """Return the lowest baud rate that is enough for the periods, None when none is."""
+        return forecast.needed_baud(
+            self.network, self.mappings, self.default_period, self.response_time)
+
+    def remarks(self) -> list[Remark]:
+        """Return all that is odd."""
+        return [*_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
+                *_gap_remarks(self)]
+
+
+def make_report(network: Network, mappings: Iterable[Mapping], default_period: float,
+                response_time: float = forecast.USUAL_RESPONSE_TIME) -> Report:
+    """Plan the reads of ``mappings``; times in seconds."""
+    mappings = tuple(mappings)
+    planner = Planner(forecast.line_model(network), default_period)
+    blocks = sorted(planner.plan(mappings), key=_row_order)
+    return Report(network, mappings, tuple(blocks), default_period, response_time)
+
+
+def _row_order(block: Block) -> tuple[int, int]:
+    return block.station, min(mapping.item for mapping in block.mappings)
+
+
+def _station_remarks(report: Report) -> Iterator[Remark]:
+    """Find addresses of stations that clash."""
+    network = report.network
+    stations: defaultdict[int, list[Mapping]] = defaultdict(list)
+    for mapping in report.mappings:
+        if not mapping.serves and mapping.station != BROADCAST:
+            stations[mapping.station].append(mapping)
+    for station, mappings in sorted(stations.items()):
+        if station == network.station:
+            yield Remark(Kind.STATION, (
+                f'station {station} of {_tags(mappings)} is our own Station in the net file; '
+                'two nodes of one address cannot talk'), station)
+        types: dict[str, list[Mapping]] = {}
+        for mapping in mappings:
+            if mapping.access is Access.CIF:
+                continue  # PLC-2 commands to an SLC: two types that are one PLC
+            types.setdefault(mapping.plc_type.value, []).append(mapping)
+        if len(types) > 1:
+            kinds = ', '.join(f'{name} ({_tags(group)})' for name, group in types.items())
+            yield Remark(Kind.STATION, (
+                f'station {station} has more than one PLC_Type: {kinds}'), station)
+    if network.mode == 'Peer' and len(stations) > 1:
+        listed = ', '.join(map(str, sorted(stations)))
+        yield Remark(Kind.STATION, (
+            f'a full-duplex line has one PLC, the map has stations {listed}; only a gateway '
+            'answers for several'))
+
+
+def _load_remarks(report: Report) -> Iterator[Remark]:
+    """Compare what the periods need with what the line can do."""
+    load = report.load
+    if load > 1:
+        baud = report.needed_baud()
+        advice = f'{baud} baud would do' if baud else 'no baud rate is enough, only longer periods'
+        yield Remark(Kind.LOAD, (
+            f'the periods need {load:.0%} of the time there is at {report.network.baud} baud, '
+            f'so reads come late; {advice}'))
+    elif load > _HIGH_LOAD:
+        yield Remark(Kind.LOAD, (
+            f'the periods need {load:.0%} of the line; writes, repetitions and silent stations '
+            'have to do with the rest'))
+
+
+def _period_remarks(report: Report) -> Iterator[Remark]:
+    """Find reads that take longer than their own period."""
+    for block in report.blocks:
+        time = report.time(block)
+        if 0 < block.period < time:
+            yield Remark(Kind.PERIOD, (
+                f'{_tags(block.mappings)}: a read takes {_ms(time)} ms, '
+                f'the period is {_ms(block.period)} ms'), block.station)
+
+
+def _gap_remarks(report: Report) -> Iterator[Remark]:
+    """Find what stands so far apart that reading it together costs much more."""
+    groups: defaultdict[tuple[Place, float], list[Block]] = defaultdict(list)
+    for block in report.blocks:
+        groups[block.place, block.period].append(block)
+    for blocks in groups.values():
+        time = sum(map(report.time, blocks))
+        least = _time_side_by_side(report, blocks)
+        if time - least >= _WORTH_SAVING * report.scan_time:
+            mappings = [mapping for block in blocks for mapping in block.mappings]
+            first, last = _ends(mappings)
+            spare = sum(block.words for block in blocks) - len(_words(mappings))
+            yield Remark(Kind.GAP, (
+                f'station {blocks[0].station}, {first} to {last}: {len(blocks)} '
+                f'{"read" if len(blocks) == 1 else "reads"} with {spare} words that no tag '
+                f'needs take {_ms(time)} ms; side by side in the PLC the tags would take '
+                f'{_ms(least)} ms'), blocks[0].station)
+
+
+def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
+    """Return the seconds that the mappings of a place would take without gaps between them."""
+    mappings = [mapping for block in blocks for mapping in block.mappings]
+    example = blocks[0]
+    kind = example.start.file_type
+    needed, limit = len(_words(mappings)), example.dialect.max_read(kind)
+    if needed > 1:
+        needed += -needed % example.start.layout.words
+    packets = [limit] * (needed // limit) + [needed % limit] * (needed % limit > 0)
+    requests = tuple(Request(example.start, words) for words in packets)
+    model = forecast.line_model(report.network)
+    line_time = sum(model.read_time(example.dialect, request, example.station)
+                    for request in requests)
+    return report.time(replace(example, requests=requests, line_time=line_time))
+
+
+def _words(mappings: Iterable[Mapping]) -> set[int]:
+    """Return the offsets of all words that mappings of one place need."""
+    return {mapping.address.offset + number
+            for mapping in mappings for number in range(mapping.codec.words)}
+
+
+def _ends(mappings: Sequence[Mapping]) -> tuple[Address, Address]:
+    """Return the first and the last word of mappings of one place."""
+    offsets = _words(mappings)
+    address = mappings[0].address
+    return address.at_offset(min(offsets)), last_address(address, max(offsets))
+
+
+def last_address(address: Address, offset: int) -> Address:
+    """Return the element of the area of ``address``, or a structure's word, at an offset."""
+    whole = 1 if address.file_type.is_structure else address.layout.words
+    return address.at_offset(offset - offset % whole)
+
+
+def _tags(mappings: Sequence[Mapping]) -> str:
+    names = [mapping.tag for mapping in mappings]
+    rest = len(names) - _NAMED_TAGS
+    return ', '.join(names[:_NAMED_TAGS]) + (f' and {rest} more' if rest > 0 else '')
+
+
+def _ms(seconds: float) -> str:
+    return f'{seconds * 1000:.1f}'

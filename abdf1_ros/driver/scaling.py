@@ -1,0 +1,88 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Engineering values: what the columns Scale and Offset make of the raw values of a PLC."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from abdf1_ros.driver.values import FLOAT_MAX, ValueType
+from abdf1_ros.errors import FormatError
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """
+    Engineering value = raw value * ``scale`` + ``offset``.
+
+    It is computed in double precision and published as float32. The way back takes the raw value
+    nearest to (value - ``offset``) / ``scale``, of two equally near ones the even one, as IEEE 754
+    does it. Both are finite, ``scale`` is not 0.
+    """
+
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def publish(self, raw: Sequence[float]) -> array[float]:
+        """Return engineering values, to be published."""
+        return array('f', [value * self.scale + self.offset for value in raw])
+
+    def raw(self, values: Sequence[float], kind: ValueType) -> list[float]:
+        """Return the nearest raw values; FormatError where ``kind`` does not reach that far."""
+        low, high = kind.range
+        found: list[float] = []
+        for index, value in enumerate(values):
+            nearest = (value - self.offset) / self.scale
+            if kind is not ValueType.FLOAT32 and math.isfinite(nearest):
+                nearest = round(nearest)
+            if not low <= nearest <= high:  # also NaN
+                raise FormatError(f'value {value:.7g} at index {index} is outside '
+                                  f'{self._range(kind)}')
+            found.append(nearest)
+        return found
+
+    def fault(self, kind: ValueType) -> str | None:
+        """
+        Return why values of ``kind`` cannot be scaled so, None when they can.
+
+        What is published has to be a float32, and of 16-bit values each its own: then writing
+        it back gives the same raw value.
+        """
+        if kind in (ValueType.BOOL, ValueType.STRING):
+            return f'Scale and Offset are for numbers, not for {kind.value}'
+        widest = max(map(abs, self._ends(kind)))
+        if kind is not ValueType.FLOAT32 and widest > FLOAT_MAX:
+            return f'a float32 cannot hold {self._range(kind)}'
+        # So the float32 is at most a quarter of a raw step off, the next raw value half of one.
+        if kind.words == 1 and 2 * _float32_step(widest) > abs(self.scale):
+            return ('a float32 has too few digits to tell the values apart in '
+                    f'{self._range(kind)}')
+        return None
+
+    def _ends(self, kind: ValueType) -> list[float]:
+        return sorted(end * self.scale + self.offset for end in kind.range)
+
+    def _range(self, kind: ValueType) -> str:
+        low, high = self._ends(kind)
+        return (f'{low:.10g} to {high:.10g}, the range of {kind.value} with '
+                f'Scale {self.scale:.10g}, Offset {self.offset:.10g}')
+
+
+def _float32_step(value: float) -> float:
+    """Return the distance of float32 numbers around ``value``."""
+    return math.ldexp(1.0, max(math.frexp(value)[1] - 24, -149))

@@ -1,0 +1,35 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Stations as people write them: "1,3-5"."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.driver.csv_table import whole_number
+
+
+def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
+    """Return the stations of a list in its order, each once, and what is wrong with it."""
+    stations: list[int] = []
+    faults: list[str] = []
+    for part in filter(None, text.replace(' ', '').split(',')):
+        first, _, last = part.partition('-')
+        low, high = whole_number(first), whole_number(last or first)
+        if low is None or high is None or not 0 <= low <= high <= MAX_STATION:
+            faults.append(f'"{part}" should be a station from 0 to {MAX_STATION}, '
+                          'or a range such as 3-5')
+        else:
+            stations += range(low, high + 1)
+    return tuple(dict.fromkeys(stations)), faults

@@ -1,0 +1,57 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What of a structure in a PLC can be read as what, and what of it may be written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from abdf1_ros.driver.values import ValueType
+from abdf1_ros.pccc.address import Address, BITS
+
+
+def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
+    """Return which of the words that ``length`` elements take is no ``kind``, None if all are."""
+    if not address.file_type.is_structure or kind is ValueType.BOOL:
+        return None
+    for place in _places(address, kind, length):
+        if not place.is_value(kind.words):
+            right = 'words of 16 bits' if kind.words == 2 else 'floats'
+            return f'{length} {kind.value} from {address} reach to {place}, where {right} are'
+    return None
+
+
+def write_fault(address: Address, kind: ValueType, length: int) -> str | None:
+    """Return which part of a structure is not for others to write, None if all may be."""
+    if not address.file_type.is_structure:
+        return None
+    if kind is ValueType.BOOL:
+        first = address.bit or 0
+        wrong = [bit for bit in range(first, min(first + length, BITS))
+                 if not address.layout.may_write(address.word, bit)]
+        place = address.with_bit(wrong[0]) if wrong else None
+    else:
+        place = next((place for place in _places(address, kind, length)
+                      if not place.layout.may_write(place.word)), None)
+    if place is None:
+        return None
+    allowed = ', '.join(name for name, member in address.layout.members.items()
+                        if member.writable) or 'nothing'
+    return f'{place} belongs to the processor; of such an element can be written: {allowed}'
+
+
+def _places(address: Address, kind: ValueType, length: int) -> Iterable[Address]:
+    """Return where each element begins."""
+    return (address.at_offset(address.offset + n * kind.words) for n in range(length))

@@ -1,0 +1,143 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is said to a PLC to read, to write and to ask who it is, and how that ends."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.planner import Block
+from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.driver.values import Values
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.fields import word
+from abdf1_ros.pccc.identity import decode_identity, Identity
+from abdf1_ros.pccc.status import check_status, is_local, STS_ILLEGAL_COMMAND
+
+REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
+             'lost')
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a write ended, after ``done`` of its packets; ``error`` is what ended it early."""
+
+    outcome: Outcome
+    detail: str
+    done: int
+    error: LinkError | RemoteError | None = None
+
+    @property
+    def is_unsure(self) -> bool:
+        """Tell whether a packet may have been executed, and may not."""
+        if isinstance(self.error, RemoteError):
+            return is_local(self.error)
+        return self.error is not None and self.error.sent
+
+
+def read_packet(block: Block, number: int,
+                command: Request) -> Generator[Request, Packet, bytes]:
+    """
+    Read the words of one request of a block with its ``command``, made before.
+
+    Raises LinkError, RemoteError, or FormatError for a reply that cannot be used.
+    """
+    request = block.requests[number]
+    reply = check_status((yield command))
+    return block.dialect.read_data(request.start, request.words, reply)
+
+
+def read_block(block: Block) -> Generator[Request, Packet, bytes]:
+    """Read all words of a block; raises like ``read_packet``."""
+    data = b''
+    for number, command in enumerate(block.commands()):
+        data += yield from read_packet(block, number, command)
+    return data
+
+
+def carry_out(write: Write) -> Generator[Request, Packet, Ending]:
+    """Send every packet of a write, as long as each is confirmed."""
+    done, detail = 0, ''
+    try:
+        for packet in range(len(write.commands)):
+            detail = (yield from _send(write, packet)) or detail
+            done += 1
+    except RemoteError as error:
+        outcome = Outcome.UNKNOWN if is_local(error) else Outcome.FAILED
+        return _early(write, outcome, done, error)
+    except LinkError as error:
+        outcome = Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
+        return _early(write, outcome, done, error)
+    is_broadcast = write.mapping.station == BROADCAST
+    return Ending(Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN, detail, done)
+
+
+def _send(write: Write, packet: int) -> Generator[Request, Packet, str]:
+    """Send one packet; return what has to be said of the way it was done, if anything."""
+    try:
+        check_status((yield write.commands[packet]))
+    except RemoteError as error:
+        if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
+            raise
+        yield from _rewrite(write, packet, error)
+        return REWRITTEN
+    return ''
+
+
+def _rewrite(write: Write, packet: int,
+             refusal: RemoteError) -> Generator[Request, Packet, None]:
+    """Do what a refused masked write should have done: read the word, write it back changed."""
+    dialect = write.mapping.dialect
+    address, mask, bits = write.bit_change(packet)
+    try:
+        reply = check_status((yield dialect.read(address, 1)))
+        old = int.from_bytes(dialect.read_data(address, 1, reply), 'little')
+    except LinkError as error:
+        error.sent = False  # the refused command and a read have changed nothing
+        raise
+    except (RemoteError, FormatError) as error:
+        raise RemoteError(refusal.sts, refusal.ext_sts, f'{refusal}; its word cannot be read to '
+                          f'be written back: {error}') from None
+    check_status((yield dialect.write(address, word(old & ~mask | bits & mask))))
+
+
+def _early(write: Write, outcome: Outcome, done: int, error: LinkError | RemoteError) -> Ending:
+    if not done:
+        return Ending(outcome, str(error), done, error)
+    detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
+    return Ending(Outcome.PARTLY, detail, done, error)
+
+
+def read_values(mapping: Mapping, block: Block) -> Generator[Request, Packet, Values]:
+    """Read a block and return the raw values of one mapping; raises like ``read_packet``."""
+    words = yield from read_block(block)
+    return mapping.codec.decode(words[block.slice_of(mapping)])
+
+
+def identify() -> Generator[Request, Packet, Identity]:
+    """Ask who is there; raises RemoteError, or FormatError for a reply too short to tell."""
+    return decode_identity(check_status((yield diagnostics.CMD, diagnostics.STATUS_REQUEST)))
+
+
+def echo(data: bytes) -> Generator[Request, Packet, None]:
+    """Have ``data`` sent back; FormatError when something else comes."""
+    reply = check_status((yield diagnostics.CMD, diagnostics.Echo(data).encode()))
+    if reply != data:
+        raise FormatError(f'the echo of {data.hex(" ")} came back as {reply.hex(" ")}')

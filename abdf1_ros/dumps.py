@@ -1,0 +1,136 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Read recorded bytes from files of several kinds: captures, hex dumps, raw bytes.
+
+A hex dump is bytes in hexadecimal, with or without spaces, and with or without the offsets and
+characters that ``xxd`` and ``hexdump -C`` put beside them. It has neither times nor directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+import re
+
+from abdf1_ros.capture import Chunk, Direction, is_capture_line, read_capture
+from abdf1_ros.errors import Problem
+
+_BLOCK = 4096
+# The bytes, and behind two spaces what they are as characters.
+_XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
+_HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+?)(?: *\|.*)?',
+                      re.IGNORECASE)
+_REPEATED = '*'
+
+
+class Recording:
+    """
+    The chunks of a file; ``settings`` are those of a capture, as far as it has been read.
+
+    Raises OSError when the file cannot be opened.
+    """
+
+    def __init__(self, path: Path, is_binary: bool = False) -> None:
+        self.settings: dict[str, str] = {}
+        self._size = path.stat().st_size
+        self._position = 0
+        self._name = str(path)
+        self._is_binary = is_binary
+        self._file = path.open('rb')
+
+    @property
+    def percent(self) -> int:
+        """Return how much of the file has been read."""
+        return 100 * self._position // max(1, self._size)
+
+    def chunks(self) -> Iterator[Chunk]:
+        """Yield the chunks; Problem names file and line of what cannot be read."""
+        with self._file:
+            if self._is_binary:
+                yield from self._binary()
+                return
+            lines = self._lines()
+            first = next(lines, '')
+            if is_capture_line(first):
+                yield from read_capture(self._name, _chained(first, lines), self.settings)
+            else:
+                yield from read_hex(self._name, _chained(first, lines))
+
+    def _binary(self) -> Iterator[Chunk]:
+        while data := self._file.read(_BLOCK):
+            self._position += len(data)
+            yield Chunk(None, Direction.UNKNOWN, data)
+
+    def _lines(self) -> Iterator[str]:
+        for number, line in enumerate(self._file, 1):
+            self._position += len(line)
+            try:
+                yield line.decode('ascii').rstrip('\r\n')
+            except UnicodeDecodeError:
+                raise Problem(f'{self._name}:{number}', 'this is no text; for a file of raw '
+                              'bytes give --binary') from None
+
+
+def _chained(first: str, rest: Iterable[str]) -> Iterator[str]:
+    yield first
+    yield from rest
+
+
+def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
+    """Yield the chunks of a hex dump; Problem names file and line of what is none."""
+    end = 0  # where the last line with an offset has ended
+    last = b''
+    is_repeated = False
+    for number, text in enumerate(lines, 1):
+        line = text.strip()
+        if line == _REPEATED and last:
+            is_repeated = True
+            continue
+        if not line or line.startswith('#'):
+            continue
+        match = _XXD.fullmatch(line) or _HEXDUMP.fullmatch(line)
+        offset = int(match['offset'], 16) if match else _bare_offset(line, end, is_repeated)
+        data = b'' if match is None and offset is not None else _bytes(
+            match['bytes'] if match else line, f'{name}:{number}')
+        if is_repeated and offset is not None:
+            yield from _repetition(last, offset - end)
+        is_repeated = False
+        if match:
+            end, last = (offset or 0) + len(data), data
+        if data:
+            yield Chunk(None, Direction.UNKNOWN, data)
+
+
+def _bare_offset(line: str, end: int, is_repeated: bool) -> int | None:
+    """Return the offset that ``hexdump -C`` puts alone on the last line."""
+    if not end or not re.fullmatch('[0-9a-fA-F]{7,}', line):
+        return None
+    offset = int(line, 16)
+    return offset if is_repeated or offset == end else None
+
+
+def _repetition(data: bytes, count: int) -> Iterator[Chunk]:
+    """Yield the lines that a dump has left out because they are like the one before."""
+    for _ in range(max(0, count) // len(data)):
+        yield Chunk(None, Direction.UNKNOWN, data)
+
+
+def _bytes(text: str, where: str) -> bytes:
+    try:
+        return bytes.fromhex(re.sub(r'0x|,', ' ', text))
+    except ValueError:
+        raise Problem(where, f'"{text[:60]}" is no hexadecimal dump; write bytes as in '
+                      '10 05 01 FF, or give --binary for a file of raw bytes') from None

@@ -1,0 +1,62 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The executables that take a while to import what they need.
+
+Until their ``main`` handles signals, Ctrl-C and SIGTERM end them as they do later: at once,
+with status 0 and without a traceback. There is nothing yet that wants to be closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+import signal
+from types import FrameType
+
+
+def node() -> int:
+    """Run the node."""
+    with _ending_quietly():
+        from abdf1_ros.node import main
+    return main()
+
+
+def monitor() -> int:
+    """Run the monitor."""
+    with _ending_quietly():
+        from abdf1_ros.monitor import main
+    return main()
+
+
+def demo() -> int:
+    """Run the demonstration."""
+    with _ending_quietly():
+        from abdf1_ros.demo import main
+    return main()
+
+
+@contextmanager
+def _ending_quietly() -> Iterator[None]:
+    usual = {number: signal.signal(number, _leave)
+             for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in usual.items():
+        signal.signal(number, handler)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    os._exit(0)

@@ -1,0 +1,253 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What is known of a running bridge, and the lines of text that show it.
+
+Nothing here knows ROS or a terminal: ``monitor_node`` fills a ``Snapshot``, ``monitor`` prints
+the lines. Everything that comes from topics is made printable here, at the last door.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+import textwrap
+
+from abdf1_ros.text import printable
+
+# Seconds without diagnostics from which on this is said; by default they come every second.
+_SILENCE = 3.0
+
+# Columns that names and addresses get at most; the values have what is left of the line.
+_NAME_WIDTH = 30
+_ADDRESS_WIDTH = 12
+_STATE_WIDTH = 16
+_LEAST_VALUE_WIDTH = 12
+
+_LINK_KEYS = ('settings', 'transactions per second', 'line load', 'scan time',
+              'longest scan time', 'expected scan time')
+_STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
+                 'mode', 'faults')
+
+
+class Style(Enum):
+    """How a line is to be shown, where a terminal can."""
+
+    PLAIN = 'plain'
+    TITLE = 'title'
+    GOOD = 'good'
+    WARNING = 'warning'
+    BAD = 'bad'
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line to be shown."""
+
+    text: str
+    style: Style = Style.PLAIN
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """
+    The last message of a read topic; ``values`` is None before the first.
+
+    ``received`` is a clock value (s). ``promised`` is the longest pause (s) between two values
+    that the topic offers, None for one that promises nothing.
+    """
+
+    topic: str
+    values: Sequence[float] | str | None = None
+    address: str = ''
+    received: float = 0.0
+    promised: float | None = None
+
+    def state(self, now: float) -> tuple[str, Style]:
+        """Return in a word what the values are worth at the clock value ``now`` (s)."""
+        if self.values is None:
+            return 'no value', Style.BAD
+        if self.promised is None:
+            return 'no promise', Style.PLAIN
+        if now - self.received > self.promised:
+            return f'STALE (>{self.promised:.3g} s)', Style.BAD
+        return 'fresh', Style.GOOD
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One status of the diagnostics; ``section`` is its name without that of the node."""
+
+    section: str
+    style: Style
+    message: str
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The result of one write; ``received`` is a clock value (s)."""
+
+    tag: str
+    style: Style
+    message: str
+    values: Mapping[str, str]
+    received: float
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """
+    All that is known of one node.
+
+    ``told`` is the clock value (s) of the last diagnostics, ``active`` the stations of the
+    Active Node Table; each is None before the first message. ``results`` begin with the newest.
+    """
+
+    node: str
+    is_there: bool
+    told: float | None
+    statuses: Sequence[Status]
+    readings: Sequence[Reading]
+    active: Sequence[int] | None
+    results: Sequence[Result]
+    remarks: Sequence[str] = ()
+
+
+def render(snapshot: Snapshot, now: float, width: int) -> list[Line]:
+    """Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``."""
+    lines = [*_head(snapshot, now), *_link(snapshot, width), *_stations(snapshot, width),
+             *_values(snapshot, now, width), *_mappings(snapshot, width),
+             *_writes(snapshot, now, width), *_counters(snapshot, width)]
+    return [Line(_cut(line.text, width), line.style) for line in lines]
+
+
+def show(values: Sequence[float] | str, width: int) -> str:
+    """Return values as text of at most ``width`` characters; what is left out is counted."""
+    if isinstance(values, str):
+        return _cut(f'"{printable(values)}"', width)
+    # An element takes two characters or more: no need to write out what cannot fit.
+    texts = [_number(value) for value in values[:width // 2 + 1]]
+    for count in range(len(texts), 0, -1):
+        rest = len(values) - count
+        text = ' '.join(texts[:count]) + (f' and {rest} more' if rest else '')
+        if len(text) <= width:
+            return text
+    return _cut(' '.join(texts), width)
+
+
+def _head(snapshot: Snapshot, now: float) -> Iterator[Line]:
+    yield Line(printable(snapshot.node), Style.TITLE)
+    if not snapshot.is_there:
+        yield Line('  the node is gone; these are its last words', Style.BAD)
+    if snapshot.told is None:
+        yield Line('  no diagnostics yet', Style.WARNING)
+    elif now - snapshot.told > _SILENCE:
+        yield Line(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
+    for remark in snapshot.remarks:
+        yield Line(f'  {printable(remark)}', Style.WARNING)
+
+
+def _link(snapshot: Snapshot, width: int) -> Iterator[Line]:
+    for status in _section(snapshot, 'link'):
+        yield _summary('link', status)
+        yield from _wrapped(_pairs(status.values, _LINK_KEYS), width)
+        error = status.values.get('last error', 'none')
+        if error != 'none':
+            yield from _wrapped(f'last error: {error}', width, Style.WARNING)
+
+
+def _stations(snapshot: Snapshot, width: int) -> Iterator[Line]:
+    if snapshot.active is not None:
+        numbers = ', '.join(map(str, snapshot.active)) or 'none'
+        yield Line(f'  active stations: {numbers}')
+    for status in snapshot.statuses:
+        if status.section.startswith('station '):
+            yield _summary(status.section, status)
+            yield from _wrapped(_pairs(status.values, _STATION_KEYS), width)
+
+
+def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
+    names = [_cut(printable(reading.topic), _NAME_WIDTH) for reading in snapshot.readings]
+    name_width = max(map(len, ['topic', *names]))
+    value_width = max(_LEAST_VALUE_WIDTH,
+                      width - name_width - _ADDRESS_WIDTH - _STATE_WIDTH - 15)
+    yield Line(f'  {"topic":<{name_width}}  {"address":<{_ADDRESS_WIDTH}}'
+               f'  {"age":>6}  {"state":<{_STATE_WIDTH}}  value', Style.TITLE)
+    for name, reading in zip(names, snapshot.readings, strict=True):
+        state, style = reading.state(now)
+        age, value = '', ''
+        if reading.values is not None:
+            age = f'{now - reading.received:.1f} s'
+            value = show(reading.values, value_width)
+        address = _cut(printable(reading.address), _ADDRESS_WIDTH)
+        yield Line(f'  {name:<{name_width}}  {address:<{_ADDRESS_WIDTH}}'
+                   f'  {age:>6}  {state:<{_STATE_WIDTH}}  {value}', style)
+    if not snapshot.readings:
+        yield Line('  no read topic found', Style.WARNING)
+
+
+def _mappings(snapshot: Snapshot, width: int) -> Iterator[Line]:
+    for status in _section(snapshot, 'mappings'):
+        yield _summary('mappings', status)
+        for key, value in status.values.items():
+            if not value.isdecimal():  # the counts are in the summary
+                yield from _wrapped(f'{key}: {value}', width, status.style)
+
+
+def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
+    for status in _section(snapshot, 'writes'):
+        yield _summary('writes', status)
+    for result in snapshot.results:
+        value, latency = (result.values.get(key, '?') for key in ('value', 'latency_ms'))
+        yield from _wrapped(f'{now - result.received:.1f} s ago: {result.tag} {value} '
+                            f'{result.message} ({latency} ms)', width, result.style)
+
+
+def _counters(snapshot: Snapshot, width: int) -> Iterator[Line]:
+    """Yield the counters that are not 0, as many columns as fit."""
+    for status in _section(snapshot, 'counters'):
+        yield _summary('counters', status)
+        cells = [f'{printable(key):<24} {printable(value):>9}'
+                 for key, value in status.values.items() if value != '0']
+        columns = max(1, (width - 2) // 38)
+        for start in range(0, len(cells), columns):
+            yield Line('      ' + '    '.join(cells[start:start + columns]))
+
+
+def _section(snapshot: Snapshot, name: str) -> Iterator[Status]:
+    return (status for status in snapshot.statuses if status.section == name)
+
+
+def _summary(name: str, status: Status) -> Line:
+    return Line(f'  {printable(name):<12} {printable(status.message)}', status.style)
+
+
+def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[Line]:
+    for part in textwrap.wrap(printable(text), max(_LEAST_VALUE_WIDTH, width - 6)):
+        yield Line(f'      {part}', style)
+
+
+def _pairs(values: Mapping[str, str], keys: Sequence[str]) -> str:
+    return ', '.join(f'{key} {values[key]}' for key in keys if key in values)
+
+
+def _number(value: float) -> str:
+    return str(value) if isinstance(value, int) else f'{value:.7g}'  # what a float32 is good for
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else text[:max(0, width - 3)] + '...'

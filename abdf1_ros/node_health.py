@@ -1,0 +1,109 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the PLCs say of themselves, for /diagnostics and for the service ~/read_link_counters."""
+
+from __future__ import annotations
+
+import time
+
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.health import StationHealth
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.port import LinkThread
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+# How long (s) the service waits for all stations.
+_PATIENCE = 5.0
+
+
+def trouble(identity: Identity | None) -> str | None:
+    """Return why a processor that answers does not do its work, None when nothing is known."""
+    if identity is None:
+        return None
+    if identity.faults:
+        return f'{", ".join(identity.faults)} ({identity.mode_text})'
+    if identity.mode is None or identity.mode.is_running:
+        return None
+    return f'in {identity.mode.words} mode ({identity.mode_text})'
+
+
+def health_values(health: StationHealth, now: float) -> dict[str, str]:
+    """Return what is shown of a station at the clock value ``now`` (s)."""
+    values = {'processor': health.processor, 'mode': 'unknown', 'faults': 'unknown'}
+    identity = health.identity
+    if identity is not None and health.told is not None:
+        values['mode'] = f'{identity.mode_text or "none"} ({now - health.told:.1f} s ago)'
+        values['faults'] = '; '.join((*identity.faults, *identity.remarks)) or 'none'
+    if health.no_counters:
+        values['link counters'] = health.no_counters
+    return values | {f'link counter {name}': value for name, value in health.counters.items()}
+
+
+class LinkCounterService:
+    """
+    Ask every active station for the counters of its port; ~/read_link_counters.
+
+    ``answer`` is the callback. It waits without holding up the executor, in a callback group of
+    its own, and goes on when ``check`` finds that all have answered, or after five seconds.
+    """
+
+    def __init__(self, driver: Driver, link: LinkThread) -> None:
+        self._driver = driver
+        self._link = link
+        self._asked: list[int] = []
+        self._give_up = 0.0
+        self._done: Future | None = None
+
+    async def answer(self, request: Trigger.Request,
+                     response: Trigger.Response) -> Trigger.Response:
+        """Ask, wait, and tell."""
+        self._asked = [station.number for station in self._driver.stations if station.active]
+        if not self._driver.is_online or not self._asked:
+            what = 'no station is active' if self._driver.is_online else 'the port is not open'
+            response.success, response.message = False, f'nobody to ask: {what}'
+            return response
+        for station in self._asked:
+            self._driver.request_counters(station)
+        self._link.wake()
+        self._give_up = time.monotonic() + _PATIENCE
+        self._done = Future()
+        await self._done
+        response.success = all(self._has_told(station) for station in self._asked)
+        response.message = '; '.join(map(self._text, self._asked))
+        return response
+
+    def check(self, now: float) -> None:
+        """End the waiting when there is nothing more to wait for."""
+        if self._done is None or self._done.done():
+            return
+        if now >= self._give_up or not any(map(self._is_waited_for, self._asked)):
+            self._done.set_result(None)
+
+    def _is_waited_for(self, station: int) -> bool:
+        return self._driver.is_online and station in self._driver.health.counters_wanted
+
+    def _has_told(self, station: int) -> bool:
+        health = self._driver.health
+        return station not in health.counters_wanted and bool(health.known(station).counters)
+
+    def _text(self, station: int) -> str:
+        health = self._driver.health.known(station)
+        if station in self._driver.health.counters_wanted:
+            text = 'no answer yet'
+        else:
+            text = health.no_counters or ', '.join(
+                f'{name} {value}' for name, value in health.counters.items())
+        return f'station {station}: {text}'

@@ -1,0 +1,83 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the driver needs of a PLC family to read and write the words of its data table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import FileType
+
+Request = tuple[int, bytes]
+"""CMD, and what stands behind TNS."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """
+    What several packets move together: ``words`` words from ``start`` on.
+
+    Commands with an offset and a total name it; the others only know their own packet.
+    """
+
+    start: Address
+    words: int
+
+
+def exactly(words: int, data: bytes) -> bytes:
+    """Return a reply's data; FormatError unless they are so many words."""
+    if len(data) != words * 2:
+        raise FormatError(f'the reply holds {len(data)} bytes, asked were {words * 2}')
+    return data
+
+
+class Dialect(Protocol):
+    """
+    Turn an address and a number of words into a request, and a reply's data into words.
+
+    Data are words in the order of ``Address.offset``, each low byte first. A packet that is not
+    the whole of a transfer is told which it is part of. ``writes_bits`` is False where a family
+    has no command that changes single bits; ``write_bits`` then raises FormatError.
+    """
+
+    writes_bits: bool
+
+    def max_read(self, file_type: FileType) -> int:
+        """Return the most words that one read of such a file brings, whole elements."""
+
+    def max_write(self, file_type: FileType) -> int:
+        """Return the most words that one write to such a file takes, whole elements."""
+
+    def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
+        """
+        Return a read of ``words`` words.
+
+        More than one word of a structure file has to be whole elements.
+        """
+
+    def reply_size(self, address: Address, words: int) -> int:
+        """Return the bytes behind the header of the reply to that read."""
+
+    def read_data(self, address: Address, words: int, data: bytes) -> bytes:
+        """Return the words in the reply to that read; FormatError when they are not there."""
+
+    def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
+        """Return a write of whole words."""
+
+    def write_bits(self, address: Address, mask: int, bits: int) -> Request:
+        """Return what changes the bits of ``mask`` in one word to ``bits``."""

@@ -1,0 +1,160 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Places and values as they stand in commands, in the words of a controls engineer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import struct
+from typing import Any
+
+from abdf1_ros.pccc import plc2_address, plc3, plc3_address, plc5, slc, typed_data
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import BY_SLC_CODE, file_types_of, FileType, layout_of, PlcType
+from abdf1_ros.pccc.typed_data import TypedData
+
+_BY_PLC5_FILE = {
+    kind.default_file: kind for kind in file_types_of(PlcType.PLC5)
+    if kind.default_file is not None}
+# Types that a typed command names; 4 may be N, B, A, D, S, I or O (M 7-29).
+_BY_PLC5_ID = {
+    layout_of(kind, PlcType.PLC5).code: kind for kind in file_types_of(PlcType.PLC5)
+    if kind.is_structure or kind in (FileType.FLOAT, FileType.STRING)}
+
+
+def count_of(number: int, name: str) -> str:
+    """Return e.g. "1 word" or "2 words"."""
+    return f'{number} {name}' if number == 1 else f'{number} {name}s'
+
+
+def part_of(offset: int, size: int, total: int) -> str:
+    """Return where in a transaction of several packets this is, or nothing if it is all."""
+    return '' if (offset, size) == (0, total) else f' (from {offset} of {total})'
+
+
+def hexadecimal(data: bytes) -> str:
+    """Return bytes as they stand on the line."""
+    return data.hex(' ').upper()
+
+
+def system_address(address: plc5.SystemAddress, type_id: int | None = None) -> str:
+    """
+    Return a PLC-5 address.
+
+    The type of a file above 8 is not in its address; where ``type_id`` of the data does not
+    tell it either, the file has its number only.
+    """
+    kind = _BY_PLC5_FILE.get(address.file)
+    if kind is None and type_id is not None:
+        kind = _BY_PLC5_ID.get(type_id)
+    if kind is not None:
+        return _place(PlcType.PLC5, kind, address.file, address.element,
+                      address.sub_element or 0)
+    text = f'file {address.file}:{address.element}'
+    return text if address.sub_element is None else f'{text}.{address.sub_element}'
+
+
+def extended_address(address: plc3.ExtendedAddress) -> str:
+    """Return a PLC-3 address, by its levels where its section has no letter (M 13-5)."""
+    kind = plc3_address.BY_SECTION.get(address.section)
+    if kind is not None and not kind.is_structure and not address.structure:
+        return plc3_address.show(kind, address.file, address.word, 0, None)
+    if kind is not None and kind.is_structure and address.word < 3:
+        return plc3_address.show(kind, address.file, address.structure, address.word, None)
+    return (f'E{plc3.DATA_TABLE}.{plc3.CONTEXT}.{address.section}.{address.file}.'
+            f'{address.structure}.{address.word}')
+
+
+def byte_address(address: int) -> str:
+    """Return the octal word of a PLC-2 address, which an SLC may take for a word's number."""
+    return f'{plc2_address.show(address // 2, None)} (ADDR {address})'
+
+
+def logical_address(address: slc.LogicalAddress) -> str:
+    """Return an SLC address, by its fields where its type is not known."""
+    kind, word = BY_SLC_CODE.get(address.type_code), address.sub_element or 0
+    if kind is not None:
+        return _place(PlcType.SLC, kind, address.file, address.element, word)
+    text = f'file {address.file} type {address.type_code:02X} element {address.element}'
+    return text + _beyond(word)
+
+
+def logical_size(address: slc.LogicalAddress, size: int) -> str:
+    """Return ``size`` bytes as elements where they are whole ones, as words, or as bytes."""
+    kind = BY_SLC_CODE.get(address.type_code)
+    words = layout_of(kind, PlcType.SLC).words if kind else 1
+    if words > 1 and size and size % (2 * words) == 0 and not address.sub_element:
+        return count_of(size // 2 // words, 'element')
+    return count_of(size, 'byte') if size % 2 else count_of(size // 2, 'word')
+
+
+def _place(plc_type: PlcType, kind: FileType, file: int, element: int, word: int) -> str:
+    """Return an address; a word that its element does not have is counted from there on."""
+    is_slot = kind.is_io and plc_type is PlcType.SLC
+    is_inside = kind.is_structure and word < layout_of(kind, plc_type).words
+    beyond = 0 if is_slot or is_inside else word
+    return str(Address(plc_type, kind, file, element, word - beyond)) + _beyond(beyond)
+
+
+def _beyond(words: int) -> str:
+    return f' + {count_of(words, "word")}' if words else ''
+
+
+def words_text(data: bytes) -> str:
+    """Return words as hexadecimal numbers, their high byte first."""
+    return hexadecimal(data) if len(data) % 2 else ' '.join(
+        f'{value:04X}' for value in _unpack('H', data))
+
+
+def _integers(data: bytes) -> str:
+    return hexadecimal(data) if len(data) % 2 else ' '.join(map(str, _unpack('h', data)))
+
+
+def _longs(data: bytes) -> str:
+    return hexadecimal(data) if len(data) % 4 else ' '.join(map(str, _unpack('i', data)))
+
+
+def _floats(data: bytes) -> str:
+    return hexadecimal(data) if len(data) % 4 else ' '.join(
+        f'{value:.7g}' for value in _unpack('f', data))
+
+
+def _unpack(code: str, data: bytes) -> tuple[Any, ...]:
+    return struct.unpack(f'<{len(data) // struct.calcsize(code)}{code}', data)
+
+
+# Types whose values are numbers; all others are shown as words.
+_NUMBERS: dict[FileType, Callable[[bytes], str]] = {
+    FileType.INTEGER: _integers, FileType.TIMER: _integers, FileType.COUNTER: _integers,
+    FileType.CONTROL: _integers, FileType.LONG: _longs, FileType.FLOAT: _floats}
+
+
+def logical_values(address: slc.LogicalAddress, data: bytes) -> str:
+    """Return the data of an SLC command or reply as its file type says."""
+    kind = BY_SLC_CODE.get(address.type_code)
+    if kind is None or kind.is_structure and not address.sub_element:
+        return words_text(data)  # a structure begins with a word of flags
+    return _NUMBERS.get(kind, words_text)(data)
+
+
+def typed_values(address: plc5.SystemAddress, values: TypedData) -> str:
+    """Return the elements of a PLC-5 typed command or reply as their type says."""
+    if values.type_id == typed_data.FLOAT and values.element_size == 4:
+        return _floats(values.data)
+    kind = _BY_PLC5_FILE.get(address.file)
+    if values.type_id == typed_data.INTEGER and values.element_size == 2 and (
+            kind is None or kind in _NUMBERS):
+        return _integers(values.data)
+    return words_text(values.data)

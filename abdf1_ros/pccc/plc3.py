@@ -1,0 +1,65 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The extended address of a PLC-3 (M 13-5..13-8).
+
+A flag byte says which of six levels follow: area, context, section, file, structure, word. The
+area of the data table is 3; a level that is left out is 3, 1, or 0 for all behind these two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import number, Reader
+
+DATA_TABLE = 3
+CONTEXT = 1
+_DEFAULTS = (DATA_TABLE, CONTEXT, 0, 0, 0, 0)
+_ALWAYS_THERE = (2, 3, 5)  # section, file, and word, because it is the last
+
+
+@dataclass(frozen=True, slots=True)
+class ExtendedAddress:
+    """A place in the data table of context 1."""
+
+    section: int
+    file: int
+    structure: int = 0
+    word: int = 0
+
+    def encode(self) -> bytes:
+        """Return the flag byte and the levels, those left out that the default stands for."""
+        levels = (DATA_TABLE, CONTEXT, self.section, self.file, self.structure, self.word)
+        sent = [n for n, value in enumerate(levels)
+                if n in _ALWAYS_THERE or value != _DEFAULTS[n]]
+        flag = sum(1 << n for n in sent)
+        return bytes((flag,)) + b''.join(number(levels[n]) for n in sent)
+
+    @classmethod
+    def read(cls, reader: Reader) -> ExtendedAddress:
+        """Take an address off ``reader``; FormatError for symbols and other memory."""
+        flag = reader.byte()
+        if flag == 0:
+            raise FormatError('a symbol is no address that can be looked up here')
+        if flag >> len(_DEFAULTS):
+            raise FormatError(f'address flag {flag:02X} has more levels than a PLC-3')
+        area, context, *levels = (
+            reader.number() if flag >> n & 1 else default
+            for n, default in enumerate(_DEFAULTS))
+        if (area, context) != (DATA_TABLE, CONTEXT):
+            raise FormatError(f'E{area}.{context} is not the data table of context {CONTEXT}')
+        return cls(*levels)

@@ -1,0 +1,188 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Addresses of a PLC-3.
+
+Grammar, letters in any case::
+
+    address  := type [file] ":" number ["." member] ["/" bit]       B10:5/03, T:4.ACC
+              | "E3.1." section "." file "." structure "." word ["/" bit]
+
+The second form is the manuals' own (M 13-5). Both name the same places: T:4.ACC is
+E3.1.3.0.4.2. Bits are octal in every section, words of the I/O image too. Sections and ranges
+are those of publication 1775-6.5.5 A-15, which 1779-KFM B-5 confirms. Floats, high-order
+integers and pointers are left out: what their words hold is in neither.
+"""
+
+from __future__ import annotations
+
+import re
+
+from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.members import Members
+from abdf1_ros.pccc.plc3 import CONTEXT, DATA_TABLE
+
+Parts = tuple[FileType, int, int, int, int | None]
+"""File type, file, element, word in the element, bit."""
+
+SECTIONS = {
+    FileType.OUTPUT: 1, FileType.INPUT: 2, FileType.TIMER: 3, FileType.COUNTER: 4,
+    FileType.INTEGER: 5, FileType.BCD: 7, FileType.BINARY: 8, FileType.ASCII: 9,
+    FileType.STATUS: 13}
+BY_SECTION = {section: kind for kind, section in SECTIONS.items()}
+
+_LAST_FILE = 999
+_LAST_NUMBER = 9999
+_LAST_IO_WORD = 0o7777
+_LAST_BIT = 0o17
+_NO_FILE_NEEDED = (
+    FileType.OUTPUT, FileType.INPUT, FileType.TIMER, FileType.COUNTER, FileType.STATUS)
+
+_LETTERS = re.compile(
+    r'[#$]?(?P<type>[A-Z]{1,2})(?P<file>\d{1,4})?[:;](?P<number>\d{1,5})'
+    r'(?:\.(?P<member>[A-Z]{2,3}|\d))?(?:/(?P<bit>[A-Z]{2}|\d{1,3}))?', re.ASCII)
+_LEVELS = re.compile(r'E(\d{1,5}(?:\.\d{1,5}){5})(?:/(\d{1,3}))?', re.ASCII)
+
+
+def parse(text: str) -> Parts:
+    """Return the parts of an address; AddressSyntaxError or AddressRangeError otherwise."""
+    levels = _LEVELS.fullmatch(text)
+    if levels is not None:
+        return _from_levels(levels[1].split('.'), levels[2])
+    match = _LETTERS.fullmatch(text)
+    if match is None:
+        raise AddressSyntaxError(
+            'write type, file, ":", word, as in N7:0 or B10:5/03, or E3.1.8.10.0.5')
+    kind = _kind(match['type'])
+    file = _file(match['file'], kind)
+    number = _number(match['number'], kind)
+    member, bit = match['member'], match['bit']
+    if kind.is_structure:
+        return kind, file, number, *_member(kind, member, bit)
+    if member:
+        raise AddressSyntaxError(f'words of {kind.value} files have no members')
+    return kind, file, number, 0, _bit(bit)
+
+
+def show(kind: FileType, file: int, element: int, word: int, bit: int | None) -> str:
+    """Return the text that ``parse`` reads."""
+    number = f'{element:04o}' if kind.is_io else str(element)
+    place = f'{kind.value}{file or ""}:{number}' if kind in _NO_FILE_NEEDED \
+        else f'{kind.value}{file}:{number}'
+    if kind.is_structure:
+        names = (name for name, member in _members(kind).items()
+                 if (member.word, member.bit) == (word, None))
+        place += f'.{next(names, word)}'
+    return place if bit is None else f'{place}/{bit:02o}'
+
+
+def last_element(kind: FileType) -> int:
+    """Return the last word of a file, or the last timer or counter."""
+    return _LAST_IO_WORD if kind.is_io else _LAST_NUMBER
+
+
+def _from_levels(levels: list[str], bit: str | None) -> Parts:
+    area, context, section, file, structure = map(int, levels[:-1])
+    if (area, context) != (DATA_TABLE, CONTEXT):
+        raise AddressRangeError(f'only the data table, E{DATA_TABLE}.{CONTEXT}, can be read')
+    kind = BY_SECTION.get(section)
+    if kind is None:
+        known = ', '.join(f'{number} ({entry.value})' for number, entry in BY_SECTION.items())
+        raise AddressRangeError(f'section {section} is not known; sections: {known}')
+    _check_file(file, kind)
+    if kind.is_structure:
+        _check_number(structure, kind)
+        word = int(levels[-1])
+        if word >= layout_of(kind, PlcType.PLC3).words:
+            raise AddressRangeError('words of a timer or counter are 0, 1 and 2')
+        return kind, file, structure, word, _bit(bit)
+    if structure:
+        raise AddressRangeError(f'section {section} has no structures; write 0 for it')
+    return kind, file, _number(levels[-1], kind), 0, _bit(bit)
+
+
+def _kind(letters: str) -> FileType:
+    kind = next((entry for entry in SECTIONS if entry.value == letters), None)
+    if kind is None:
+        known = ', '.join(entry.value for entry in SECTIONS)
+        raise AddressSyntaxError(f'{letters} is no file type of a PLC-3; file types: {known}')
+    return kind
+
+
+def _file(text: str | None, kind: FileType) -> int:
+    if text is None:
+        if kind not in _NO_FILE_NEEDED:
+            raise AddressSyntaxError(f'give the file number, as in {kind.value}7:0')
+        return 0
+    file = int(text)
+    _check_file(file, kind)
+    return file
+
+
+def _check_file(file: int, kind: FileType) -> None:
+    if kind.is_structure and file:
+        raise AddressRangeError(f'the {kind.value} file of a PLC-3 is file 0')
+    if file > _LAST_FILE:
+        raise AddressRangeError(f'files run from 0 to {_LAST_FILE}')
+
+
+def _number(text: str, kind: FileType) -> int:
+    if kind.is_io and set(text) & set('89'):
+        raise AddressSyntaxError('words of the I/O image are octal, as in I:017')
+    number = int(text, 8 if kind.is_io else 10)
+    _check_number(number, kind)
+    return number
+
+
+def _check_number(number: int, kind: FileType) -> None:
+    last = last_element(kind)
+    if number > last:
+        shown = f'{last:o} (octal)' if kind.is_io else str(last)
+        raise AddressRangeError(f'elements of {kind.value} run from 0 to {shown}')
+
+
+def _member(kind: FileType, member: str | None, bit: str | None) -> tuple[int, int | None]:
+    """Return word and bit of a part of a timer or counter."""
+    members = _members(kind)
+    if member is None and bit is None:
+        raise AddressSyntaxError(f'say which word, as in {kind.value}:0.ACC')
+    place = members.get(member or 'CTL')
+    if member and member.isdigit():
+        place = next((entry for entry in members.values() if entry.word == int(member)), None)
+    if place is None:
+        raise AddressSyntaxError(f'{member} is no member here; members of {kind.value}: '
+                                 f'{", ".join(members)}')
+    named = members.get(bit or '')
+    if named is not None and named.word == place.word and place.bit is None:
+        return named.word, named.bit
+    if place.bit is not None and bit is not None:
+        raise AddressSyntaxError(f'{member} is a bit already')
+    return place.word, place.bit if bit is None else _bit(bit)
+
+
+def _members(kind: FileType) -> Members:
+    return layout_of(kind, PlcType.PLC3).members
+
+
+def _bit(text: str | None) -> int | None:
+    if text is None:
+        return None
+    if not text.isdigit() or set(text) & set('89'):
+        raise AddressSyntaxError('PLC-3 bits are octal, 0 to 17')
+    bit = int(text, 8)
+    if bit > _LAST_BIT:
+        raise AddressRangeError('bits run from 0 to 17 (octal)')
+    return bit

@@ -1,0 +1,106 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How words of a PLC-5 are read and written with its typed commands."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import plc5, typed_data
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Request, Transfer
+from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.typed_data import TypedData
+
+
+class Plc5Dialect:
+    """
+    Typed read and write, read-modify-write for bits.
+
+    One value of a structure, a word or a float32, is moved by itself (M 13-12); anything more
+    is whole elements.
+    """
+
+    writes_bits = True
+
+    def max_read(self, file_type: FileType) -> int:
+        """Return the most words per read."""
+        return _most_words(file_type, plc5.MAX_REPLY)
+
+    def max_write(self, file_type: FileType) -> int:
+        """Return the most words per write."""
+        return _most_words(file_type, plc5.MAX_WRITE - plc5.MAX_ELEMENT_ADDRESS)
+
+    def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
+        """Return a typed read."""
+        count = 2 * words // _element(address, words).size
+        return plc5.CMD, plc5.TypedRead(_system_address(address, words), count, 0, count).encode()
+
+    def reply_size(self, address: Address, words: int) -> int:
+        """Return descriptors and elements of the reply's array."""
+        element = _element(address, words)
+        data = bytes(2 * words // element.size * element.wire_size)
+        return len(TypedData(element.type_id, element.wire_size, data).encode())
+
+    def read_data(self, address: Address, words: int, data: bytes) -> bytes:
+        """Check type and length of a typed read's reply and return its words."""
+        typed = TypedData.decode(data)
+        element = _element(address, words)
+        if (typed.type_id == typed_data.FLOAT) is not (element.type_id == typed_data.FLOAT):
+            raise FormatError(f'the reply holds type {typed.type_id}, not what is at {address}')
+        if typed.element_size < element.size and len(typed.data) == words * 2:
+            return typed.data  # bytes or characters: the same words in smaller elements
+        size = element.size
+        asked = 2 * words // size
+        if typed.count != asked or typed.element_size not in (size, element.wire_size):
+            raise FormatError(f'the reply holds {typed.count} elements of '
+                              f'{typed.element_size} bytes, asked were {asked} of {size}')
+        if typed.element_size == size:
+            return typed.data
+        # Timers carry two internal words behind the three that have names.
+        step = typed.element_size
+        return b''.join(typed.data[at:at + size] for at in range(0, len(typed.data), step))
+
+    def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
+        """Return a typed write."""
+        words = len(data) // 2
+        element = _element(address, words)
+        values = TypedData(element.type_id, element.size, data)
+        return plc5.CMD, plc5.TypedWrite(
+            _system_address(address, words), values, 0, values.count).encode()
+
+    def write_bits(self, address: Address, mask: int, bits: int) -> Request:
+        """Return a read-modify-write of one word."""
+        change = plc5.BitSet(_system_address(address, 1), ~mask & 0xFFFF, bits & mask)
+        return plc5.CMD, plc5.ReadModifyWrite((change,)).encode()
+
+
+def _system_address(address: Address, words: int) -> plc5.SystemAddress:
+    sub_element = address.word if address.is_value(words) else None
+    return plc5.SystemAddress(address.file, address.element, sub_element)
+
+
+def _element(address: Address, words: int) -> plc5.Element:
+    """Return what so many words at an address are counted in."""
+    return plc5.element_of(address, address.is_value(words))
+
+
+def _most_words(file_type: FileType, room: int) -> int:
+    """Return the words of as many whole elements as fit into ``room`` with their descriptors."""
+    layout = layout_of(file_type, PlcType.PLC5)
+    size = 2 * layout.wire_words
+    some = bytes(8 * size)  # enough for the array's size to need a byte of its own, as all do
+    descriptors = len(TypedData(layout.code, size, some).encode()) - len(some)
+    count = (room - descriptors) // size
+    return min(count, plc5.MAX_INTEGERS) * layout.words

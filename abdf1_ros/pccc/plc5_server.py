@@ -1,0 +1,108 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a PLC-5 answers to commands."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc import plc5, status
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.family import Codes, Commands, extended
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.plc2_server import BasicService, Window
+from abdf1_ros.pccc.typed_data import TypedData
+from abdf1_ros.pccc.word_range_server import WordRangeService
+
+
+class Plc5Commands:
+    """The commands a PLC-5 serves."""
+
+    no_such_file: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
+    out_of_range: Codes = status.EXTENDED, status.EXT_WRONG_SIZE
+
+    def __init__(self, table: DataTable) -> None:
+        self._table = table
+        self.basic_commands = BasicService(table, self._compatibility_file).everything()
+        self.commands: Commands = {
+            (plc5.CMD, plc5.TYPED_READ): self._typed_read,
+            (plc5.CMD, plc5.TYPED_WRITE): self._typed_write,
+            (plc5.CMD, plc5.READ_MODIFY_WRITE): self._read_modify_write,
+        } | WordRangeService(
+            table, plc5.SystemAddress.read, self._address,
+            bad_size=(status.EXTENDED, status.EXT_ILLEGAL_FIELD),
+            too_long=(status.EXTENDED, status.EXT_TOO_LARGE)).commands()
+
+    def _typed_read(self, reader: Reader) -> bytes:
+        request = plc5.TypedRead.read(reader)
+        if request.offset + request.size > request.total or request.size == 0:
+            raise extended(status.EXT_ILLEGAL_FIELD)
+        address = self._address(request.address, request.offset)
+        element = _element(address, request.address)
+        size = element.size
+        data = self._table.read(address, request.size * size // 2)
+        padding = bytes(element.wire_size - size)
+        elements = (data[at:at + size] + padding for at in range(0, len(data), size))
+        reply = TypedData(element.type_id, element.wire_size, b''.join(elements)).encode()
+        if len(reply) > plc5.MAX_REPLY:
+            raise extended(status.EXT_TOO_LARGE)
+        return reply
+
+    def _typed_write(self, reader: Reader) -> bytes:
+        request = plc5.TypedWrite.read(reader)
+        values = request.values
+        if request.offset + values.count > request.total or values.count == 0:
+            raise extended(status.EXT_ILLEGAL_FIELD)
+        if len(request.address.encode()) + len(values.encode()) > plc5.MAX_WRITE:
+            raise extended(status.EXT_TOO_LARGE)
+        address = self._address(request.address, request.offset)
+        element = _element(address, request.address)
+        step = element.wire_size
+        if (values.type_id, values.element_size) != (element.type_id, step):
+            raise extended(status.EXT_TYPE_MISMATCH)
+        elements = (values.data[at:at + element.size]
+                    for at in range(0, len(values.data), step))
+        self._table.write(address, b''.join(elements))
+        return b''
+
+    def _read_modify_write(self, reader: Reader) -> bytes:
+        request = plc5.ReadModifyWrite.read(reader)
+        changes = [(self._address(entry.address), entry) for entry in request.sets]
+        for address, _ in changes:  # all or nothing
+            self._table.read(address, 1)
+        for address, entry in changes:
+            mask = ~entry.and_mask & 0xFFFF | entry.or_mask
+            self._table.write_bits(address, mask, entry.or_mask)
+        return b''
+
+    def _compatibility_file(self, source: int) -> Window:
+        """Return the file whose number is the station that the command comes from (M 6-4)."""
+        return Window(Address(PlcType.PLC5, self._table.file_type(source), source, 0))
+
+    def _address(self, address: plc5.SystemAddress, offset: int = 0) -> Address:
+        """Return the place ``offset`` elements (values, with a sub-element) behind ``address``."""
+        kind = self._table.file_type(address.file)
+        if address.sub_element is None:
+            return Address(PlcType.PLC5, kind, address.file, address.element + offset)
+        start = Address(PlcType.PLC5, kind, address.file, address.element, address.sub_element)
+        if address.sub_element >= start.layout.words:
+            raise extended(status.EXT_TOO_MANY_LEVELS)
+        return start.at_offset(start.offset + offset * _element(start, address).size // 2)
+
+
+def _element(address: Address, asked: plc5.SystemAddress) -> plc5.Element:
+    """Return what a typed command with this address moves."""
+    is_value = asked.sub_element is not None and address.file_type.is_structure
+    return plc5.element_of(address, is_value)

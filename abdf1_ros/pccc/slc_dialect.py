@@ -1,0 +1,77 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How words of an SLC 500 or MicroLogix are read and written."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc import slc
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import exactly, Request, Transfer
+from abdf1_ros.pccc.fields import word
+from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.processor import Processor, USUAL
+
+
+class SlcDialect:
+    """
+    Protected typed logical read, write and masked write with three address fields.
+
+    Packets are as long as ``processor`` takes them.
+    """
+
+    writes_bits = True
+
+    def __init__(self, processor: Processor = USUAL) -> None:
+        self._processor = processor
+
+    def max_read(self, file_type: FileType) -> int:
+        """Return the most words per read."""
+        return _whole_elements(file_type, self._processor.max_read)
+
+    def max_write(self, file_type: FileType) -> int:
+        """Return the most words per write."""
+        return _whole_elements(file_type, self._processor.max_write)
+
+    def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
+        """Return a protected typed logical read."""
+        return slc.CMD, slc.LogicalRead(_logical_address(address), words * 2).encode()
+
+    def reply_size(self, address: Address, words: int) -> int:
+        """Return the bytes asked for."""
+        return words * 2
+
+    def read_data(self, address: Address, words: int, data: bytes) -> bytes:
+        """Check the length of the reply and return it."""
+        return exactly(words, data)
+
+    def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
+        """Return a protected typed logical write."""
+        return slc.CMD, slc.LogicalWrite(_logical_address(address), data).encode()
+
+    def write_bits(self, address: Address, mask: int, bits: int) -> Request:
+        """Return a masked write of one word."""
+        return slc.CMD, slc.MaskedWrite(
+            _logical_address(address), mask, word(bits & mask)).encode()
+
+
+def _whole_elements(file_type: FileType, size: int) -> int:
+    """Return the words of as many whole elements as fit into ``size`` bytes."""
+    words = layout_of(file_type, PlcType.SLC).words
+    return size // 2 // words * words
+
+
+def _logical_address(address: Address) -> slc.LogicalAddress:
+    code = slc.FLAT_CODES[address.file_type] if address.is_flat else address.layout.code
+    return slc.LogicalAddress(address.file, code, address.element, address.word)

@@ -1,0 +1,141 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which reply belongs to which command, and what is said twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from abdf1_ros.capture import Direction
+from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
+from abdf1_ros.sniffer.entries import Mark
+
+# Seconds after which no reply is expected any more: Cmd_Timeout goes up to 5 s (S0), and a
+# master with standard polling may need as long to get round to the station.
+_PATIENCE = 10.0
+_MOST_OPEN = 1000
+
+_Key = tuple[int, int, int]
+
+
+@dataclass(slots=True)
+class _Said:
+    """A message as it was last said by one node to another."""
+
+    packet: Packet
+    acknowledged: bool = False
+
+
+@dataclass(slots=True)
+class Transaction:
+    """A command, when it was first said, and whether its reply has been heard."""
+
+    command: Packet
+    time: float | None
+    answered: bool = False
+
+
+class Facts(NamedTuple):
+    """What there is to say about a message because of those before it."""
+
+    command: Packet | None = None
+    latency: float | None = None
+    marks: tuple[Mark, ...] = ()
+
+
+class Conversation:
+    """Remember the messages of a line; every good one is handed to ``take``."""
+
+    def __init__(self) -> None:
+        self._open: dict[_Key, Transaction] = {}
+        self._said: dict[tuple[int, int, bool, bool], _Said] = {}
+        self._last: dict[Direction, _Said] = {}
+        self._given_up: list[Transaction] = []
+
+    def take(self, packet: Packet, time: float | None, direction: Direction,
+             from_master: bool) -> Facts:
+        """Return what is known of a message; ``from_master`` tells frames with DLE SOH."""
+        mark = self._repetition(packet, from_master)
+        self._last[direction] = self._said[*_path(packet), from_master]
+        marks = () if mark is None else (mark,)
+        if not packet.is_reply:
+            self._begin(packet, time, mark)
+            return Facts(marks=marks)
+        transaction = self._open.get((packet.dst, packet.src, packet.tns))
+        if transaction is None:
+            return Facts(marks=(*marks, Mark.STRAY))
+        command = transaction.command
+        if packet.cmd != command.cmd | REPLY_BIT:
+            return Facts(marks=(*marks, Mark.WRONG_COMMAND))
+        latency = None
+        if not transaction.answered and time is not None and transaction.time is not None:
+            latency = time - transaction.time
+        transaction.answered = True
+        return Facts(command, latency, marks)
+
+    def acknowledge(self, direction: Direction) -> None:
+        """Take an ACK that went ``direction``: it is for what went the other way."""
+        said = self._last.get(direction.opposite)
+        if said is not None:
+            said.acknowledged = True
+
+    def expired(self, now: float | None) -> Iterator[Transaction]:
+        """Yield, once, the commands that have waited too long for their reply."""
+        yield from self._given_up
+        self._given_up.clear()
+        while self._open:
+            key, oldest = next(iter(self._open.items()))
+            is_old = now is not None and oldest.time is not None and (
+                now - oldest.time > _PATIENCE)
+            if not is_old and len(self._open) <= _MOST_OPEN:
+                return
+            del self._open[key]
+            if not oldest.answered:
+                yield oldest
+
+    def unanswered(self) -> list[Transaction]:
+        """Return the commands whose reply may still come."""
+        return [entry for entry in self._open.values() if not entry.answered]
+
+    def _repetition(self, packet: Packet, from_master: bool) -> Mark | None:
+        """Return how this message repeats another, and keep it as the last of its path."""
+        path = _path(packet)
+        last = self._said.get((*path, from_master))
+        if last is not None and last.packet == packet:
+            return Mark.DUPLICATE if last.acknowledged else Mark.RETRANSMISSION
+        self._said[*path, from_master] = _Said(packet)
+        other = self._said.get((*path, not from_master))
+        if other is not None and other.packet == packet:
+            return Mark.RELAYED
+        return None
+
+    def _begin(self, command: Packet, time: float | None, mark: Mark | None) -> None:
+        key = command.src, command.dst, command.tns
+        known = self._open.get(key)
+        if command.dst == BROADCAST:
+            return  # nobody replies
+        if known is not None and mark is not None and not (
+                mark is Mark.DUPLICATE and known.answered):
+            return
+        if known is not None and not known.answered:
+            self._given_up.append(known)  # its TNS is used for something else
+        self._open.pop(key, None)  # the new one takes its place at the end
+        self._open[key] = Transaction(command, time)
+
+
+def _path(packet: Packet) -> tuple[int, int, bool]:
+    return packet.src, packet.dst, packet.is_reply

@@ -1,0 +1,81 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One thing that was seen on the line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from abdf1_ros.capture import Direction
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+
+
+class Kind(Enum):
+    """What an entry is; the value is how it is called in text and JSON."""
+
+    POLL = 'poll'
+    COMMAND = 'command'
+    REPLY = 'reply'
+    ACK = 'ACK'
+    NAK = 'NAK'
+    EOT = 'EOT'
+    ENQ = 'ENQ'
+    DAMAGED = 'damaged'
+    UNKNOWN = 'unknown'
+    NOISE = 'noise'
+    SILENCE = 'silence'
+    UNANSWERED = 'no reply'
+
+
+class Mark(Enum):
+    """
+    What is special about a message.
+
+    A message that comes again is a duplicate once the other side has acknowledged it (the
+    receiver has to drop it, M 3-4), before that a retransmission. A master passes messages of
+    slaves to slaves on as they are. A stray reply is one to no command that was seen.
+    """
+
+    RETRANSMISSION = 'retransmission'
+    DUPLICATE = 'duplicate'
+    RELAYED = 'relayed'
+    STRAY = 'stray'
+    WRONG_COMMAND = 'wrong command code'
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """
+    What was seen, and what is known of it.
+
+    ``time`` is seconds, None where the recording has no times. ``station`` is the slave, or
+    on a full-duplex line the node that commands go to and replies come from. ``valid`` is the
+    verdict of the check of kind ``checksum``, None for what has none. ``latency`` is the
+    seconds from a command to its reply. ``size`` counts the bytes of noise.
+    """
+
+    time: float | None
+    direction: Direction
+    kind: Kind
+    text: str = ''
+    station: int | None = None
+    checksum: Checksum | None = None
+    valid: bool | None = None
+    packet: Packet | None = None
+    latency: float | None = None
+    marks: tuple[Mark, ...] = ()
+    size: int = 0

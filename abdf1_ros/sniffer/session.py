@@ -1,0 +1,219 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From bytes to entries: who says what to whom, good or bad, once or again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Code, Control, Duplex, Fault, Frame, Poll, Symbol, Unknown
+from abdf1_ros.df1.listener import LineKind, ListeningDecoder
+from abdf1_ros.df1.packet import BROADCAST, HEADER_SIZE, Packet
+from abdf1_ros.pccc.describe import describe
+from abdf1_ros.sniffer.conversation import Conversation, Transaction
+from abdf1_ros.sniffer.entries import Entry, Kind
+
+# Seconds of silence after which an unfinished frame is given up, as a receiver does it: some
+# characters, and what an operating system or a device server may hold bytes back.
+_PAUSE = 0.15
+
+_CONTROLS = {
+    Code.ACK: (Kind.ACK, ''), Code.NAK: (Kind.NAK, ''),
+    Code.EOT: (Kind.EOT, 'nothing to send'), Code.ENQ: (Kind.ENQ, 'asks for the last answer'),
+}
+
+
+class _Wire:
+    """The bytes of one direction."""
+
+    def __init__(self, kind: LineKind) -> None:
+        self.decoder = ListeningDecoder(kind)
+        self.last_time: float | None = None
+        self._noise_told = 0
+
+    def feed(self, chunk: Chunk) -> None:
+        """Take bytes; what broke off before a pause is noise."""
+        if chunk.time is not None and self.last_time is not None and (
+                chunk.time - self.last_time > _PAUSE):
+            self.decoder.reset()
+        self.last_time = chunk.time
+        self.decoder.feed(chunk.data)
+
+    def new_noise(self) -> int:
+        """Return the bytes that have belonged to nothing since this was asked last."""
+        count = self.decoder.noise - self._noise_told
+        self._noise_told = self.decoder.noise
+        return count
+
+
+class Session:
+    """
+    Decode the traffic of one line, whatever the bytes are; nothing is raised.
+
+    ``feed`` takes chunks in the order of their times, ``finish`` ends the traffic. Check and
+    duplex are found where they are not given; ``kind`` tells what they are. Where the direction
+    is not known it is inferred on half-duplex lines, ``>`` being the master's.
+    """
+
+    def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None) -> None:
+        self.kind = LineKind(checksum, duplex)
+        self._wires: dict[Direction, _Wire] = {}
+        self._conversation = Conversation()
+        self._station: int | None = None  # that the master has spoken to last
+        self._awaited: tuple[Direction, str] | None = None  # asker, and what has no answer yet
+        self._last_asker = Direction.OUT
+
+    def feed(self, chunk: Chunk) -> Iterator[Entry]:
+        """Yield what the line says with these bytes."""
+        wire = self._wires.get(chunk.direction)
+        if wire is None:
+            wire = self._wires[chunk.direction] = _Wire(self.kind)
+        wire.feed(chunk)
+        while (symbol := wire.decoder.next_symbol()) is not None:
+            yield from self._noise(wire, chunk)
+            yield from self._entries(symbol, chunk, wire.decoder.checksum)
+        for transaction in self._conversation.expired(chunk.time):
+            yield self._unanswered(transaction, chunk.time)
+
+    def finish(self) -> Iterator[Entry]:
+        """Yield what is left at the end."""
+        for direction, wire in self._wires.items():
+            chunk = Chunk(wire.last_time, direction, b'')
+            symbol = wire.decoder.finish()
+            wire.decoder.reset()
+            yield from self._noise(wire, chunk)
+            if symbol is not None:
+                yield from self._entries(symbol, chunk, wire.decoder.checksum)
+        times = [wire.last_time for wire in self._wires.values() if wire.last_time is not None]
+        for transaction in self._conversation.unanswered():
+            yield self._unanswered(transaction, max(times, default=None))
+
+    def _noise(self, wire: _Wire, chunk: Chunk) -> Iterator[Entry]:
+        count = wire.new_noise()
+        if count:
+            text = 'a byte outside of any frame' if count == 1 else (
+                f'{count} bytes outside of any frame')
+            yield Entry(chunk.time, chunk.direction, Kind.NOISE, text, size=count)
+
+    def _unanswered(self, transaction: Transaction, time: float | None) -> Entry:
+        command = transaction.command
+        return Entry(time, Direction.UNKNOWN, Kind.UNANSWERED,
+                     f'{_route(command)}: {describe(command)}', command.dst, packet=command)
+
+    def _entries(self, symbol: Symbol, chunk: Chunk, checksum: Checksum) -> Iterator[Entry]:
+        direction = self._direction(symbol, chunk.direction)
+        yield from self._silence(symbol, chunk.time, direction)
+        if isinstance(symbol, Poll):
+            yield self._poll(symbol, chunk.time, direction)
+        elif isinstance(symbol, Frame):
+            if symbol.station is not None:
+                self._station = symbol.station
+            yield self._frame(symbol, chunk.time, direction, checksum)
+        else:
+            yield self._control(symbol, chunk.time, direction)
+
+    @property
+    def _is_half(self) -> bool:
+        return self.kind.duplex is Duplex.HALF
+
+    def _direction(self, symbol: Symbol, direction: Direction) -> Direction:
+        """Infer the direction on a line where all hear all: masters and slaves differ."""
+        if direction is not Direction.UNKNOWN or not self._is_half:
+            return direction
+        if _is_masters(symbol):
+            return Direction.OUT
+        if isinstance(symbol, Control) and symbol.code is Code.ACK:
+            return self._last_asker.opposite
+        return direction if isinstance(symbol, Unknown) else Direction.IN
+
+    def _silence(self, symbol: Symbol, time: float | None,
+                 direction: Direction) -> Iterator[Entry]:
+        """Yield an entry when the master goes on although a slave has not answered."""
+        awaited = self._awaited
+        if awaited is not None and self._is_half:
+            asker, what = awaited
+            self._awaited = None
+            if direction is asker:
+                yield Entry(time, asker.opposite, Kind.SILENCE, f'no answer to the {what}',
+                            self._station)
+        if isinstance(symbol, Poll | Frame):
+            self._last_asker = direction
+        if isinstance(symbol, Poll):
+            self._awaited = direction, 'poll'
+        elif isinstance(symbol, Frame) and symbol.station not in (None, BROADCAST):
+            self._awaited = direction, 'message'
+
+    def _poll(self, poll: Poll, time: float | None, direction: Direction) -> Entry:
+        self._station = poll.station
+        return Entry(time, direction, Kind.POLL, '', poll.station, Checksum.BCC, poll.valid)
+
+    def _control(self, symbol: Control | Unknown, time: float | None,
+                 direction: Direction) -> Entry:
+        station = self._station if self._is_half else None
+        if isinstance(symbol, Unknown):
+            return Entry(time, direction, Kind.UNKNOWN, f'DLE {symbol.byte:02X}', station)
+        kind, text = _CONTROLS[symbol.code]
+        if kind is Kind.ACK:
+            self._conversation.acknowledge(direction)
+        if kind is Kind.NAK:
+            text = 'resets all slaves' if self._is_half else 'refuses the message'
+        return Entry(time, direction, kind, text, station)
+
+    def _frame(self, frame: Frame, time: float | None, direction: Direction,
+               checksum: Checksum) -> Entry:
+        if frame.fault is not None:
+            return self._damaged(frame, time, direction, checksum)
+        packet = Packet.decode(frame.data)
+        facts = self._conversation.take(packet, time, direction, frame.station is not None)
+        kind = Kind.REPLY if packet.is_reply else Kind.COMMAND
+        return Entry(
+            time, direction, kind, f'{_route(packet)}: {describe(packet, facts.command)}',
+            self._node(frame.station, packet), checksum, True, packet, facts.latency,
+            facts.marks)
+
+    def _damaged(self, frame: Frame, time: float | None, direction: Direction,
+                 checksum: Checksum) -> Entry:
+        assert frame.fault is not None
+        station = self._station if self._is_half else None
+        text = frame.fault.value
+        if frame.fault is not Fault.BAD_CHECK:
+            return Entry(time, direction, Kind.DAMAGED, text, station)
+        text += f': {frame.received:04X}, right is {frame.expected:04X}'
+        packet = None
+        if len(frame.data) >= HEADER_SIZE:
+            packet = Packet.decode(frame.data)
+            text += f'; reads like {_route(packet)}'
+        return Entry(time, direction, Kind.DAMAGED, text, station, checksum, False, packet)
+
+    def _node(self, station: int | None, packet: Packet) -> int:
+        """Return the station that the entry is listed under."""
+        if station is not None:
+            return station
+        if self._is_half:
+            return packet.src
+        return packet.src if packet.is_reply else packet.dst
+
+
+def _is_masters(symbol: Symbol) -> bool:
+    """Tell whether only the master of a half-duplex line says this."""
+    if isinstance(symbol, Control):
+        return symbol.code is Code.NAK
+    return isinstance(symbol, Poll) or isinstance(symbol, Frame) and symbol.station is not None
+
+
+def _route(packet: Packet) -> str:
+    return f'{packet.src} to {packet.dst}, TNS {packet.tns:04X}'

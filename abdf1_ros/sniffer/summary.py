@@ -1,0 +1,120 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What all the traffic comes to: counts, latencies, the load of the line."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.sniffer.entries import Entry, Kind, Mark
+
+BITS_PER_CHARACTER = 10
+
+
+@dataclass(slots=True)
+class Latency:
+    """Seconds from commands to their replies."""
+
+    count: int = 0
+    total: float = 0.0
+    longest: float = 0.0
+
+    def add(self, seconds: float) -> None:
+        """Take one."""
+        self.count += 1
+        self.total += seconds
+        self.longest = max(self.longest, seconds)
+
+    @property
+    def mean(self) -> float:
+        """Return the mean; 0 when there was none."""
+        return self.total / self.count if self.count else 0.0
+
+
+@dataclass(slots=True)
+class Counts:
+    """
+    How often things were seen, of the whole line or of one station.
+
+    ``errors`` are replies with an STS that is not 0, ``repeated`` retransmissions of either
+    side, ``damaged`` everything with a wrong check or a broken frame.
+    """
+
+    kinds: Counter[Kind] = field(default_factory=Counter)
+    marks: Counter[Mark] = field(default_factory=Counter)
+    errors: int = 0
+    damaged: int = 0
+    noise: int = 0
+    latency: Latency = field(default_factory=Latency)
+
+    def add(self, entry: Entry) -> None:
+        """Count an entry."""
+        self.kinds[entry.kind] += 1
+        self.marks.update(entry.marks)
+        self.noise += entry.size
+        self.damaged += entry.kind is Kind.DAMAGED or entry.valid is False
+        if entry.kind is Kind.REPLY and entry.packet is not None:
+            self.errors += entry.packet.sts != 0
+        if entry.latency is not None:
+            self.latency.add(entry.latency)
+
+
+class Summary:
+    """Count what a session gives; ``baud`` is needed for the load of the line."""
+
+    def __init__(self, baud: int | None = None) -> None:
+        self.baud = baud
+        self.all = Counts()
+        self.stations: defaultdict[int, Counts] = defaultdict(Counts)
+        self.bytes: Counter[Direction] = Counter()
+        self._first: float | None = None
+        self._last: float | None = None
+
+    def take(self, chunk: Chunk) -> None:
+        """Count the bytes of a chunk."""
+        self.bytes[chunk.direction] += len(chunk.data)
+        if chunk.time is not None:
+            self._first = chunk.time if self._first is None else self._first
+            self._last = chunk.time
+
+    def add(self, entry: Entry) -> None:
+        """Count an entry."""
+        self.all.add(entry)
+        if entry.station is not None:
+            self.stations[entry.station].add(entry)
+
+    @property
+    def seconds(self) -> float | None:
+        """Return the seconds from the first byte to the last; None without times."""
+        if self._first is None or self._last is None:
+            return None
+        return self._last - self._first
+
+    def load(self, duplex: Duplex | None) -> float | None:
+        """
+        Return how much of its time the line carries bytes, 0 to 1; None when unknown.
+
+        Full duplex has a wire for each direction; the busier one counts. More than a line can
+        carry comes over a pseudo-terminal or a network, whose speed is not known.
+        """
+        if not self.baud or not self.seconds:
+            return None
+        busiest = max(self.bytes.values(), default=0) if duplex is Duplex.FULL else (
+            self.bytes.total())
+        load = busiest * BITS_PER_CHARACTER / self.baud / self.seconds
+        return load if load <= 1 else None

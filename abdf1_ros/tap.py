@@ -1,0 +1,147 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Listen on a port, or stand between two and pass everything on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+import os
+from queue import Empty, SimpleQueue
+import threading
+import time
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.driver.network import Network
+from abdf1_ros.port import Port
+from abdf1_ros.simulator import PtyLine, SerialLine
+
+_PTY = 'pty'
+
+_Heard = SimpleQueue[Chunk | OSError | None]
+
+
+def is_pty(name: str) -> bool:
+    """Tell whether ``name`` asks for a new pseudo-terminal: "pty" or "pty:NAME"."""
+    return name.partition(':')[0] == _PTY
+
+
+class _Reader(threading.Thread):
+    """Read a port, queue its bytes with their time, and pass them on at once."""
+
+    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _Heard,
+                 wake: int) -> None:
+        super().__init__(name=f'tap {direction.value}')
+        self.stopping = False
+        self._port = port
+        self._direction = direction
+        self._onward = onward
+        self._heard = heard
+        self._wake = wake
+
+    def run(self) -> None:
+        """Read until told to stop, or until a port is lost."""
+        try:
+            while not self.stopping:
+                data = self._port.read(None, self._wake)
+                if data:
+                    # Queued first, or an answer might get into the queue before it.
+                    self._heard.put(Chunk(time.monotonic(), self._direction, data))
+                    if self._onward is not None:
+                        self._onward.write(data)
+        except OSError as error:
+            # Not as it is: a broken pipe would be taken for that of standard output.
+            self._heard.put(OSError(error.strerror or str(error)))
+
+
+class Tap:
+    """
+    One port to listen on, or two to stand between; open while the ``with`` block runs.
+
+    A name is what ``open_port`` takes, or "pty" or "pty:NAME" for a new pseudo-terminal;
+    ``names`` is what others call the ports. Raises OSError when one cannot be opened.
+    """
+
+    def __init__(self, names: Sequence[str], network: Network) -> None:
+        self.names: list[str] = []
+        self._network = network
+        self._heard: _Heard = SimpleQueue()
+        with ExitStack() as stack:
+            ports = [self._open(name, stack) for name in names]
+            self._open_ports = stack.pop_all()
+        self._begun = time.monotonic()
+        self._wake_reader, self._wake_writer = os.pipe()
+        if len(ports) == 1:
+            self._readers = [self._reader(ports[0], Direction.UNKNOWN, None)]
+        else:
+            self._readers = [self._reader(ports[0], Direction.OUT, ports[1]),
+                             self._reader(ports[1], Direction.IN, ports[0])]
+
+    def __enter__(self) -> Tap:
+        """Begin to read."""
+        for reader in self._readers:
+            reader.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """End all threads, then close the ports."""
+        for reader in self._readers:
+            reader.stopping = True
+        os.write(self._wake_writer, b'w')  # left in the pipe for all to see
+        for reader in self._readers:
+            reader.join()
+        os.close(self._wake_reader)
+        os.close(self._wake_writer)
+        self._open_ports.close()
+
+    def stop(self) -> None:
+        """End ``chunks``; may be called by a signal handler."""
+        self._heard.put(None)
+
+    def chunks(self, seconds: float, period: float, idle: Callable[[], None]) -> Iterator[Chunk]:
+        """
+        Yield what is heard, with the seconds since the ports were opened.
+
+        It ends after ``seconds`` or ``stop``. ``idle`` is called every ``period`` seconds in
+        which nothing is heard. Raises OSError when a port is lost.
+        """
+        end = self._begun + seconds
+        while (left := end - time.monotonic()) > 0:
+            try:
+                item = self._heard.get(timeout=min(left, period))
+            except Empty:
+                idle()
+                continue
+            if item is None:
+                return
+            if isinstance(item, OSError):
+                raise item
+            yield item._replace(time=(item.time or 0.0) - self._begun)
+
+    def _open(self, name: str, stack: ExitStack) -> Port:
+        line: PtyLine | SerialLine = SerialLine(name, self._network)
+        if is_pty(name):
+            line = PtyLine(name.partition(':')[2] or None)
+        stack.callback(line.close)
+        try:
+            port = line.open()
+        except OSError as error:
+            raise OSError(f'{name}: {error.strerror or error}') from error
+        stack.callback(port.close)
+        self.names.append(line.name)
+        return port
+
+    def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _Reader:
+        return _Reader(port, direction, onward, self._heard, self._wake_reader)

@@ -1,0 +1,102 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the commands for people show: tables, colours and progress, as a stream takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import io
+import os
+import sys
+import time
+from typing import TextIO
+
+RED, YELLOW, GREEN = 31, 33, 32
+
+_PROGRESS_DELAY = 2.0  # what is done sooner needs none
+
+
+def is_terminal(stream: TextIO) -> bool:
+    """Tell whether people look at ``stream``, so that it may move the cursor."""
+    return stream.isatty() and os.environ.get('TERM') != 'dumb'
+
+
+def colour(text: str, code: int, stream: TextIO) -> str:
+    """Return ``text`` in a colour where ``stream`` is a terminal and NO_COLOR is not set."""
+    if is_terminal(stream) and 'NO_COLOR' not in os.environ:
+        return f'\x1b[{code}m{text}\x1b[0m'
+    return text
+
+
+def prepare_output() -> None:
+    """
+    Make printing fit for any output, once at the start of a command.
+
+    A closed one is replaced by none at all, and a character that it cannot show by its escape.
+    """
+    for name in ('stdout', 'stderr'):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), 'w'))
+        stream = getattr(sys, name)
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors='backslashreplace')
+
+
+def drop_output() -> None:
+    """Send what is still to be printed nowhere: whoever reads us has seen enough."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
+    """Return rows below a head, in columns; those in ``right`` are aligned at their end."""
+    cells = [list(head), *map(list, rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = []
+    for row in cells:
+        padded = [cell.rjust(width) if number in right else cell.ljust(width)
+                  for number, (cell, width) in enumerate(zip(row, widths, strict=True))]
+        lines.append('  '.join(padded).rstrip())
+    return '\n'.join(lines)
+
+
+class Progress:
+    """
+    Tell on standard error how far something is that takes more than two seconds.
+
+    A terminal shows one line that changes; elsewhere a new line comes every two seconds.
+    """
+
+    def __init__(self) -> None:
+        self._live = is_terminal(sys.stderr)
+        self._next = time.monotonic() + _PROGRESS_DELAY
+        self._is_shown = False
+
+    def show(self, text: str) -> None:
+        """Say ``text`` when it is time."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        if self._live:
+            print(f'\r\x1b[K{text}', end='', file=sys.stderr, flush=True)
+            self._is_shown = True
+        else:
+            print(text, file=sys.stderr, flush=True)
+            self._next = now + _PROGRESS_DELAY
+
+    def clear(self) -> None:
+        """Take the line away, so that something else can be printed."""
+        if self._is_shown:
+            print('\r\x1b[K', end='', file=sys.stderr, flush=True)
+            self._is_shown = False

@@ -1,0 +1,31 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Text from outside, made safe to show."""
+
+from __future__ import annotations
+
+
+def printable(text: str) -> str:
+    """
+    Return ``text`` on one line, with every character visible.
+
+    Line ends, escape sequences of terminals, marks that turn the direction of writing and other
+    characters that show nothing become escapes as in a Python string. Letters of any language
+    stay. So a line of a log cannot pass for two, and a terminal shows what was there.
+    """
+    if text.isprintable():
+        return text
+    return ''.join(
+        character if character.isprintable() else ascii(character)[1:-1] for character in text)

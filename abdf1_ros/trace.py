@@ -1,0 +1,132 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Record what passes a port, for the node's parameter ``trace_file`` and for ``sniff``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+import math
+from pathlib import Path
+import time
+
+from abdf1_ros.capture import CaptureWriter, Chunk, Direction
+from abdf1_ros.driver.network import Network
+from abdf1_ros.port import open_port, Port, PortOptions, USUAL_OPTIONS
+
+
+def begun_now() -> str:
+    """Return the time of day for the head of a capture."""
+    return datetime.now().astimezone().isoformat(timespec='milliseconds')
+
+
+class Trace:
+    """
+    A capture that ends by itself when it cannot be written, and tells ``on_error`` so, once.
+
+    ``limit`` is the most bytes on the disk. Raises OSError when it cannot be begun.
+    """
+
+    def __init__(self, path: str, settings: dict[str, str], on_error: Callable[[str], None],
+                 limit: float = math.inf) -> None:
+        self._on_error = on_error
+        self._writer: CaptureWriter | None = CaptureWriter(Path(path), limit, settings)
+
+    def write(self, chunk: Chunk) -> None:
+        """Write a chunk, or nothing after an error."""
+        if self._writer is None:
+            return
+        try:
+            self._writer.write(chunk)
+        except OSError as error:
+            self.close()
+            self._on_error(f'{error}; nothing more is recorded')
+
+    def close(self) -> None:
+        """End the capture."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+
+
+class TracedPort:
+    """A port whose bytes go into ``trace`` as well, with the seconds since ``begun``."""
+
+    def __init__(self, port: Port, trace: Trace, begun: float,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self._port = port
+        self._trace = trace
+        self._begun = begun
+        self._clock = clock
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
+        data = self._port.read(timeout, wake)
+        if data:
+            self._note(Direction.IN, data)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._port.write(data)
+        self._note(Direction.OUT, data)
+
+    def close(self) -> None:
+        """Close the port; the trace goes on when it is opened again."""
+        self._port.close()
+
+    def _note(self, direction: Direction, data: bytes) -> None:
+        self._trace.write(Chunk(self._clock() - self._begun, direction, data))
+
+
+class PortOpener:
+    """
+    Open the port ``name`` of a net CSV, as often as it takes.
+
+    ``options`` and ``tell`` are those of ``open_port``. After ``trace`` all that passes it goes
+    into a capture. What goes wrong with that is told to ``on_error`` and has no effect on the
+    port.
+    """
+
+    def __init__(self, network: Network, name: str, options: PortOptions = USUAL_OPTIONS,
+                 tell: Callable[[str], None] = lambda text: None) -> None:
+        self._network = network
+        self._name = name
+        self._options = options
+        self._tell = tell
+        self._trace: Trace | None = None
+        self._begun = 0.0
+
+    def trace(self, path: str, limit: float, on_error: Callable[[str], None]) -> None:
+        """Begin a capture of at most ``limit`` bytes."""
+        settings = {
+            'begun': begun_now(), 'port': self._name, 'baud': str(self._network.baud),
+            'check': self._network.checksum.value,
+            'duplex': self._network.duplex.name.lower()}
+        self._begun = time.monotonic()
+        try:
+            self._trace = Trace(path, settings, on_error, limit)
+        except OSError as error:
+            on_error(f'{error}; nothing is recorded')
+
+    def open(self) -> Port:  # noqa: A003
+        """Open the port; raises OSError."""
+        port = open_port(self._network, self._name, self._options, self._tell)
+        return port if self._trace is None else TracedPort(port, self._trace, self._begun)
+
+    def close(self) -> None:
+        """End the capture."""
+        if self._trace is not None:
+            self._trace.close()

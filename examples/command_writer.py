@@ -1,0 +1,172 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Write one value to a PLC and wait for the result.
+
+The bridge answers every message to ~/write/<topic> with exactly one result for each mapping of
+that topic on ~/write_results. A result has the tag of the mapping, not the name of the writer:
+with several writers to one topic, this program takes the first result that has its tag and its
+numbers (texts are not compared), which may be that of another who has written the same. So give
+each topic one writer.
+
+A command whose result does not come is neither done nor not done. Look at the read topic before
+you send it again; for a pulse, a second one may be the wrong one.
+
+Exit status: 0 written, 1 not written, 2 bad arguments, 3 unknown whether written (or only partly,
+or sent to all stations, which nobody confirms).
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import sys
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+import rclpy
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.utilities import remove_ros_args
+import std_msgs.msg
+
+WRITTEN, NOT_WRITTEN, BAD_ARGUMENTS, UNKNOWN = range(4)
+
+_EXAMPLES = """\
+examples:
+  command_writer.py recipe 211 222 233 244
+  command_writer.py setpoint 21.5 --node /cell/line_1
+  command_writer.py name 'Tank 4'
+  command_writer.py lamps 1 --tags lamp_north lamp_south     two mappings, one topic
+"""
+
+
+class CommandWriter(Node):
+    """Writes to one topic of the bridge ``bridge``, whose mappings have ``tags``."""
+
+    def __init__(self, bridge: str, topic: str, tags: list[str]) -> None:
+        super().__init__('command_writer')
+        self._topic = f'{bridge}/write/{topic}'
+        self._tags = tags
+        self._numbers: list[str] = []
+        self._publisher: Any = None
+        self.results: dict[str, DiagnosticStatus] = {}
+        self._listener = self.create_subscription(
+            DiagnosticStatus, f'{bridge}/write_results', self._take, 100)
+
+    def connect(self, timeout: float) -> bool:
+        """Find the bridge; whether it listens and we hear its results."""
+        if not self._spin_until(self._type, timeout):
+            return False
+        # Volatile, so that a bridge that starts later does not execute an old command.
+        self._publisher = self.create_publisher(self._type(), self._topic, QoSProfile(depth=10))
+        return self._spin_until(lambda: self._publisher.get_subscription_count() > 0
+                                and self._listener.get_publisher_count() > 0, timeout)
+
+    def write(self, words: list[str], timeout: float) -> bool:
+        """Send the values once; whether all results have come."""
+        message = self._type()()
+        if isinstance(message, std_msgs.msg.String):
+            message.data = ' '.join(words)
+        elif isinstance(message, std_msgs.msg.Float32MultiArray):
+            message.data = list(map(float, words))
+            self._numbers = [f'{value:.7g}' for value in message.data]
+        else:
+            message.data = [int(word, 0) for word in words]
+            self._numbers = list(map(str, message.data))
+        self._publisher.publish(message)
+        return self._spin_until(lambda: len(self.results) == len(self._tags), timeout)
+
+    def _type(self) -> Any:
+        """Return the message type that the bridge takes, None before it has been found."""
+        found = self.get_subscriptions_info_by_topic(self._topic)
+        return getattr(std_msgs.msg, found[0].topic_type.split('/')[-1]) if found else None
+
+    def _take(self, result: DiagnosticStatus) -> None:
+        value = next((pair.value for pair in result.values if pair.key == 'value'), '')
+        if result.name in self._tags and self._is_ours(value):
+            self.results.setdefault(result.name, result)
+
+    def _is_ours(self, value: str) -> bool:
+        # The bridge cuts a long value short; what it shows has to agree.
+        shown = [word for word in value.strip('[]').split(', ') if not word.startswith('and ')]
+        return not self._numbers or shown == self._numbers[:len(shown)]
+
+    def _spin_until(self, condition: Callable[[], Any], timeout: float) -> bool:
+        end = time.monotonic() + timeout
+        while not condition() and time.monotonic() < end:
+            rclpy.spin_once(self, timeout_sec=0.05)
+        return bool(condition())
+
+
+def judge(message: str) -> int:
+    """Return the exit status that the text of a result stands for."""
+    if message == 'written':
+        return WRITTEN
+    return NOT_WRITTEN if message.startswith('not written') else UNKNOWN
+
+
+def run(node: CommandWriter, options: argparse.Namespace) -> int:
+    """Write and tell the results; return the exit status."""
+    if not node.connect(options.timeout):
+        print(f'not written: {options.node} does not listen to write/{options.topic}')
+        return NOT_WRITTEN
+    complete = node.write(options.values, options.timeout)
+    for tag, result in node.results.items():
+        latency = {pair.key: pair.value for pair in result.values}['latency_ms']
+        print(f'{tag}: {result.message} ({latency} ms)')
+    statuses = [judge(result.message) for result in node.results.values()]
+    if not complete:
+        print(f'unknown whether written: no result within {options.timeout:g} s')
+        statuses.append(UNKNOWN)
+    return max(statuses)
+
+
+def main() -> int:
+    """Parse the arguments and write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('topic', help='name below ~/write/')
+    parser.add_argument('values', nargs='+', help='all values of the mapping; for bits 0 and 1')
+    parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
+    parser.add_argument('--tags', nargs='+', help='of the mappings (default: the topic)')
+    parser.add_argument('--timeout', type=float, default=6.0,
+                        help='seconds to wait for the bridge, then for the result; longer than '
+                             'twice its write_timeout, for a write that is read back '
+                             '(default: %(default)g)')
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    rclpy.init()
+    node = None
+    try:
+        node = CommandWriter(options.node, options.topic, options.tags or [options.topic])
+        return run(node, options)
+    except (ValueError, OverflowError, InvalidTopicNameException) as error:
+        reason = ' '.join(str(error).split())
+        print(f'{" ".join(options.values)}: cannot be sent: {reason}', file=sys.stderr)
+        return BAD_ARGUMENTS
+    except KeyboardInterrupt:
+        print('unknown whether written: interrupted')
+        return UNKNOWN
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

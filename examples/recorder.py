@@ -1,0 +1,152 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Record what a bridge reads from the PLCs into a CSV file that a spreadsheet opens.
+
+A row is one message: the time of its publishing (UTC), the topic below ~/read/, the PLC address,
+and the values. For more than a table (replay, plots, other nodes' topics) use rosbag2; the
+commands are in recording.md beside this file.
+
+Exit status: 0 after Ctrl-C or --seconds, 1 when the bridge is not found, 2 for bad arguments or
+a file that cannot be written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import csv
+from datetime import datetime, UTC
+import math
+import signal
+import sys
+import time
+from typing import Any, TextIO
+
+import rclpy
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+import std_msgs.msg
+
+_EXAMPLES = """\
+examples:
+  recorder.py line.csv
+  recorder.py line.csv --node /cell/line_1 --seconds 3600
+"""
+
+_PROGRESS_PERIOD = 2.0
+
+# The bridge keeps one value for late subscribers; this much may wait here while the disk is busy.
+_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE,
+                  durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Recorder(Node):
+    """Writes every message on the read topics of ``bridge`` to ``file``."""
+
+    def __init__(self, bridge: str, file: TextIO) -> None:
+        super().__init__('recorder')
+        self._bridge = bridge
+        self._file = file
+        self._writer = csv.writer(file)
+        self._writer.writerow(['time', 'topic', 'address', 'values'])
+        self._known: set[str] = set()
+        self.rows = 0
+        self.create_timer(0.5, self._look_for_topics)
+        self.create_timer(1.0, file.flush)
+
+    def _look_for_topics(self) -> None:
+        namespace, _, name = self._bridge.rpartition('/')
+        try:
+            topics = self.get_publisher_names_and_types_by_node(name, namespace or '/')
+        except NodeNameNonExistentError:
+            return
+        for topic, (type_name, *_) in topics:
+            if topic.startswith(f'{self._bridge}/read/') and topic not in self._known:
+                self._known.add(topic)
+                message_type = getattr(std_msgs.msg, type_name.split('/')[-1])
+                self.create_subscription(message_type, topic, self._taker(topic), _QOS)
+
+    @property
+    def has_found_topics(self) -> bool:
+        return bool(self._known)
+
+    def _taker(self, topic: str) -> Callable[..., None]:
+        short = topic.removeprefix(f'{self._bridge}/read/')
+
+        def take(message: Any, info: Any) -> None:
+            published = datetime.fromtimestamp(info['source_timestamp'] / 1e9, UTC)
+            is_text = isinstance(message, std_msgs.msg.String)
+            address = '' if is_text or not message.layout.dim else message.layout.dim[0].label
+            values = [message.data] if is_text else message.data
+            self._writer.writerow([published.isoformat(), short, address, *values])
+            self.rows += 1
+        return take
+
+
+def record(node: Recorder, seconds: float, wait: float) -> bool:
+    """Spin until the time is up; whether the bridge was there."""
+    begin = said = time.monotonic()
+    while time.monotonic() < begin + seconds:
+        rclpy.spin_once(node, timeout_sec=0.1)
+        if not node.has_found_topics and time.monotonic() > begin + wait:
+            return False
+        if sys.stderr.isatty() and time.monotonic() > said + _PROGRESS_PERIOD:
+            said = time.monotonic()
+            print(f'\r{node.rows} messages', end='', file=sys.stderr, flush=True)
+    return node.has_found_topics
+
+
+def main() -> int:
+    """Record until Ctrl-C, SIGTERM or --seconds."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('file', help='CSV file to write; one that exists is replaced')
+    parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
+    parser.add_argument('--seconds', type=float, default=math.inf, help='end after so many')
+    parser.add_argument('--wait', type=float, default=10.0,
+                        help='seconds to look for the bridge (default: %(default)g)')
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    # Both signals are Ctrl-C here; rclpy's handlers would not let the file be closed in order.
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    try:
+        with open(options.file, 'w', newline='', encoding='utf-8') as file:
+            return run(options, file)
+    except OSError as error:
+        print(f'{options.file}: cannot be written: {error.strerror}', file=sys.stderr)
+        return 2
+
+
+def run(options: argparse.Namespace, file: TextIO) -> int:
+    """Record into ``file``; return the exit status."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = Recorder(options.node, file)
+    try:
+        found = record(node, options.seconds, options.wait)
+    except KeyboardInterrupt:
+        found = True
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    print(f'{node.rows} messages in {options.file}' if found else
+          f'{options.node} is not there, or has no read topic')
+    return 0 if found else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

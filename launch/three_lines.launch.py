@@ -1,0 +1,51 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Start the bridges of a cell with three serial lines, each in the namespace of its machine.
+
+What differs between them stands in config/three_lines.yaml; copy both files and change them.
+The names differ too, not only the namespaces: a status on /diagnostics has the name of its node
+alone. A bridge that ends by itself is started again.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
+from launch_ros.substitutions import FindPackageShare
+
+# Namespace and name of each bridge: values are on /press/press_plc/read/... and so on.
+LINES = (('press', 'press_plc'), ('paint', 'paint_plc'), ('packing', 'packing_plc'))
+
+
+def line(namespace: str, name: str) -> GroupAction:
+    """Return one bridge, in a scope of its own so that no argument reaches the next."""
+    bridge = PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])
+    arguments = {'namespace': namespace, 'name': name, 'respawn': 'true',
+                 'params_file': LaunchConfiguration('lines_file')}
+    return GroupAction([IncludeLaunchDescription(
+        PythonLaunchDescriptionSource(bridge), launch_arguments=arguments.items())])
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Declare the argument and start the bridges."""
+    lines_file = PathJoinSubstitution(
+        [FindPackageShare('abdf1_ros'), 'config', 'three_lines.yaml'])
+    return LaunchDescription([
+        DeclareLaunchArgument(
+            'lines_file', default_value=lines_file,
+            description='YAML file with the parameters of the three bridges'),
+        *(line(namespace, name) for namespace, name in LINES),
+    ])

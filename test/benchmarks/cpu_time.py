@@ -1,0 +1,173 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Measure how much processor time a read transaction costs, and how many there are a second.
+
+Method. The driver reads ten words of one SLC as often as it can, half duplex, through
+``LinkThread`` on a pseudo-terminal without any pacing. At the other end a process of its own
+answers at once with frames that were made beforehand, so that its work does not count. After
+a warm-up --seconds are measured: transactions, and the processor time of this process
+(``time.process_time``, which does not see what else runs on the machine, unlike the rate).
+"driver" has a listener that only counts; "driver and publish" publishes every value with rclpy,
+as the node does, and is left out where there is no ROS. "troubles" counts errors and retries.
+
+Run it as "python test/benchmarks/cpu_time.py"; without ROS it needs nothing but the package.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import signal
+import sys
+import time
+import tty
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+
+from abdf1_ros.df1 import frames  # noqa: E402
+from abdf1_ros.df1.packet import Packet  # noqa: E402
+from abdf1_ros.driver.driver import Driver  # noqa: E402
+from abdf1_ros.driver.links import DriverSettings  # noqa: E402
+from abdf1_ros.driver.mapping import Mapping  # noqa: E402
+from abdf1_ros.driver.network import Network  # noqa: E402
+from abdf1_ros.driver.values import Values  # noqa: E402
+from abdf1_ros.pccc.slc_dialect import SlcDialect  # noqa: E402
+from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
+from paced_line import block_of, Listener, WORDS  # noqa: E402
+
+STATION = 1
+MAPPING = block_of(STATION)
+NETWORK = Network(baud=115200)
+TRANSACTIONS = 0x10000
+
+
+class Publisher(Listener):
+    """Publishes what is read, as the node does."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        os.environ.setdefault('ROS_DOMAIN_ID', '83')
+        from abdf1_ros import node_messages
+        import rclpy
+        from rclpy.event_handler import PublisherEventCallbacks
+        rclpy.init()
+        node = rclpy.create_node('abdf1_benchmark')
+        self._encode = node_messages.encoder(MAPPING)
+        self._publisher = node.create_publisher(
+            node_messages.MESSAGES[MAPPING.type], 'words', node_messages.read_qos(MAPPING, 1.0),
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Publish values."""
+        self._publisher.publish(self._encode(values))
+
+
+def _frames(tns: int) -> tuple[bytes, bytes]:
+    """Return the command frame with that transaction number, and the reply to it."""
+    cmd, body = SlcDialect().read(MAPPING.address, WORDS)
+    command = Packet(STATION, NETWORK.station, cmd, 0, tns, body)
+    return (frames.master_frame(STATION, command.encode(), NETWORK.checksum),
+            frames.message_frame(command.reply(bytes(range(2 * WORDS))).encode(),
+                                 NETWORK.checksum))
+
+
+def _respond(descriptor: int) -> None:
+    """Answer command after command, poll after poll, for ever."""
+    talk = [(len(command), reply) for command, reply in map(_frames, range(TRANSACTIONS))]
+    first = talk.pop(0)  # a driver begins with 1
+    poll = len(frames.poll_frame(STATION))
+    acknowledged = 0
+    os.write(descriptor, b'r')
+    while True:
+        for command, reply in talk:
+            _take(descriptor, acknowledged + command)
+            os.write(descriptor, frames.ACK)
+            _take(descriptor, poll)
+            os.write(descriptor, reply)
+            acknowledged = len(frames.ACK)  # it comes together with the next command
+        talk = [first, *talk] if len(talk) < TRANSACTIONS else talk
+
+
+def _take(descriptor: int, count: int) -> None:
+    while count > 0:
+        count -= len(os.read(descriptor, count))
+
+
+@contextmanager
+def responder() -> Iterator[int]:
+    """Run a process that answers; give the descriptor of our end of its line."""
+    far, near = os.openpty()
+    tty.setraw(near)
+    process = os.fork()
+    if process == 0:
+        try:
+            os.close(near)
+            _respond(far)
+        finally:
+            os._exit(0)
+    os.read(near, 1)  # its frames are made
+    try:
+        yield near
+    finally:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        os.close(far)
+
+
+def measure(listener: Listener, warm_up: float, seconds: float) -> tuple[float, float]:
+    """Return transactions per second, and s of processor time of each."""
+    driver = Driver(NETWORK, [MAPPING], DriverSettings(), listener)
+    with responder() as descriptor:
+        link = LinkThread(driver.machine,
+                          lambda: DescriptorPort(descriptor, lambda: os.close(descriptor)))
+        link.start()
+        time.sleep(warm_up)
+        began, used, before = time.monotonic(), time.process_time(), driver.transactions
+        time.sleep(seconds)
+        used, done = time.process_time() - used, driver.transactions - before
+        passed = time.monotonic() - began
+        link.stop()
+    return done / passed, used / max(done, 1)
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--warm-up', type=float, default=0.5, metavar='SECONDS')
+    parser.add_argument('--seconds', type=float, default=5.0)
+    options = parser.parse_args()
+    print(f'reads of {WORDS} words, half duplex, {options.seconds:g} s each; '
+          f'load of the machine {os.getloadavg()[0]:.1f}')
+    print('                     transactions/s  processor time of each  troubles')
+    kinds: list[tuple[str, type[Listener]]] = [
+        ('driver', Listener), ('driver and publish', Publisher)]
+    for name, kind in kinds:
+        try:
+            listener = kind()
+        except ImportError:
+            continue
+        rate, used = measure(listener, options.warm_up, options.seconds)
+        print(f'{name:19}  {rate:14.0f}  {1e6 * used:19.1f} us  {listener.troubles:8d}',
+              flush=True)
+
+
+if __name__ == '__main__':
+    main()

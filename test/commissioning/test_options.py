@@ -1,0 +1,63 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of ``plc``."""
+
+from __future__ import annotations
+
+import argparse
+
+from abdf1_ros.commissioning.options import make_parser
+import pytest
+
+
+def parse(*args: str) -> argparse.Namespace:
+    return make_parser('').parse_args(args)
+
+
+def test_defaults() -> None:
+    read = parse('read', 'N7:0')
+    assert (read.command, read.addresses, read.length, read.station) == ('read', ['N7:0'], '1', 1)
+    assert read.plc_type is read.type is read.access is read.word_order is None
+    assert parse('status').station == 1
+    assert parse('ping', '3').count == 4
+    assert parse('watch', 'N7:0').period == 0.5
+    assert parse('watch', 'N7:0').count is None
+    assert not parse('write', 'N7:0', '1').yes
+
+
+def test_negative_values_are_no_options() -> None:
+    assert parse('write', 'F8:0', '-1', '-2.5', '--yes').values == ['-1', '-2.5']
+
+
+def test_detect_waits_for_a_short_time_only() -> None:
+    assert parse('detect').timeout == '200'
+    assert parse('detect').stations == tuple(range(8))
+    assert parse('detect', '--timeout', '500').timeout == '500'
+    assert parse('scan', '1').timeout is None
+
+
+def test_lists_of_stations() -> None:
+    assert parse('scan', '0-3,9').stations == (0, 1, 2, 3, 9)
+
+
+@pytest.mark.parametrize('args', [
+    ('scan', ''), ('scan', '300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
+    ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
+    ('watch', 'N7:0', '--count', '1.5'), ('read',), ('write', 'N7:0'), ('fly',),
+    ('read', 'N7:0', '--type', 'int8')])
+def test_wrong(args: tuple[str, ...]) -> None:
+    with pytest.raises(SystemExit) as ending:
+        parse(*args)
+    assert ending.value.code == 2

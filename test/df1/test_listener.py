@@ -1,0 +1,145 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The decoder that finds out what is spoken on a line."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Code, Control, Duplex, Fault, Frame, Poll, Symbol
+from abdf1_ros.df1.listener import LineKind, ListeningDecoder
+from abdf1_ros.df1.packet import Packet
+from hypothesis import given, strategies
+import pytest
+from support.vectors import MESSAGES, Vector
+
+COMMAND = Packet(1, 5, 0x0F, 0, 0x1234, b'\xa2\x02\x07\x89\x00\x00').encode()
+
+
+def symbols(decoder: ListeningDecoder, data: bytes) -> list[Symbol]:
+    """Return what the decoder makes of ``data``."""
+    decoder.feed(data)
+    return list(iter(decoder.next_symbol, None))
+
+
+def frame(checksum: Checksum, tns: int = 0) -> bytes:
+    return frames.message_frame(Packet(1, 5, 0x0F, 0, tns, b'\x01').encode(), checksum)
+
+
+@pytest.mark.parametrize('vector', [
+    pytest.param(vector, id=vector.name) for vector in MESSAGES
+    if vector.valid and not vector.has_embedded_response])
+def test_every_vector_is_read_without_being_told_its_check(vector: Vector) -> None:
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    found = [*symbols(decoder, vector.frame), decoder.finish()]
+    good = [symbol for symbol in found if isinstance(symbol, Frame)]
+    assert [(symbol.data, symbol.station) for symbol in good] == [
+        (vector.link_data, vector.station)]
+    assert good[0].fault in (None, Fault.TOO_SHORT)
+    assert decoder.checksum is vector.checksum
+
+
+def test_one_good_crc_settles_the_check() -> None:
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    assert len(symbols(decoder, frame(Checksum.CRC))) == 1
+    assert kind.checksum is Checksum.CRC
+    damaged = bytearray(frame(Checksum.CRC))
+    damaged[4] ^= 1
+    (symbol,) = symbols(decoder, bytes(damaged))
+    assert isinstance(symbol, Frame)
+    assert symbol.fault is Fault.BAD_CHECK
+
+
+def test_two_good_bccs_settle_the_check() -> None:
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    one, two, three = (frame(Checksum.BCC, tns) for tns in range(3))
+    assert symbols(decoder, one) == []  # may become a CRC yet
+    assert len(symbols(decoder, two)) == 1
+    assert kind.checksum is None
+    assert len(symbols(decoder, three)) == 2  # it settles it, and waits for nothing any more
+    assert kind.checksum is Checksum.BCC
+    assert decoder.finish() is None
+
+
+def test_what_one_direction_has_found_holds_for_the_other() -> None:
+    kind = LineKind()
+    one, other = ListeningDecoder(kind), ListeningDecoder(kind)
+    symbols(one, frame(Checksum.BCC, 1) + frame(Checksum.BCC, 2) + frames.ACK)
+    assert kind.checksum is Checksum.BCC
+    assert len(symbols(other, frame(Checksum.BCC, 3))) == 1
+
+
+def test_last_bcc_frame_is_not_lost() -> None:
+    decoder = ListeningDecoder(LineKind())
+    assert symbols(decoder, frame(Checksum.BCC)) == []
+    symbol = decoder.finish()
+    assert isinstance(symbol, Frame)
+    assert symbol.fault is None
+
+
+def test_half_of_a_crc_is_no_frame() -> None:
+    decoder = ListeningDecoder(LineKind())
+    assert symbols(decoder, frame(Checksum.CRC)[:-1]) == []
+    assert decoder.finish() is None
+
+
+@pytest.mark.parametrize('data', [
+    frames.poll_frame(3), frames.EOT, frames.master_frame(1, COMMAND, Checksum.CRC)])
+def test_half_duplex_is_found(data: bytes) -> None:
+    kind = LineKind()
+    assert len(symbols(ListeningDecoder(kind), data)) == 1
+    assert kind.duplex is Duplex.HALF
+
+
+def test_full_duplex_is_found_by_a_message_that_nobody_has_polled_for() -> None:
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    symbols(decoder, frame(Checksum.CRC))
+    assert kind.duplex is Duplex.FULL
+    assert symbols(decoder, frames.ENQ + frames.NAK) == [Control(Code.ENQ), Control(Code.NAK)]
+    whole = frame(Checksum.CRC)
+    assert symbols(decoder, whole[:6] + frames.ACK + whole[6:])[0] == Control(Code.ACK)
+
+
+def test_recording_that_begins_in_the_middle_is_half_duplex_after_all() -> None:
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    symbols(decoder, frame(Checksum.CRC))
+    command, poll = symbols(
+        decoder, frames.master_frame(1, COMMAND, Checksum.CRC) + frames.poll_frame(1))
+    assert kind.duplex is Duplex.HALF
+    assert isinstance(command, Frame)
+    assert (command.station, command.fault) == (1, None)
+    assert poll == Poll(1, True)
+
+
+def test_what_is_given_is_not_found_anew() -> None:
+    kind = LineKind(Checksum.BCC, Duplex.FULL)
+    decoder = ListeningDecoder(kind)
+    symbols(decoder, frames.EOT + frames.poll_frame(1) + frame(Checksum.CRC))
+    assert kind == LineKind(Checksum.BCC, Duplex.FULL)
+
+
+@given(strategies.lists(strategies.binary(max_size=30), max_size=20))
+def test_any_bytes_are_symbols_or_noise(chunks: list[bytes]) -> None:
+    whole, pieces = ListeningDecoder(LineKind()), ListeningDecoder(LineKind())
+    expected = symbols(whole, b''.join(chunks))
+    found = [symbol for chunk in chunks for symbol in symbols(pieces, chunk)]
+    assert found == expected
+    assert pieces.noise == whole.noise
+    assert pieces.finish() == whole.finish()

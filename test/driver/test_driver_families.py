@@ -1,0 +1,153 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver against stations of the families that are not spoken to with typed commands."""
+
+from __future__ import annotations
+
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.simulated_plc import SimulatedPlc
+import pytest
+from support.driver_bench import DriverBench, store, stored
+from support.mappings import make_mapping
+
+PLC2_WORDS = (('000', 512),)
+PLC3_FILES = (('B10:0', 512), ('N10:0', 16), ('I:0', 16), ('O:0', 16), ('T:0.CTL', 30),
+              ('C:0.CTL', 30), ('D1:0', 8), ('A1:0', 8), ('S:0', 16))
+PLC5_FILES = (('N7:0', 512), ('F8:0', 64), ('B3:0', 16), ('T4:0', 30), ('ST9:0', 84),
+              ('PD10:0', 164))
+
+# Family, access, address, length, type, values.
+VALUES: list[tuple[str, str | None, str, int, str | None, list[float] | str]] = [
+    ('PLC2', None, '020', 3, None, [1, 0x1010, 65535]),
+    ('PLC2', None, '020', 2, 'int32', [-2, 70000]),
+    ('PLC2', None, '110/17', 3, None, [1, 0, 1]), ('PLC2', None, '110/00', 1, None, [1]),
+    ('PLC2', 'Protected', '020', 2, 'bcd16', [1234, 9999]),
+    ('PLC2', 'Protected', '020/07', 4, None, [1, 1, 0, 1]),
+    ('PLC2', None, '020', 250, None, list(range(1000, 1250))),
+    ('PLC3', None, 'E3.1.8.10.0.3', 3, None, [1, 2, 0x1010]),
+    ('PLC3', None, 'B10:5/17', 2, None, [1, 1]), ('PLC3', None, 'N10:2', 2, None, [-1, 7]),
+    ('PLC3', None, 'T:4.PRE', 2, None, [100, 42]), ('PLC3', None, 'O:17', 1, None, [0xFFFF]),
+    ('PLC3', None, 'B10:0', 342, None, list(range(342))),
+    ('PLC5', 'WordRange', 'N7:3', 4, None, [1, -2, 3, 0x1010]),
+    ('PLC5', 'WordRange', 'F8:1', 3, None, [1000.0, -1.5, 0.0]),
+    ('PLC5', 'WordRange', 'B3:1/5', 20, None, [1, 0] * 10),
+    ('PLC5', 'WordRange', 'T4:2.ACC', 1, None, [77]),
+    ('PLC5', 'WordRange', 'ST9:1', 1, None, 'word range'),
+    ('PLC5', 'WordRange', 'PD10:1.SP', 1, None, [12.5]),
+    ('PLC5', 'WordRange', 'N7:0', 300, None, list(range(-150, 150)))]
+FILES = {'PLC2': PLC2_WORDS, 'PLC3': PLC3_FILES, 'PLC5': PLC5_FILES}
+
+
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+@pytest.mark.parametrize(('plc', 'access', 'text', 'length', 'kind', 'values'), VALUES)
+def test_value_is_written_and_read_back(
+        check: str, plc: str, access: str | None, text: str, length: int, kind: str | None,
+        values: list[float] | str) -> None:
+    mapping = make_mapping(text, 'ReadWrite', plc=plc, length=length, kind=kind, access=access)
+    bench = DriverBench([mapping], network=Network(baud=115200, error_code=check))
+    station = bench.plc(1, plc, *FILES[plc])
+    bench.run(0.3)
+    bench.write(mapping, values)
+    bench.run(1.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.listener.values(mapping)[-1] == values
+    assert decoded(station, mapping) == values
+
+
+def decoded(station: SimulatedPlc, mapping: Mapping) -> list[float] | str:
+    """Return the values that the PLC holds."""
+    start = mapping.address.at_offset(mapping.address.offset)
+    values = mapping.codec.decode(station.table.read(start, mapping.codec.words))
+    return values if isinstance(values, str) else list(values)
+
+
+def test_bits_beside_those_written_stay() -> None:
+    mapping = make_mapping('020/07', 'Write', plc='PLC2', length=4)
+    bench = DriverBench([mapping])
+    station = bench.plc(1, 'PLC2', *PLC2_WORDS)
+    store(station, '020', [0xFFFF, 0xFFFF])
+    bench.run(0.1)
+    bench.write(mapping, [0, 1, 0, 1])
+    bench.run(0.3)
+    assert stored(station, '020', 2) == bytes.fromhex('7F FD FF FF')
+
+
+def test_common_interface_file_of_an_slc() -> None:
+    words = make_mapping('011', 'ReadWrite', plc='PLC2', access='CIF', length=60)
+    bits = make_mapping('012/17', plc='PLC2', access='CIF')
+    bench = DriverBench([words, bits])
+    station = bench.plc(1, 'SLC', ('N9:0', 100))
+    bench.run(0.3)
+    bench.write(words, [0, 0x8000, *range(58)])
+    bench.run(1.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.listener.values(words)[-1] == [0, 0x8000, *range(58)]
+    assert bench.listener.values(bits)[-1] == [1]
+    assert stored(station, 'N9:9', 2) == b'\0\0\0\x80'
+
+
+def test_long_transfer_to_a_plc3_carries_its_offset() -> None:
+    mapping = make_mapping('E3.1.8.10.0.0', plc='PLC3', length=342, period=60_000)
+    bench = DriverBench([mapping])
+    bench.plc(1, 'PLC3', *PLC3_FILES)
+    heard: list[bytes] = []
+
+    def hear(data: bytes) -> bytes:
+        heard.append(data)
+        return data
+
+    bench.far.hear = hear
+    bench.run_until(lambda: bool(bench.listener.reads))
+    line = b''.join(heard)
+    for offset, size in (('00', 'F4'), ('7A', 'F4'), ('F4', 'C4')):
+        assert bytes.fromhex(f'01 {offset} 00 56 01 2C 08 0A 00 {size}') in line
+
+
+@pytest.mark.parametrize(('plc', 'text', 'reason'), [
+    ('PLC2', '1000', 'STS 50: address not there, or memory protected'),
+    ('PLC3', 'B11:0', 'STS 50: address not there, or memory protected'),
+    ('PLC3', 'B10:512', 'STS 50: address not there, or memory protected')])
+def test_address_that_is_not_there_fails_alone(plc: str, text: str, reason: str) -> None:
+    good = make_mapping('000' if plc == 'PLC2' else 'B10:511', plc=plc)
+    bad = make_mapping(text, plc=plc)
+    bench = DriverBench([good, bad])
+    bench.plc(1, plc, *FILES[plc])
+    bench.run(1.0)
+    assert bench.listener.values(bad) == []
+    assert bench.listener.values(good)
+    assert (text if plc == 'PLC2' else str(bad.address), reason) in bench.listener.reasons
+
+
+@pytest.mark.parametrize(('plc', 'text'), [('PLC2', '1000'), ('PLC3', 'B11:0')])
+def test_write_to_an_address_that_is_not_there_is_refused(plc: str, text: str) -> None:
+    mapping = make_mapping(text, 'Write', plc=plc)
+    bench = DriverBench([mapping])
+    bench.plc(1, plc, *FILES[plc])
+    bench.write(mapping, [1])
+    bench.run(0.5)
+    result, = bench.listener.results
+    assert (result.outcome, result.detail) == (
+        Outcome.FAILED, 'STS 50: address not there, or memory protected')
+
+
+def test_each_access_speaks_in_its_own_way() -> None:
+    typed = make_mapping('N7:0')
+    words = make_mapping('N7:1', access='WordRange')
+    bench = DriverBench([typed, words])
+    store(bench.plc(1, 'PLC5', *PLC5_FILES), 'N7:0', [5, 6])
+    bench.run(0.3)
+    assert (bench.listener.values(typed)[-1], bench.listener.values(words)[-1]) == ([5], [6])

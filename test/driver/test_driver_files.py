@@ -1,0 +1,242 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""File types, processors and I/O of PLC-5, SLC and MicroLogix, from the line to the listener."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.transactions import REWRITTEN
+from abdf1_ros.pccc import slc
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.simulated_plc import SimulatedPlc
+import pytest
+from support.driver_bench import DriverBench, simulated_plc, store, stored
+from support.mappings import make_mapping
+
+FILES = {
+    'PLC5': (('PD10:0', 3 * 82), ('MG11:0', 2 * 56), ('BT12:0', 12), ('SC13:0', 6),
+             ('ST14:0', 84), ('A15:0', 8), ('D16:0', 8)),
+    'SLC': (('PD10:0', 69), ('MG11:0', 50), ('ST14:0', 84), ('L17:0', 8))}
+
+WRITABLE = [
+    ('PLC5', 'PD10:2.SP', 1, [42.5]), ('PLC5', 'PD10:1.KP', 3, [1.5, -2.0, 0.25]),
+    ('PLC5', 'PD10:0/MO', 1, [1]), ('PLC5', 'PD10:0.MINI', 1, [-0.5]),
+    ('PLC5', 'MG11:1/TO', 1, [1]), ('PLC5', 'BT12:1/CO', 1, [1]),
+    ('PLC5', 'SC13:1.PRE', 1, [250]), ('PLC5', 'ST14:1', 1, 'odd'),
+    ('PLC5', 'A15:1', 2, [0x4142, 0x4344]), ('PLC5', 'D16:3', 1, [0x1234]),
+    ('SLC', 'PD10:1.SPS', 3, [500, -1, 7]), ('SLC', 'PD10:2/AM', 1, [1]),
+    ('SLC', 'ST14:0', 1, 'even'), ('SLC', 'L17:1', 2, [-1, 2**31 - 1])]
+READ_ONLY = [
+    ('PLC5', 'PD10:1.PV', 3, [1.0, 2.0, 3.0]), ('PLC5', 'PD10:1.50', 4, [1, 2, 3, 4]),
+    ('PLC5', 'PD10:0/INI', 1, [1]), ('PLC5', 'MG11:1.ERR', 3, [-1, 2, 3]),
+    ('PLC5', 'MG11:0', 112, list(range(112))), ('PLC5', 'BT12:1.RLEN', 5, [1, 2, 3, 4, 5]),
+    ('PLC5', 'SC13:1.TIM', 1, [9]), ('PLC5', 'SC13:0/FS', 1, [1]),
+    ('SLC', 'PD10:1.SPV', 1, [77]), ('SLC', 'PD10:0', 69, list(range(69))),
+    ('SLC', 'MG11:1/DN', 1, [1]), ('SLC', 'MG11:1.ERR', 1, [23])]
+
+
+@pytest.mark.parametrize('plc, text, length, values', WRITABLE + READ_ONLY)
+def test_value_is_read(plc: str, text: str, length: int, values: list[float] | str) -> None:
+    mapping = make_mapping(text, plc=plc, length=length)
+    bench = DriverBench([mapping])
+    store(bench.plc(1, plc, *FILES[plc]), text, values)
+    bench.run_until(lambda: bool(bench.listener.reads))
+    assert bench.listener.values(mapping) == [values]
+
+
+@pytest.mark.parametrize('plc, text, length, values', WRITABLE)
+def test_value_is_written_and_nothing_else(plc: str, text: str, length: int,
+                                           values: list[float] | str) -> None:
+    mapping = make_mapping(text, 'ReadWrite', plc=plc, length=length)
+    bench = DriverBench([mapping])
+    made = bench.plc(1, plc, *FILES[plc])
+    expected = simulated_plc(1, plc, bench.clock, *FILES[plc])
+    store(expected, text, values)
+    bench.run(0.05)
+    bench.write(mapping, values)
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.listener.values(mapping)[-1] == values
+    for area, words in FILES[plc]:
+        assert stored(made, area, words) == stored(expected, area, words)
+
+
+def test_members_of_one_pid_come_together_and_right() -> None:
+    names = ['SP', 'KP', 'KI', 'KD', 'PV', 'ERR', 'OUT', 'TIE']
+    mappings = [make_mapping(f'PD10:1.{name}') for name in names]
+    mappings.append(make_mapping('PD10:1/SPOR'))
+    bench = DriverBench(mappings)
+    plc = bench.plc(1, 'PLC5', *FILES['PLC5'])
+    for number, name in enumerate(names):
+        store(plc, f'PD10:1.{name}', [number + 0.5])
+    store(plc, 'PD10:1/SPOR', [1])
+    bench.run_until(lambda: len(bench.listener.reads) == len(mappings))
+    assert len(bench.driver.blocks) == 1
+    assert [bench.listener.values(mapping) for mapping in mappings] == [
+        *([[number + 0.5]] for number in range(len(names))), [[1]]]
+
+
+class OldPlc(SimulatedPlc):
+    """
+    A PLC with packets of 82 bytes that knows no masked write.
+
+    ``meanwhile`` is called with each function code before the command is carried out.
+    """
+
+    meanwhile: Callable[[int], None] = staticmethod(lambda function: None)
+
+    def serve(self, command: Packet) -> Packet:
+        """Refuse what it does not know or take."""
+        if command.cmd != slc.CMD:
+            return super().serve(command)
+        function, size = command.data[:2]
+        self.meanwhile(function)
+        if function == slc.MASKED_WRITE or size > 82:
+            return command.reply(sts=0x10)
+        return super().serve(command)
+
+
+def old_plc(bench: DriverBench) -> OldPlc:
+    """Put an old PLC on the line."""
+    table = DataTable(PlcType.SLC)
+    plc = OldPlc(1, table, bench.network.checksum, bench.clock)
+    for text, words in (('N7:0', 256), ('B3:0', 8)):
+        table.create(make_mapping(text, plc='SLC').address, words)
+    bench.connect(plc)
+    return plc
+
+
+def test_old_slc_is_read_and_written_in_packets_of_82_bytes() -> None:
+    mapping = make_mapping('N7:0', 'ReadWrite', plc='SLC', length=200, processor='5/02')
+    values = list(range(200))
+    bench = DriverBench([mapping])
+    plc = old_plc(bench)
+    bench.write(mapping, values)
+    bench.run(2.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.listener.values(mapping)[-1] == values
+    assert stored(plc, 'N7:199') == (199).to_bytes(2, 'little')
+
+
+def test_packets_of_a_5_03_are_too_long_for_an_old_slc() -> None:
+    mapping = make_mapping('N7:0', plc='SLC', length=100)
+    bench = DriverBench([mapping])
+    old_plc(bench)
+    bench.run(1.0)
+    assert bench.listener.values(mapping) == []
+    assert bench.listener.reasons == [('N7:0', 'STS 10: illegal command, format or length')]
+
+
+def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:
+    mapping = make_mapping('B3:1/4', 'ReadWrite', plc='SLC', processor='5/01')
+    bench = DriverBench([mapping])
+    plc = old_plc(bench)
+    store(plc, 'B3:1', [0x8001])
+    bench.write(mapping, [1])
+    bench.run(0.5)
+    result, = bench.listener.results
+    assert str(result) == f'written: {REWRITTEN}'
+    assert stored(plc, 'B3:1') == bytes.fromhex('11 80')
+    bench.write(mapping, [0])
+    bench.run(0.5)
+    assert stored(plc, 'B3:1') == bytes.fromhex('01 80')
+    assert bench.listener.values(mapping)[-1] == [0]
+
+
+def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() -> None:
+    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/01')
+    bench = DriverBench([mapping])
+    plc = old_plc(bench)
+
+    def interfere(function: int) -> None:
+        if function == slc.LOGICAL_WRITE:
+            store(plc, 'B3:1', [0x0002])
+
+    plc.meanwhile = interfere
+    bench.write(mapping, [1])
+    bench.run(0.5)
+    assert str(bench.listener.results[0]).endswith('a change that the PLC made in between is lost')
+    assert stored(plc, 'B3:1') == bytes.fromhex('10 00')
+
+
+def test_writing_back_without_a_reply_leaves_it_unknown() -> None:
+    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='ML1000')
+    bench = DriverBench([mapping])
+    plc = old_plc(bench)
+
+    def fall_silent(function: int) -> None:
+        plc.faults.silent = function == slc.LOGICAL_WRITE
+
+    plc.meanwhile = fall_silent
+    bench.write(mapping, [1])
+    bench.run(5.0)
+    assert bench.listener.outcomes() == [Outcome.UNKNOWN]
+    assert stored(plc, 'B3:1') == bytes.fromhex('10 00')  # it was, in this case
+
+
+def test_reading_for_it_without_a_reply_means_not_written() -> None:
+    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='ML1000')
+    bench = DriverBench([mapping])
+    plc = old_plc(bench)
+
+    def fall_silent(function: int) -> None:
+        plc.faults.silent = function == slc.LOGICAL_READ
+
+    plc.meanwhile = fall_silent
+    bench.write(mapping, [1])
+    bench.run(5.0)
+    assert bench.listener.outcomes() == [Outcome.NOT_SENT]
+    assert stored(plc, 'B3:1') == bytes(2)
+
+
+def test_bit_refused_by_a_processor_that_has_masked_writes_is_a_failure() -> None:
+    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/03')
+    bench = DriverBench([mapping])
+    plc = old_plc(bench)
+    bench.write(mapping, [1])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.FAILED]
+    assert stored(plc, 'B3:1') == bytes(2)
+
+
+def test_flat_io_is_read_and_written_through_the_slots() -> None:
+    inputs = make_mapping('I:1', plc='SLC', length=3, access='Flat')
+    output = make_mapping('O:1/5', 'ReadWrite', plc='SLC', access='Flat')
+    slot = make_mapping('I:3.0', plc='SLC')
+    bench = DriverBench([inputs, output, slot])
+    plc = bench.plc(1, 'SLC', ('I:1.0', 2), ('I:3.0', 2), ('O:2.0', 1), ('O:4.0', 1))
+    store(plc, 'I:1.0', [10, 11])
+    store(plc, 'I:3.0', [12, 13])
+    bench.run(0.3)
+    bench.write(output, [1])
+    bench.run(0.5)
+    assert bench.listener.values(inputs)[-1] == [11, 12, 13]
+    assert bench.listener.values(slot)[-1] == [12]
+    assert bench.listener.values(output)[-1] == [1]
+    assert stored(plc, 'O:4.0') == bytes.fromhex('20 00')
+    assert len(bench.driver.blocks) == 3  # what is flat is never read with what is a slot's
+
+
+def test_flat_io_is_never_tried_the_other_way() -> None:
+    mapping = make_mapping('I:9', plc='SLC', access='Flat')
+    bench = DriverBench([mapping])
+    bench.plc(1, 'SLC', ('I:9.0', 1))
+    bench.run(1.0)
+    assert bench.listener.values(mapping) == []
+    assert bench.listener.reasons == [('I:9', 'STS 50: address not there, or memory protected')]

@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What holds for every write: one result that is true, and no command executed late or twice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.simulated_plc import SimulatedPlc
+import pytest
+from support.driver_bench import DriverBench, stored
+from support.mappings import make_mapping
+
+
+def bench_of(*mappings: Mapping, **settings: bool) -> tuple[DriverBench, SimulatedPlc]:
+    """Return a driver of these mappings that has found its PLC-5."""
+    bench = DriverBench(mappings, settings=DriverSettings(**settings))  # type: ignore[arg-type]
+    plc = bench.plc(1, 'PLC5', ('N7:0', 20), ('F8:0', 4), ('B3:0', 4))
+    bench.run(1.0)
+    return bench, plc
+
+
+class Executed:
+    """What a PLC has executed, of writes."""
+
+    def __init__(self, plc: SimulatedPlc, is_watchful: bool = True) -> None:
+        self.writes: list[Packet] = []
+        self._plc = plc
+        plc.slave = HalfDuplexSlave(
+            SlaveSettings(plc.station, duplicate_detection=is_watchful), self._serve)
+
+    def _serve(self, command: Packet) -> Packet:
+        reply = self._plc.serve(command)
+        if command.cmd == 0x0F and not reply.data:
+            self.writes.append(command)
+        return reply
+
+
+class FirstAckLost:
+    """A line that loses one DLE ACK."""
+
+    def __init__(self) -> None:
+        self.is_lost = False
+
+    def __call__(self, data: bytes) -> bytes:
+        """Return what comes through."""
+        if data != frames.ACK or self.is_lost:
+            return data
+        self.is_lost = True
+        return b''
+
+
+@pytest.mark.parametrize(('is_watchful', 'times'), [(True, 1), (False, 2)])
+def test_repeated_write_is_executed_once_by_a_slave_that_detects_duplicates(
+        is_watchful: bool, times: int) -> None:
+    mapping = make_mapping('N7:0', 'Write')
+    bench, plc = bench_of(mapping)
+    executed = Executed(plc, is_watchful)
+    bench.far.say = FirstAckLost()
+    bench.write(mapping, [7])
+    bench.run(2.0)
+    assert [result.outcome for result in bench.listener.results] == [Outcome.WRITTEN]
+    assert len(executed.writes) == times
+    assert len(set(executed.writes)) == 1  # the same TNS and the same values
+    assert stored(plc, 'N7:0') == b'\7\0'
+
+
+@pytest.mark.parametrize(('text', 'outcomes'), [
+    ('N7:0', [Outcome.SUPERSEDED, Outcome.WRITTEN, Outcome.WRITTEN]),
+    ('B3:0/0', [Outcome.WRITTEN] * 3)])  # each bit is a command
+def test_of_two_writers_the_last_wins_and_both_get_results(
+        text: str, outcomes: list[Outcome]) -> None:
+    mapping = make_mapping(text, 'ReadWrite', period=60_000)
+    bench, plc = bench_of(mapping)
+    for value in (1, 0, 1):  # the first has gone out when the others come
+        bench.write(mapping, [value])
+    bench.run(2.0)
+    assert sorted(bench.listener.outcomes(), key=str) == sorted(outcomes, key=str)
+    assert [result.value for result in bench.listener.results
+            if result.outcome is Outcome.WRITTEN][-1] == '[1]'
+    assert stored(plc, text) == b'\1\0'
+    assert bench.listener.values(mapping)[-1] == [1]
+
+
+def test_packets_of_two_long_writes_do_not_mix() -> None:
+    mapping = make_mapping('N10:0', 'ReadWrite', length=250, period=60_000)
+    bench = DriverBench([mapping])
+    plc = bench.plc(1, 'PLC5', ('N10:0', 250))
+    bench.run(1.0)
+    executed = Executed(plc)
+    bench.write(mapping, [1] * 250)
+    bench.write(mapping, [2] * 250)
+    bench.run(2.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN] * 2
+    assert [packet.data[-2] for packet in executed.writes] == [1, 1, 1, 2, 2, 2]
+    assert stored(plc, 'N10:0', 250) == b'\2\0' * 250
+
+
+def test_two_rows_that_write_the_same_words_both_write() -> None:
+    one, other = make_mapping('N7:0', 'Write', tag='a'), make_mapping('N7:0', 'Write', tag='b')
+    bench, plc = bench_of(one, other)
+    bench.write(one, [1])
+    bench.write(other, [2])
+    bench.run(2.0)
+    assert [(result.mapping.tag, result.outcome) for result in bench.listener.results] == [
+        ('a', Outcome.WRITTEN), ('b', Outcome.WRITTEN)]
+    assert stored(plc, 'N7:0') == b'\2\0'
+
+
+REFUSED: list[tuple[str, Sequence[float], str]] = [
+    ('N7:0', [1, 2], 'the mapping has 1'), ('N7:0', [], 'the mapping has 1'),
+    ('N7:0', [32768], '32768'),
+    ('N7:0', [11], 'Max 10'), ('N7:0', [-11], 'Min -10'),
+    ('F8:0', [math.nan], 'nan'), ('F8:0', [math.inf], 'inf'), ('F8:0', [1e39], '1e+39'),
+    ('B3:0/0', [2], '2')]
+
+
+@pytest.mark.parametrize(('text', 'values', 'reason'), REFUSED)
+def test_refused_before_the_line(text: str, values: list[float], reason: str) -> None:
+    limit = math.inf if text == 'B3:0/0' else 10.0
+    mapping = make_mapping(text, 'Write', minimum=-limit, maximum=limit)
+    bench, plc = bench_of(mapping)
+    executed = Executed(plc)
+    bench.write(mapping, values)
+    bench.run(2.0)
+    result, = bench.listener.results
+    assert result.outcome is Outcome.REFUSED
+    assert reason.lower() in result.detail.lower()
+    assert executed.writes == []
+
+
+def test_read_only_refuses_before_the_line() -> None:
+    mapping = make_mapping('N7:0', 'ReadWrite')
+    bench, plc = bench_of(mapping, read_only=True)
+    executed = Executed(plc)
+    bench.write(mapping, [1])
+    bench.run(2.0)
+    assert [str(result) for result in bench.listener.results] == [
+        'not written: refused: this node is read_only']
+    assert executed.writes == []
+
+
+def test_nothing_that_waited_survives_an_outage() -> None:
+    words, bits = make_mapping('N7:0', 'ReadWrite'), make_mapping('B3:0/0', 'ReadWrite')
+    bench, plc = bench_of(words, bits)
+    executed = Executed(plc)
+    plc.faults.silent = True
+    for value in (1, 2, 3):
+        bench.write(words, [value])
+        bench.write(bits, [value % 2])
+    bench.run(30.0)
+    assert len(bench.listener.results) == 6
+    assert set(bench.listener.outcomes()) <= {
+        Outcome.UNKNOWN, Outcome.NOT_SENT, Outcome.SUPERSEDED}
+    plc.faults.silent = False
+    bench.run(30.0)
+    assert bench.driver.stations[1].active
+    assert executed.writes == []
+    assert len(bench.listener.results) == 6

@@ -1,0 +1,165 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Errands on a virtual line: orders one after the other, over the links of both duplexes."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Any
+
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.driver.errands import Errands
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.transactions import echo, identify
+from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, PortLost, StationInactive
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.dialect import Request
+from support.driver_bench import simulated_plc
+from support.virtual_line import VirtualLine
+
+NETWORK = Network(baud=115200, timeout=200, nak_retries=2, enq_retries=2, cmd_timeout=500)
+
+
+@dataclass
+class Ends:
+    """Who wants to know how errands end."""
+
+    results: list[object] = field(default_factory=list)
+    errors: list[Exception] = field(default_factory=list)
+
+    def count(self) -> int:
+        return len(self.results) + len(self.errors)
+
+
+class Bench:
+    """Errands at one end, an SLC that is station 1 at the other."""
+
+    def __init__(self, absent: tuple[int, ...] = ()) -> None:
+        self.errands = Errands(NETWORK, absent, first_tns=7)
+        self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
+        self.far = Machine(multidrop([self.plc]), checksum=NETWORK.checksum)
+        self.line = VirtualLine(self.errands.machine, self.far, baud=115200)
+        self.ends = Ends()
+        self.added = 0
+        self.line.start()
+
+    def add(self, station: int, order: Generator[Request, Packet, Any]) -> None:
+        self.added += 1
+        self.errands.add(station, order, self.ends.results.append, self.ends.errors.append)
+
+    def run(self) -> None:
+        self.line.wake(self.errands.machine)
+        self.line.run(lambda: self.ends.count() == self.added, 30.0)
+
+
+def test_orders_are_carried_out_in_turn() -> None:
+    bench = Bench()
+    bench.add(1, identify())
+    bench.add(1, echo(b'\1\2\3'))
+    bench.run()
+    identity, nothing = bench.ends.results
+    assert str(identity).startswith('SLC')
+    assert nothing is None
+    assert bench.ends.errors == []
+    assert bench.errands.counters.commands_sent == 2
+
+
+def test_order_of_several_commands_is_not_interrupted() -> None:
+    log = []
+
+    def twice(name: str) -> Generator[Request, Packet, None]:
+        for number in range(2):
+            yield diagnostics.CMD, diagnostics.Echo(b'').encode()
+            log.append(f'{name}{number}')
+
+    bench = Bench()
+    bench.add(1, twice('a'))
+    bench.add(1, twice('b'))
+    bench.run()
+    assert log == ['a0', 'a1', 'b0', 'b1']
+
+
+def test_errors_end_only_their_own_order() -> None:
+    def unusable() -> Generator[Request, Packet, None]:
+        yield diagnostics.CMD, diagnostics.Echo(b'').encode()
+        raise FormatError('no use')
+
+    bench = Bench()
+    bench.add(9, identify())
+    bench.add(1, unusable())
+    bench.add(1, echo(b'x'))
+    bench.run()
+    absent, useless = bench.ends.errors
+    assert isinstance(absent, StationInactive)
+    assert str(useless) == 'no use'
+    assert bench.ends.results == [None]
+
+
+def test_present_station_gets_every_retry_and_an_absent_one_a_single_poll() -> None:
+    bench = Bench()
+    bench.add(9, identify())
+    bench.run()
+    assert bench.errands.counters.messages_sent == 3
+    assert bench.errands.counters.polls_sent == 0
+
+    bench = Bench(absent=(9, 1))
+    bench.add(9, identify())
+    bench.add(1, identify())
+    bench.run()
+    assert bench.errands.counters.messages_sent == 1  # to the one that has answered its poll
+    assert len(bench.ends.results) == 1
+    assert bench.errands.stations[1].active
+    assert not bench.errands.stations[9].active
+
+
+def test_no_nak_is_sent_when_a_reply_does_not_come() -> None:
+    bench = Bench()
+    bench.plc.faults.slow = 100_000
+    bench.add(1, identify())
+    bench.run()
+    error, = bench.ends.errors
+    assert isinstance(error, CommandTimeout)
+    assert bench.errands.counters.naks_sent == 0
+
+
+def test_lost_port_ends_all_orders() -> None:
+    bench = Bench()
+    bench.add(9, identify())
+    bench.add(1, identify())
+    bench.line.wake(bench.errands.machine)
+    bench.line.run_for(0.1)
+    bench.errands.machine.stop(PortLost('unplugged'))
+    first, second = bench.ends.errors
+    assert str(first) == str(second) == 'port lost: unplugged'
+    assert isinstance(first, LinkError) and first.sent
+    assert isinstance(second, LinkError) and not second.sent
+
+
+def test_nothing_is_due_by_itself() -> None:
+    bench = Bench()
+    assert bench.errands.next_due() is None
+    assert bench.errands.machine.deadline is None
+
+
+def test_other_modes_are_served_by_the_same_orders() -> None:
+    errands = Errands(Network(mode='Peer', baud=115200))
+    ends = Ends()
+    errands.add(1, identify(), ends.results.append, ends.errors.append)
+    errands.machine.start(0.0)
+    assert errands.machine.data_to_send().startswith(b'\x10\x02\x01\x05\x06\x00')
+    assert ends.count() == 0

@@ -1,0 +1,427 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Slow jobs on a virtual line: status, echo and counters beside reads and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from abdf1_ros.df1.frames import Symbol
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.driver.health import ECHO_PERIOD
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.points import Freshness, Outcome
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.simulated_plc import Faults, SimulatedPlc
+import pytest
+from support.driver_bench import DriverBench, simulated_plc
+from support.mappings import make_mapping
+
+ECHO, COUNTERS, STATUS = 0, 1, 3
+FILES = (('N7:0', 300), ('N9:0', 20))
+PERIOD = 5.0
+NETWORKS = [Network(baud=115200, timeout=200),
+            Network(baud=115200, timeout=200, polling='Standard')]
+
+
+class Ears:
+    """
+    A PLC on the line that keeps the commands it gets, as (time, CMD, first byte).
+
+    ``answer`` may be replaced by something that answers otherwise than the PLC.
+    """
+
+    def __init__(self, bench: DriverBench, plc: SimulatedPlc) -> None:
+        self.heard: list[tuple[float, int, int]] = []
+        self.answer: Callable[[Packet], Packet] = plc.serve
+        self._bench = bench
+        self._plc = plc
+        self._slave = HalfDuplexSlave(SlaveSettings(plc.station), self._serve, plc.counters)
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Answer, unless the PLC is silent."""
+        return b'' if self._plc.faults.silent else self._slave.handle(symbol)
+
+    def _serve(self, command: Packet) -> Packet:
+        self.heard.append((self._bench.clock(), command.cmd, command.data[0]))
+        return self.answer(command)
+
+    def answer_diagnostics(self, answer: Callable[[Packet], Packet]) -> None:
+        """Answer diagnostic commands otherwise than the PLC does."""
+        self.answer = lambda command: (
+            answer(command) if command.cmd == 0x06 else self._plc.serve(command))
+
+    def times(self, function: int) -> list[float]:
+        """Return when a diagnostic command came."""
+        return [when for when, cmd, first in self.heard if (cmd, first) == (0x06, function)]
+
+
+def make_bench(*mappings: Mapping, network: Network | None = None, period: float = PERIOD,
+               plc: str = 'SLC') -> tuple[DriverBench, list[SimulatedPlc], list[Ears]]:
+    """Return the driver and its stations, before the port is open."""
+    bench = DriverBench(mappings, network=network, start=False,
+                        settings=DriverSettings(processor_period=period, write_timeout=10.0))
+    plcs, ears = [], []
+    for station in sorted({mapping.station for mapping in mappings}):
+        plcs.append(simulated_plc(station, plc, bench.clock, *FILES))
+        ears.append(Ears(bench, plcs[-1]))
+        bench.connect(ears[-1])
+    return bench, plcs, ears
+
+
+def word(station: int = 1, command: str = 'Read', period: int | None = None,
+         text: str = 'N7:0', plc: str = 'SLC') -> Mapping:
+    """Return a mapping of one word."""
+    return make_mapping(text, command, station=station, plc=plc, period=period)
+
+
+# diagnostic status
+
+
+@pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
+@pytest.mark.parametrize(('plc', 'processor'), [
+    ('SLC', 'SLC 5/03 series A revision 1, REM RUN'),
+    ('PLC5', 'PLC-5/40 series A revision A, REM RUN')])
+def test_status_at_the_start_and_every_period(network: Network, plc: str,
+                                              processor: str) -> None:
+    bench, _, (ears,) = make_bench(word(plc=plc), network=network, plc=plc)
+    assert bench.driver.health.known(1).processor == 'unknown (not asked yet)'
+    bench.open()
+    bench.run(3.2 * PERIOD)
+    assert [round(when / PERIOD, 1) for when in ears.times(STATUS)] == [0, 1, 2, 3]
+    known = bench.driver.health.known(1)
+    assert known.processor == processor
+    assert known.told == pytest.approx(ears.times(STATUS)[-1], abs=0.1)
+    assert bench.driver.stations[1].remote_errors == 0
+
+
+def test_period_0_is_never() -> None:
+    bench, _, (ears,) = make_bench(word(), period=0)
+    bench.open()
+    bench.run(20.0)
+    assert {cmd for _, cmd, _ in ears.heard} == {0x0F}
+
+
+@pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
+def test_program_mode_and_fault_are_seen(network: Network) -> None:
+    bench, (plc,), _ = make_bench(word(), network=network)
+    bench.open()
+    bench.run(1.0)
+    plc.processor.setting = Setting.PROGRAM
+    bench.run(PERIOD)
+    identity = bench.driver.health.known(1).identity
+    assert identity is not None
+    assert (identity.is_running, identity.mode_text) == (False, 'REM PROG')
+    plc.processor.setting = Setting.FAULT
+    bench.run(PERIOD)
+    identity = bench.driver.health.known(1).identity
+    assert identity is not None
+    assert identity.faults == ('major error 0x0020, processor halted',)
+    assert bench.listener.changes == []
+
+
+@pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
+def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
+    bench, (plc, _), (ears, _) = make_bench(word(1), word(2), network=network, period=1000.0)
+    bench.open()
+    bench.run(1.0)
+    plc.faults = Faults(silent=True)
+    bench.run_until(lambda: (1, False) in bench.listener.changes)
+    assert bench.driver.health.known(1).processor == 'unknown (not asked yet)'
+    plc.processor.setting = Setting.RUN
+    bench.run(10.0)
+    assert len(ears.times(STATUS)) == 1
+    plc.faults = Faults()
+    bench.run_until(lambda: (1, True) in bench.listener.changes)
+    bench.run(0.2)
+    assert len(ears.times(STATUS)) == 2
+    assert bench.driver.health.known(1).processor == 'SLC 5/03 series A revision 1, RUN'
+
+
+def test_all_are_asked_anew_when_the_port_comes_back() -> None:
+    bench, _, (ears,) = make_bench(word(), period=1000.0)
+    bench.open()
+    bench.run(1.0)
+    bench.lose_port()
+    assert bench.driver.health.known(1).identity is None
+    bench.run(1.0)
+    bench.open()
+    bench.run(0.2)
+    assert len(ears.times(STATUS)) == 2
+    assert bench.driver.health.known(1).identity is not None
+
+
+def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
+    bench, (plc,), (ears,) = make_bench(word())
+    ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
+    bench.open()
+    bench.run(2.2 * PERIOD)
+    assert len(ears.times(STATUS)) == 3
+    assert bench.driver.health.known(1).processor == \
+        'unknown (STS 10: illegal command, format or length)'
+    station = bench.driver.stations[1]
+    assert (station.active, station.remote_errors, station.failures) == (True, 0, 0)
+    assert bench.driver.points[bench.driver.mappings[0]].freshness(bench.clock()) \
+        is Freshness.FRESH
+    ears.answer_diagnostics(plc.serve)
+    bench.run(PERIOD)
+    assert bench.driver.health.known(1).identity is not None
+
+
+def test_reply_that_is_no_status_is_said_to_be_none() -> None:
+    bench, _, (ears,) = make_bench(word())
+    ears.answer_diagnostics(lambda command: command.reply(b'\x06'))
+    bench.open()
+    bench.run(1.0)
+    assert bench.driver.health.known(1).processor == 'unknown (a diagnostic status of 1 bytes)'
+
+
+def test_station_that_never_answers_this_is_asked_rarely() -> None:
+    bench, (plc,), (ears,) = make_bench(word(), network=Network(baud=115200, timeout=100,
+                                                                cmd_timeout=500), period=2.0)
+    ears.answer_diagnostics(lambda command: replace(command, tns=0).reply())
+    bench.open()
+    bench.run(50.0)
+    assert len(ears.times(STATUS)) == 1
+    assert bench.driver.health.known(1).processor == \
+        'unknown (2508 ERR_COMMAND_TIMEOUT: Command Timed Out)'
+    ears.answer_diagnostics(plc.serve)
+    bench.run(20.0)
+    assert bench.driver.health.known(1).identity is not None
+
+
+# beside reads and writes
+
+
+def longest_wait(bench: DriverBench, mapping: Mapping) -> float:
+    """Return the longest time between two good reads."""
+    times = bench.listener.times(mapping)
+    return max(later - earlier for earlier, later in zip(times, times[1:], strict=False))
+
+
+@pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
+def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None:
+    mappings = [word(station, period=0) for station in (1, 2, 3, 4)]
+    waits = []
+    for period in (0.0, 0.05):  # all are asked all the time
+        bench, _, ears = make_bench(*mappings, network=network, period=period)
+        bench.open()
+        bench.run(5.0)
+        waits.append(max(longest_wait(bench, mapping) for mapping in mappings))
+        assert all(bool(heard.times(STATUS)) == bool(period) for heard in ears)
+    transaction = 0.012 if network.polling == 'Message' else 0.02
+    assert waits[1] - waits[0] < transaction
+    assert bench.driver.longest_scan_time == pytest.approx(waits[1], abs=1e-6)
+
+
+def test_after_a_check_come_all_reads_that_were_due() -> None:
+    mappings = [word(text=f'N{file}:0', period=0) for file in (7, 9)] + [word(2, period=0)]
+    bench, _, all_ears = make_bench(*mappings, period=0.01)
+    bench.open()
+    bench.run(2.0)
+    order = [(cmd, number) for _, cmd, number in sorted(
+        (when, cmd, number) for number, ears in enumerate(all_ears)
+        for when, cmd, _ in ears.heard)]
+    checks = [at for at, (cmd, _) in enumerate(order) if cmd == 0x06]
+    assert len(checks) > 20
+    for first, second in zip(checks, checks[1:], strict=False):
+        assert sorted(order[first + 1:second]) == [(0x0F, 0), (0x0F, 0), (0x0F, 1)]
+
+
+def test_writes_leave_a_read_its_turn_also_when_a_check_is_due() -> None:
+    pulses = make_mapping('N9:0/0', 'Write', plc='SLC')
+    bench, _, (ears,) = make_bench(word(period=0), pulses, period=0.01)
+    bench.open()
+    for n in range(200):
+        bench.write(pulses, [n % 2])
+    bench.run(2.0)
+    assert set(bench.listener.outcomes()) == {Outcome.WRITTEN}
+    functions = [(cmd, first) for _, cmd, first in ears.heard]
+    last_write = max(at for at, entry in enumerate(functions) if entry == (0x0F, 0xAB))
+    since_read = 0
+    for cmd, first in functions[:last_write]:
+        since_read = 0 if (cmd, first) == (0x0F, 0xA2) else since_read + 1
+        assert since_read <= 5  # four writes and a check
+
+
+def test_checks_of_a_busy_line_are_not_starved_by_long_reads() -> None:
+    long = make_mapping('N7:0', plc='SLC', length=300, period=0)
+    bench, _, (ears,) = make_bench(long, period=1.0)
+    bench.open()
+    bench.run(10.0)
+    assert len(ears.times(STATUS)) in (9, 10)
+
+
+# echo
+
+
+@pytest.mark.parametrize('network', NETWORKS[:1])
+def test_write_only_station_is_watched_by_echoes(network: Network) -> None:
+    lamp = word(2, 'Write')
+    bench, (_, plc), (read_ears, ears) = make_bench(word(1), lamp, network=network, period=0)
+    bench.open()
+    bench.run(10.5)
+    assert len(ears.times(ECHO)) == 6
+    assert read_ears.times(ECHO) == []
+    plc.faults = Faults(silent=True)
+    bench.run(ECHO_PERIOD + 1.5)
+    assert bench.listener.changes == [(2, False)]
+    plc.faults = Faults()
+    bench.run(ECHO_PERIOD + 1.5)
+    assert bench.listener.changes == [(2, False), (2, True)]
+
+
+def test_station_that_is_heard_needs_no_echo() -> None:
+    lamp = word(1, 'Write')
+    bench, _, (ears,) = make_bench(lamp, period=0)
+    bench.open()
+    for n in range(20):
+        bench.at(1.0 + n, lambda: bench.write(lamp, [1]))
+    bench.run(20.5)
+    assert len(ears.times(ECHO)) == 1  # the first, before anything was heard
+    bench.run(6.0)
+    assert len(ears.times(ECHO)) in (3, 4)
+
+
+def test_standard_polling_needs_no_echo() -> None:
+    bench, _, (ears,) = make_bench(word(1, 'Write'), network=NETWORKS[1], period=0)
+    bench.open()
+    bench.run(10.0)
+    assert len(ears.times(ECHO)) <= 1
+    assert bench.driver.stations[1].last_heard == pytest.approx(bench.clock(), abs=0.1)
+
+
+def test_broadcast_is_no_station_to_be_watched() -> None:
+    bench = DriverBench([word(255, 'Write')], settings=DriverSettings(processor_period=1.0))
+    bench.run(10.0)
+    assert bench.driver.counters.commands_sent == 0
+    assert bench.driver.next_due() is None
+
+
+def test_dead_stations_take_turns_and_no_more_than_an_eighth_of_the_line() -> None:
+    alive = word(1, period=0)
+    dead = [word(2), word(3, 'Write'), word(4, 'Write')]
+    bench, plcs, _ = make_bench(alive, *dead, period=1.0)
+    for plc in plcs[1:]:
+        plc.faults = Faults(silent=True)
+    bench.open()
+    bench.run_until(lambda: len(bench.listener.changes) == 3)
+    reads = len(bench.listener.times(alive))
+    bench.run(20.0)
+    cost = 20.0 / (len(bench.listener.times(alive)) - reads)
+    other, _, _ = make_bench(alive, period=0)
+    other.open()
+    other.run(20.0)
+    assert cost < 1.18 * 20.0 / len(other.listener.times(alive))
+    for plc in plcs[1:]:
+        plc.faults = Faults()
+    bench.run(15.0)
+    assert sorted(bench.listener.changes[3:]) == [(2, True), (3, True), (4, True)]
+
+
+def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:
+    alive = word(1, period=0)
+    dead = [word(2), *(word(station, 'Write') for station in range(3, 9))]
+    bench, plcs, _ = make_bench(alive, *dead, period=0)
+    for plc in plcs[1:]:
+        plc.faults = Faults(silent=True)
+    bench.open()
+    bench.run_until(lambda: len(bench.listener.changes) == len(dead))
+    plcs[1].faults = Faults()
+    bench.run(5.0)
+    assert bench.listener.changes[len(dead):] == [(2, True)]
+
+
+# link counters
+
+
+@pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
+def test_counters_on_request(network: Network) -> None:
+    bench, (plc,), (ears,) = make_bench(word(), network=network)
+    bench.open()
+    bench.run(2.0)
+    assert ears.times(COUNTERS) == []
+    bench.driver.request_counters(1)
+    assert bench.driver.health.counters_wanted == {1}
+    before = plc.counters.messages_received
+    bench.run(0.5)
+    assert bench.driver.health.counters_wanted == set()
+    assert len(ears.times(COUNTERS)) == 1
+    counters = bench.driver.health.known(1).counters
+    assert before <= int(counters['messages received']) <= plc.counters.messages_received
+    assert int(counters['polls received']) > 10
+    bench.run(10.0)
+    assert len(ears.times(COUNTERS)) == 1
+    assert bench.driver.health.known(1).counters == counters
+
+
+def test_two_requests_at_once_are_one() -> None:
+    bench, _, (ears,) = make_bench(word())
+    bench.open()
+    bench.run(1.0)
+    for _ in range(3):
+        bench.driver.request_counters(1)
+    bench.run(1.0)
+    assert len(ears.times(COUNTERS)) == 1
+
+
+def test_refused_counters() -> None:
+    bench, _, (ears,) = make_bench(word())
+    ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
+    bench.open()
+    bench.driver.request_counters(1)
+    bench.run(1.0)
+    known = bench.driver.health.known(1)
+    assert (known.counters, known.no_counters) == (
+        {}, 'STS 10: illegal command, format or length')
+    assert bench.driver.health.counters_wanted == set()
+
+
+def test_absent_station_is_not_asked_for_counters() -> None:
+    bench, (plc,), _ = make_bench(word())
+    plc.faults = Faults(silent=True)
+    bench.open()
+    bench.run(5.0)
+    bench.driver.request_counters(1)
+    bench.run(1.0)
+    assert bench.driver.health.known(1).no_counters == 'the station does not answer'
+    assert bench.driver.health.counters_wanted == set()
+
+
+def test_station_that_falls_silent_ends_the_request() -> None:
+    bench, (plc,), _ = make_bench(word())
+    bench.open()
+    bench.run(1.0)
+    plc.faults = Faults(silent=True)
+    bench.driver.request_counters(1)
+    bench.run(5.0)
+    assert bench.driver.health.known(1).no_counters
+    assert bench.driver.health.counters_wanted == set()
+
+
+def test_lost_port_ends_the_request() -> None:
+    bench, _, _ = make_bench(word())
+    bench.open()
+    bench.run(1.0)
+    bench.driver.request_counters(1)
+    bench.lose_port()
+    assert bench.driver.health.known(1).no_counters == 'port lost: unplugged'
+    assert bench.driver.health.counters_wanted == set()
+    bench.driver.request_counters(1)
+    assert bench.driver.health.counters_wanted == set()

@@ -1,0 +1,131 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The map CSV as a whole: rows that clash, and rows that are left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.driver.map_file import load_mappings
+from abdf1_ros.driver.values import ValueType
+from abdf1_ros.errors import ConfigurationError
+import pytest
+from support.mappings import faults, load_rows, load_text, row, slc
+
+
+def test_needed_column_that_the_file_does_not_have() -> None:
+    mappings, problems = load_text('Tag,Command,Address,Station\na,Read,N7:0,1\n')
+    assert mappings == []
+    assert str(problems[0]).endswith('map.csv:2 (PLC_Type): Item: 1, PLC_Type is missing')
+
+
+def test_bad_row_is_left_out_and_the_rest_stays() -> None:
+    mappings, problems = load_rows(
+        row(Tag='a'), '', row(Tag='b', Station='x'), '# c', row(Tag='d'), row(Tag='e', Min='?'))
+    assert [(mapping.tag, mapping.item, mapping.line) for mapping in mappings] == [
+        ('a', 1, 2), ('d', 3, 6)]
+    assert [str(problem).split('map.csv:')[1].split(' ')[0] for problem in problems] == [
+        '4:4', '7:11']
+    assert 'Item: 2, ' in str(problems[0])
+    assert 'Item: 4, ' in str(problems[1])
+
+
+def test_bad_file_as_a_whole() -> None:
+    with pytest.raises(ConfigurationError, match='did you mean Address'):
+        load_text('Tag,Adress\na,N7:0\n')
+
+
+def test_same_tag_twice() -> None:
+    assert faults(row(Tag='Tank.Level'), row(Tag='Tank Level', Topic='other')) == [
+        '3:1 (Tag): Item: 2, tag "Tank Level" becomes "Tank_Level", the name of item 1 (line 2,'
+        ' tag "Tank.Level")']
+
+
+def test_two_readers_of_one_topic() -> None:
+    assert faults(row(Tag='a', Topic='x.y', Command='Read'), '# c',
+                  row(Tag='b', Topic='x:y', Command='Read')) == [
+        '4:8 (Topic): Item: 2, read topic "x_y" is the topic of item 1 (line 2, tag "a")']
+
+
+def test_topic_that_is_the_tag_of_another_row() -> None:
+    assert faults(row(Tag='a'), row(Tag='b', Topic='a', Command='Read')) == [
+        '3:8 (Topic): Item: 2, read topic "a" is the topic of item 1 (line 2, tag "a")']
+
+
+def test_row_that_clashes_counts_for_nothing() -> None:
+    mappings, problems = load_rows(
+        row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'))
+    assert [(mapping.tag, mapping.topic) for mapping in mappings] == [('a', 'a'), ('b', 'c')]
+    assert len(problems) == 1
+
+
+def test_one_topic_may_be_read_and_written_by_different_rows() -> None:
+    mappings, problems = load_rows(
+        row(Tag='a', Topic='t', Command='Read'),
+        row(Tag='b', Topic='t', Command='Write', Address='N7:9', Type='uint16'))
+    assert (len(mappings), problems) == (2, [])
+
+
+def test_write_topic_fans_out_to_addresses_of_several_stations() -> None:
+    mappings, problems = load_rows(
+        row(Tag='a', Topic='t', Command='Write'),
+        row(Tag='b', Topic='t', Command='Write', Station='2'),
+        row(Tag='c', Topic='t', Command='ReadWrite', Address='N7:50', PLC_Type='SLC'))
+    assert ([mapping.topic for mapping in mappings], problems) == (['t'] * 3, [])
+
+
+@pytest.mark.parametrize('cells', [
+    {'Length': '2'}, {'Type': 'uint16'}, {'Scale': '0.1'}, {'Offset': '0'}])
+def test_write_topic_has_one_message_type_and_length(cells: dict[str, str]) -> None:
+    assert faults(row(Tag='a', Topic='t', Command='Write'),
+                  row(Tag='b', Topic='t', Command='Write', **cells)) == [
+        '3:8 (Topic): Item: 2, write topic "t" needs the message type (int16) and Length (1) of '
+        'item 1 (line 2, tag "a")']
+
+
+def test_write_topic_of_engineering_values_fans_out_to_different_raw_types() -> None:
+    mappings, problems = load_rows(
+        row(Tag='a', Topic='t', Command='Write', Scale='0.1'),
+        row(Tag='b', Topic='t', Command='Write', Type='uint16', Scale='0.5', Offset='-10'),
+        row(Tag='c', Topic='t', Command='Write', Address='F8:0'))
+    assert ([mapping.message_type for mapping in mappings], problems) == (
+        [ValueType.FLOAT32] * 3, [])
+
+
+def test_one_address_may_be_read_into_several_topics() -> None:
+    mappings, problems = load_rows(row(Tag='a'), row(Tag='b'))
+    assert (len(mappings), problems) == (2, [])
+
+
+def test_shipped_file_is_good() -> None:
+    path = Path(__file__).resolve().parent.parent.parent / 'config' / 'map.csv'
+    mappings, problems = load_mappings(str(path))
+    assert (len(mappings), problems) == (10, [])
+
+
+def test_rows_of_one_station_name_one_processor() -> None:
+    assert faults(slc(Processor='5/01', Tag='a'), slc(Processor='ML1000', Tag='b')) == [
+        '3:17 (Processor): Item: 2, Processor of station 1 is ML1000 here, but 5/01 in the '
+        'row of item 1 (line 2, tag "a")']
+    assert faults(slc(Tag='a'), slc(Processor='5/01', Tag='b')) == [
+        '3:17 (Processor): Item: 2, Processor of station 1 is 5/01 here, but 5/03 in the '
+        'row of item 1 (line 2, tag "a")']
+
+
+def test_rows_of_several_stations_and_an_empty_cell_for_the_usual_one() -> None:
+    assert faults(slc(Tag='a'), slc(Tag='b', Processor='5/03'), row(Tag='c'),
+                  slc(Tag='d', Station='2', Processor='5/01'),
+                  slc(Tag='e', Station='255', Command='Write'),
+                  slc(Tag='f', Station='255', Command='Write', Processor='5/01')) == []

@@ -1,0 +1,451 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One row of the map CSV: columns, defaults, and the numbered texts of its errors."""
+
+from __future__ import annotations
+
+import math
+
+from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.driver.mapping import Command, Mapping, Publish
+from abdf1_ros.driver.scaling import Scaling
+from abdf1_ros.driver.values import ValueType, WordOrder
+from abdf1_ros.messages import Severity
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
+import pytest
+from support.mappings import fault, faults, load_rows, one, row, slc
+
+
+def test_row_with_every_column() -> None:
+    mapping = one(Tag='Line speed', Command='readwrite', Address='n7:10', Station='254',
+                  PLC_Type='slc', Length='4', Type='FLOAT32', Topic='cell/1 speed',
+                  Period='250', Publish='change', Min='-1.5', Max='99')
+    assert mapping == Mapping(
+        1, 2, 'Line speed', 'Line_speed', Command.READ_WRITE, mapping.address, 254,
+        PlcType.SLC, 4, ValueType.FLOAT32, 'cell/t1_speed', 250, Publish.CHANGE, -1.5, 99.0,
+        access=Access.SLOT)
+    assert str(mapping.address) == 'N7:10'
+
+
+def test_defaults() -> None:
+    mapping = one(Tag='x:y', Command='Read')
+    assert (mapping.length, mapping.type, mapping.topic, mapping.period, mapping.publish) == (
+        1, ValueType.INT16, 'x_y', None, Publish.ALWAYS)
+    assert (mapping.minimum, mapping.maximum) == (-math.inf, math.inf)
+
+
+@pytest.mark.parametrize('text, reads, writes', [
+    ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
+    ('READ', True, False), ('write', False, True)])
+def test_command(text: str, reads: bool, writes: bool) -> None:
+    mapping = one(Command=text)
+    assert (mapping.reads, mapping.writes) == (reads, writes)
+
+
+@pytest.mark.parametrize('address, plc, kind', [
+    ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:001', 'PLC5', 'uint16'),
+    ('O:000', 'PLC5', 'uint16'), ('S:1', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'uint16'),
+    ('A9:0', 'SLC', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L10:0', 'SLC', 'int32'),
+    ('T4:0.ACC', 'PLC5', 'int16'), ('C5:0.PRE', 'SLC', 'int16'), ('R6:0.LEN', 'PLC5', 'int16'),
+    ('ST9:0', 'PLC5', 'string'), ('B3:0/5', 'PLC5', 'bool'), ('T4:0/DN', 'SLC', 'bool'),
+    ('I:017/12', 'PLC5', 'bool'), ('I:1.0/3', 'SLC', 'bool'), ('N7:0/1', 'SLC', 'bool')])
+def test_natural_type(address: str, plc: str, kind: str) -> None:
+    assert one(Address=address, PLC_Type=plc, Command='Read').type.value == kind
+
+
+@pytest.mark.parametrize('address, kind', [
+    ('N7:0', 'uint16'), ('N7:0', 'int32'), ('N7:0', 'uint32'), ('N7:0', 'float32'),
+    ('N7:0', 'bcd16'), ('B3:0', 'int16'), ('D9:0', 'bcd16'), ('T4:0.ACC', 'uint16'),
+    ('N7:0', 'string'), ('A9:0', 'string'), ('A9:0', 'int32'), ('S:0', 'uint32'),
+    ('I:001', 'float32'), ('O:001', 'bcd16')])
+def test_other_type_that_fits(address: str, kind: str) -> None:
+    assert one(Address=address, Type=kind).type.value == kind
+
+
+@pytest.mark.parametrize('address, kind, right', [
+    ('F8:0', 'int16', 'F8:0 can be float32'),
+    ('ST9:0', 'int16', 'ST9:0 can be string'),
+    ('T4:0.ACC', 'int32', 'T4:0.ACC can be int16, uint16'),
+    ('B3:0', 'string', 'B3:0 can be uint16, int16, bcd16, int32, uint32, float32'),
+    ('N7:0', 'bool', 'N7:0 can be int16, uint16, bcd16, int32, uint32, float32, string; '
+                     'a bool needs a bit address such as B3:0/5'),
+    ('B3:0/5', 'int16', 'B3:0/5 can be bool')])
+def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
+    assert fault(Address=address, Type=kind) == f'2:7 (Type): Item: 1, {right}'
+
+
+@pytest.mark.parametrize('column, text, expected', [
+    ('Station', '255',
+     '2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (255) must be less '
+     'than 255; Station = "255" should be a whole number from 0 to 254'),
+    ('Station', 'PLC', '2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number '
+     '(PLC) must be less than 255; Station = "PLC" should be a whole number from 0 to 254'),
+    ('PLC_Type', 'S7',
+     '2:5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (S7) '
+     'should be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
+    ('Address', 'N7',
+     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (N7); an element '
+     'is missing, as in N7:0'),
+    ('Address', 'L10:0',
+     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (L10:0); PLC5 '
+     'has no L files; file types: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
+    ('Address', 'N7:1000',
+     '2:3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:1000, len=1);'
+     ' elements of N run from 0 to 999'),
+    ('Command', 'Poll',
+     '2:2 (Command): Item: 1, Command = "Poll" should be one of '
+     + ', '.join(command.value for command in Command)),
+    ('Publish', 'Never',
+     '2:10 (Publish): Item: 1, Publish = "Never" should be one of Always, Change'),
+    ('Type', 'int8', '2:7 (Type): Item: 1, Type = "int8" should be one of bool, int16, uint16, '
+     'int32, uint32, float32, bcd16, string'),
+    ('Length', '0', '2:6 (Length): Item: 1, Length = "0" should be a whole number from 1 to '
+     '65535'),
+    ('Length', '1.5', '2:6 (Length): Item: 1, Length = "1.5" should be a whole number from 1 '
+     'to 65535'),
+    ('Period', '-1', '2:9 (Period): Item: 1, Period = "-1" should be a whole number from 0 to '
+     '86400000'),
+    ('Period', '86400001', '2:9 (Period): Item: 1, Period = "86400001" should be a whole number'
+     ' from 0 to 86400000'),
+    ('Min', 'low', '2:11 (Min): Item: 1, Min = "low" should be a number'),
+    ('Min', 'nan', '2:11 (Min): Item: 1, Min = "nan" should be a number'),
+    ('Max', 'inf', '2:12 (Max): Item: 1, Max = "inf" should be a number'),
+    ('Max', '1e999', '2:12 (Max): Item: 1, Max = "1e999" should be a number'),
+    ('Tag', '--', '2:1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),
+    ('Topic', '/', '2:8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
+    ('Topic', 'x' * 151, '2:8 (Topic): Item: 1, Topic has 151 characters, at most 150 go'),
+])
+def test_exact_text(column: str, text: str, expected: str) -> None:
+    assert fault(**{column: text}) == expected
+
+
+@pytest.mark.parametrize('column', ['Tag', 'Command', 'Address', 'Station', 'PLC_Type'])
+def test_needed_column(column: str) -> None:
+    assert fault(**{column: ''}) == \
+        f'2:{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing'
+
+
+@pytest.mark.parametrize('column, texts', [
+    ('Station', ('0', '254')), ('Length', ('1', '1000')), ('Period', ('0', '86400000')),
+    ('Min', ('0', '-3.5', '1e3', '-2,5')), ('Max', ('0', '1e300')), ('Topic', ('x' * 150,))])
+def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
+    for text in texts:
+        mappings, problems = load_rows(row(**{column: f'"{text}"'}))
+        assert (len(mappings), problems) == (1, [])
+
+
+def test_decimal_comma_of_a_limit() -> None:
+    assert one(Min='"-2,5"').minimum == -2.5
+
+
+def test_minimum_above_the_maximum() -> None:
+    assert fault(Min='5', Max='4') == '2:11 (Min): Item: 1, Min is greater than Max'
+    assert one(Min='5', Max='5').maximum == 5
+
+
+def test_every_fault_of_a_row_is_reported() -> None:
+    texts = faults(row(Station='999', Length='0', Address='??', Period='x', Command='z'))
+    assert sorted(text.split(': ')[0] for text in texts) == [
+        '2:2 (Command)', '2:3 (Address)', '2:4 (Station)', '2:6 (Length)', '2:9 (Period)']
+
+
+def test_numbered_faults_are_errors() -> None:
+    _, problems = load_rows(row(Station='999', Address='??'), row(PLC_Type='S7'))
+    assert sorted(problem.message.number for problem in problems if problem.message) == [
+        2501, 2502, 2503]
+    assert all(problem.message and problem.message.severity is Severity.ERROR
+               for problem in problems)
+
+
+@pytest.mark.parametrize('cells', [
+    {'Address': 'T4:0'}, {'Address': 'T4:0', 'Length': '3'}, {'Address': 'C5:7'},
+    {'Address': 'R6:0', 'PLC_Type': 'SLC'}, {'Address': 'T4:0.ACC', 'Length': '2'},
+    {'Address': 'T4:0.PRE', 'Length': '4'}])
+def test_control_word_of_a_structure_is_not_writable(cells: dict[str, str]) -> None:
+    text = fault(Command='Write', **cells)
+    assert text.startswith('2:3 (Address): Item: 1, ')
+    assert ' belongs to the processor; of such an element can be written: ' in text
+    assert one(**cells | {'Command': 'Read'})
+
+
+@pytest.mark.parametrize('cells', [
+    {'Address': 'T4:0.PRE'}, {'Address': 'T4:0.PRE', 'Length': '2'}, {'Address': 'C5:0.ACC'},
+    {'Address': 'T4:0/DN'}, {'Address': 'T4:0/DN', 'Length': '3'}, {'Address': 'R6:0/FD'},
+    {'Address': 'C5:0/UA'}, {'Address': 'N7:0/0', 'Length': '16'},
+    {'Address': 'T4:0.ACC/3'}])
+def test_members_and_named_bits_are_writable(cells: dict[str, str]) -> None:
+    assert one(Command='Write', **cells).writes
+
+
+@pytest.mark.parametrize('cells, shown', [
+    ({'Address': 'T4:0/0'}, 'T4:0/0'), ({'Address': 'T4:0/12'}, 'T4:0/12'),
+    ({'Address': 'T4:0/12', 'Length': '2'}, 'T4:0/12'), ({'Address': 'C5:0/9'}, 'C5:0/9'),
+    ({'Address': 'R6:0/7', 'Length': '2'}, 'R6:0/7')])
+def test_internal_bits_are_not_writable(cells: dict[str, str], shown: str) -> None:
+    assert fault(Command='Write', **cells).startswith(
+        f'2:3 (Address): Item: 1, {shown} belongs to the processor; of such an element ')
+    assert one(**cells | {'Command': 'Read'})
+
+
+@pytest.mark.parametrize('cells', [
+    {'Address': 'N7:999'}, {'Address': 'N7:990', 'Length': '10'},
+    {'Address': 'N7:998', 'Type': 'int32'}, {'Address': 'F8:999'},
+    {'Address': 'N7:255', 'PLC_Type': 'SLC'}, {'Address': 'T4:999.ACC', 'Command': 'Read'},
+    {'Address': 'T4:998', 'Length': '6', 'Command': 'Read'},
+    {'Address': 'B3:999/15'}, {'Address': 'B3:998/1', 'Length': '31'},
+    {'Address': 'I:277', 'Command': 'Read'}, {'Address': 'S:127'}, {'Address': 'ST9:779'},
+    {'Address': 'I:30.255', 'PLC_Type': 'SLC'}])
+def test_mapping_at_the_end_of_a_file(cells: dict[str, str]) -> None:
+    assert one(**cells)
+
+
+@pytest.mark.parametrize('cells, length, last', [
+    ({'Address': 'N7:990', 'Length': '11'}, 11, 'N7:999'),
+    ({'Address': 'N7:999', 'Type': 'int32'}, 1, 'N7:999'),
+    ({'Address': 'F8:999', 'Length': '2'}, 2, 'F8:999.1'),
+    ({'Address': 'N7:250', 'Length': '7', 'PLC_Type': 'SLC'}, 7, 'N7:255'),
+    ({'Address': 'T4:999', 'Length': '4', 'Command': 'Read'}, 4, 'T4:999.ACC'),
+    ({'Address': 'B3:998/1', 'Length': '32'}, 32, 'B3:999'),
+    ({'Address': 'I:277', 'Length': '2', 'Command': 'Read'}, 2, 'I:277'),
+    ({'Address': 'S:127', 'Length': '2'}, 2, 'S2:127'),
+    ({'Address': 'I:30.255', 'Length': '2', 'PLC_Type': 'SLC'}, 2, 'I:30.255')])
+def test_mapping_over_the_end_of_a_file(cells: dict[str, str], length: int, last: str) -> None:
+    text = fault(**cells)
+    assert text.startswith(
+        '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range '
+        f'({cells["Address"]}, len={length}); the last word there can be is ')
+    assert text.endswith(last) or last == 'F8:999.1'
+
+
+def test_bits_of_a_structure_end_with_their_word() -> None:
+    assert fault(Address='T4:0/13', Length='4', Command='Read') == (
+        '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (T4:0/13, '
+        'len=4); bits of a structure end with their word')
+    assert one(Address='T4:0/13', Length='3', Command='Read')
+
+
+def test_string_mapping_is_one_string() -> None:
+    assert fault(Address='ST9:0', Length='2') == \
+        '2:6 (Length): Item: 1, a string mapping has Length 1'
+
+
+@pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
+@pytest.mark.parametrize('address', ['A10:2', 'N7:2'])
+def test_string_over_words_counts_words(address: str, plc: str) -> None:
+    mapping = one(Address=address, PLC_Type=plc, Type='string', Length='20')
+    assert (mapping.codec.words, mapping.codec.packed) == (20, True)
+    assert mapping.codec.decode(mapping.codec.encode('odd')) == 'odd'
+    assert not one(Address='ST9:0').codec.packed
+
+
+@pytest.mark.parametrize('cells', [
+    {'Address': 'N7:0', 'Type': 'int32'}, {'Address': 'N7:0', 'Type': 'uint32'},
+    {'Address': 'B3:0', 'Type': 'float32'}, {'Address': 'D9:0', 'Type': 'float32'},
+    {'Address': 'S:0', 'Type': 'int32'}, {'Address': 'A9:0', 'Type': 'int32'},
+    {'Address': 'O:001', 'Type': 'uint32', 'Command': 'Serve'}])
+def test_high_word_first(cells: dict[str, str]) -> None:
+    mapping = one(Word_Order='high', **cells)
+    assert mapping.word_order is mapping.codec.word_order is WordOrder.HIGH
+    assert mapping.cell('Word_Order') == 'High'
+    low = one(**cells)
+    assert low.word_order is low.codec.word_order is WordOrder.LOW
+    assert mapping != low
+
+
+@pytest.mark.parametrize('cells, kind', [
+    ({'Address': 'F8:0'}, 'float32 at F8:0'), ({'Address': 'N7:0'}, 'int16 at N7:0'),
+    ({'Address': 'L10:0', 'PLC_Type': 'SLC', 'Type': 'uint32'}, 'uint32 at L10:0'),
+    ({'Address': 'ST9:0'}, 'string at ST9:0'), ({'Address': 'B3:0/4'}, 'bool at B3:0/4')])
+def test_word_order_of_what_has_none(cells: dict[str, str], kind: str) -> None:
+    assert fault(Word_Order='High', **cells) == (
+        '2:13 (Word_Order): Item: 1, Word_Order High is for int32, uint32 and float32 over words '
+        f'of 16 bits such as N7:0, not for {kind}')
+    assert one(Word_Order='Low', **cells).word_order is WordOrder.LOW
+
+
+@pytest.mark.parametrize('cells, scaling', [
+    ({'Scale': '0.1'}, Scaling(0.1, 0.0)), ({'Offset': '-40'}, Scaling(1.0, -40.0)),
+    ({'Scale': '-2', 'Offset': '1e3'}, Scaling(-2.0, 1000.0)),
+    ({'Scale': '"0,25"', 'Offset': '0'}, Scaling(0.25, 0.0)),
+    ({'Scale': '1'}, Scaling(1.0, 0.0)), ({}, None)])
+def test_scale_and_offset(cells: dict[str, str], scaling: Scaling | None) -> None:
+    mapping = one(**cells)
+    assert mapping.scaling == scaling
+    assert mapping.type is ValueType.INT16
+    assert mapping.message_type is (ValueType.FLOAT32 if scaling else ValueType.INT16)
+
+
+@pytest.mark.parametrize('kind', ['int16', 'uint16', 'bcd16', 'int32', 'uint32', 'float32'])
+def test_numbers_can_be_scaled(kind: str) -> None:
+    assert one(Type=kind, Scale='0.5', Offset='1').message_type is ValueType.FLOAT32
+
+
+@pytest.mark.parametrize('cells, expected', [
+    ({'Scale': '0'}, '14 (Scale): Item: 1, Scale should not be 0'),
+    ({'Scale': '-0.0', 'Offset': '2'}, '14 (Scale): Item: 1, Scale should not be 0'),
+    ({'Scale': 'x'}, '14 (Scale): Item: 1, Scale = "x" should be a number'),
+    ({'Scale': 'inf'}, '14 (Scale): Item: 1, Scale = "inf" should be a number'),
+    ({'Offset': 'nan'}, '15 (Offset): Item: 1, Offset = "nan" should be a number'),
+    ({'Offset': '"1,000"'},
+     '15 (Offset): Item: 1, Offset = "1,000" could be two numbers; write 1000 or 1.000'),
+    ({'Address': 'B3:0/4', 'Scale': '2'},
+     '14 (Scale): Item: 1, Scale and Offset are for numbers, not for bool'),
+    ({'Address': 'ST9:0', 'Offset': '2'},
+     '15 (Offset): Item: 1, Scale and Offset are for numbers, not for string'),
+    ({'Offset': '1e9'},
+     '15 (Offset): Item: 1, a float32 has too few digits to tell the values apart in 999967232 '
+     'to 1000032767, the range of int16 with Scale 1, Offset 1000000000')])
+def test_scale_and_offset_that_do_not_go(cells: dict[str, str], expected: str) -> None:
+    assert fault(**cells) == f'2:{expected}'
+
+
+# Families and access
+
+@pytest.mark.parametrize(('plc', 'address', 'kind', 'shown'), [
+    ('PLC2', '020', 'uint16', '020'), ('plc2', '110/17', 'bool', '110/17'),
+    ('PLC3', 'E3.1.8.10.0.5', 'uint16', 'B10:5'), ('PLC3', 'N7:0', 'int16', 'N7:0'),
+    ('PLC3', 'T:4.ACC', 'int16', 'T:4.ACC'), ('PLC3', 'I:17/7', 'bool', 'I:0017/07')])
+def test_plc2_and_plc3(plc: str, address: str, kind: str, shown: str) -> None:
+    mapping = one(PLC_Type=plc, Address=address, Command='Read')
+    assert (mapping.type.value, str(mapping.address)) == (kind, shown)
+
+
+def test_types_and_length_over_the_words_of_a_plc2() -> None:
+    mapping = one(PLC_Type='PLC2', Address='020', Type='bcd16', Length='3', Command='Write')
+    assert (mapping.type, mapping.codec.words) == (ValueType.BCD16, 3)
+
+
+@pytest.mark.parametrize(('plc', 'text', 'access'), [
+    ('PLC2', '', 'Unprotected'), ('PLC2', 'protected', 'Protected'), ('PLC2', 'cif', 'CIF'),
+    ('PLC3', '', 'WordRange'), ('PLC5', '', 'Typed'), ('PLC5', 'WORDRANGE', 'WordRange'),
+    ('SLC', '', 'Slot'), ('SLC', 'flat', 'Flat')])
+def test_access(plc: str, text: str, access: str) -> None:
+    address = '020' if plc == 'PLC2' else 'N7:0'
+    mapping = one(PLC_Type=plc, Address=address, Access=text)
+    assert (mapping.access, mapping.cell('Access')) == (Access(access), access)
+    assert mapping.dialect is dialect_of(PlcType(plc), Access(access))
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Access': 'CIF'}, 'Access = "CIF" of a PLC5 should be one of Typed, WordRange'),
+    ({'Access': 'Typed', 'PLC_Type': 'PLC3'},
+     'Access = "Typed" of a PLC3 should be one of WordRange'),
+    ({'Access': 'x', 'PLC_Type': 'PLC2', 'Address': '020'},
+     'Access = "x" of a PLC2 should be one of Unprotected, Protected, CIF'),
+    ({'Access': 'Typed', 'Command': 'Serve', 'Station': '5'},
+     'a Serve row answers every access; leave the cell empty')])
+def test_access_that_does_not_fit(cells: dict[str, str], text: str) -> None:
+    assert fault(**cells) == f'2:{COLUMNS.index("Access") + 1} (Access): Item: 1, {text}'
+
+
+@pytest.mark.parametrize(('plc', 'address', 'number', 'right'), [
+    ('PLC2', '018', 2503, 'are octal, as in 020 or 110/17'),
+    ('PLC2', 'N7:0', 2503, 'write the octal number of a word'),
+    ('PLC2', '100000', 2504, 'words run from 0 to 77777 (octal)'),
+    ('PLC3', 'F8:0', 2503, 'F is no file type of a PLC-3'),
+    ('PLC3', 'E2.1.8.10.0.0', 2504, 'only the data table, E3.1, can be read')])
+def test_addresses_of_plc2_and_plc3_that_are_none(plc: str, address: str, number: int,
+                                                  right: str) -> None:
+    text = fault(PLC_Type=plc, Address=address)
+    assert text.startswith(f'2:3 (Address): {number} ')
+    assert right in text
+
+
+def test_mapping_ends_with_the_last_word_of_a_plc2() -> None:
+    assert 'the last word there can be is 77777' in fault(
+        PLC_Type='PLC2', Address='77777', Length='2')
+
+
+@pytest.mark.parametrize('command', ['Write', 'ReadWrite'])
+def test_bits_of_a_common_interface_file_are_not_written(command: str) -> None:
+    cells = {'PLC_Type': 'PLC2', 'Address': '020/05', 'Access': 'CIF'}
+    assert fault(**cells, Command=command) == (
+        '2:3 (Address): Item: 1, Access CIF has no command that changes single bits; write the '
+        'whole word, or only read')
+    assert one(**cells, Command='Read').type is ValueType.BOOL
+
+
+@pytest.mark.parametrize('address', ['T:4.CTL', 'T:4/DN', 'C:4.CTL/17'])
+def test_control_bits_of_a_plc3_belong_to_its_program(address: str) -> None:
+    assert fault(PLC_Type='PLC3', Address=address, Command='Write').startswith('2:3 (Address): ')
+
+
+# Structures, flat I/O and processors
+
+@pytest.mark.parametrize(('plc', 'address', 'length', 'kind'), [
+    ('PLC5', 'PD10:0.SP', '1', 'float32'), ('PLC5', 'PD10:0.SP', '24', 'float32'),
+    ('PLC5', 'PD10:398/INI', '1', 'bool'), ('PLC5', 'MG9:0.ERR', '3', 'int16'),
+    ('PLC5', 'BT9:0', '12', 'int16'), ('PLC5', 'SC9:0/SA', '1', 'bool'),
+    ('SLC', 'PD10:0.SPV', '1', 'int16'), ('SLC', 'MG9:0/DN', '1', 'bool'),
+    ('SLC', 'PD10:0', '23', 'int16')])
+def test_parts_of_structures(plc: str, address: str, length: str, kind: str) -> None:
+    mapping = one(PLC_Type=plc, Address=address, Length=length, Command='Read')
+    assert (mapping.type.value, mapping.cell('Address')) == (kind, address)
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Address': 'PD9:0.SP', 'Length': '25'},
+     '2:6 (Length): Item: 1, 25 float32 from PD9:0.SP reach to PD9:0.50, where words of 16 bits '
+     'are'),
+    ({'Address': 'PD9:0.SP', 'Type': 'int16'},
+     '2:7 (Type): Item: 1, PD9:0.SP can be float32'),
+    ({'Address': 'PD9:0.50', 'Type': 'float32'},
+     '2:7 (Type): Item: 1, PD9:0.50 can be int16, uint16'),
+    ({'Address': 'PD9:0.3'},
+     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (PD9:0.3); word 3 '
+     'is the second half of a float32; write the first, 2'),
+    ({'Address': 'MG9:0/EN', 'Command': 'Write'},
+     '2:3 (Address): Item: 1, MG9:0/EN belongs to the processor; of such an element can be '
+     'written: TO, CO')])
+def test_parts_of_structures_that_do_not_go(cells: dict[str, str], text: str) -> None:
+    assert fault(**{'Command': 'Read'} | cells) == text
+
+
+def test_io_by_the_word_of_the_image() -> None:
+    mapping = one(PLC_Type='SLC', Address='i:5/3', Access='Flat', Command='Read')
+    assert (mapping.cell('Address'), mapping.address.is_flat) == ('I:5/3', True)
+    text = fault(PLC_Type='SLC', Address='I:1.0', Access='Flat', Command='Read')
+    assert text.endswith('with access Flat write the word of the whole image, as in I:5 or O:0/3')
+
+
+@pytest.mark.parametrize('processor', Processor)
+def test_processor(processor: Processor) -> None:
+    mapping = one(PLC_Type='SLC', Processor=processor.value.lower())
+    assert (mapping.processor, mapping.cell('Processor')) == (processor, processor.value)
+    assert mapping.dialect is dialect_of(PlcType.SLC, None, processor)
+
+
+def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
+    mapping = one(PLC_Type='SLC', Address='L10:0', Command='Read')  # or for a MicroLogix
+    assert (mapping.processor, mapping.cell('Processor')) == (None, '')
+    assert mapping.dialect is dialect_of(PlcType.SLC, None, Processor.SLC_5_03)
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Processor': '5/06'}, '(Processor): Item: 1, Processor = "5/06" should be one of 5/01, '
+                            '5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400, ML1500'),
+    ({'Processor': '5/03', 'PLC_Type': 'PLC5'}, '(Processor): Item: 1, Processor is for PLCs of '
+     'type SLC that we read or write; leave the cell empty'),
+    ({'Processor': '5/03', 'Command': 'Serve'}, '(Processor): Item: 1, Processor is for PLCs of '
+     'type SLC that we read or write; leave the cell empty'),
+    ({'Processor': '5/05', 'Address': 'L10:0'}, '(Address): Item: 1, 5/05 has no file L10'),
+    ({'Processor': '5/02', 'Address': 'F8:0'}, '(Address): Item: 1, 5/02 has no file F8'),
+    ({'Processor': 'ML1000', 'Address': 'N10:0'}, '(Address): Item: 1, ML1000 has no file N10')])
+def test_processor_that_does_not_fit(cells: dict[str, str], text: str) -> None:
+    found, = faults(slc(**cells))
+    assert found.endswith(text)

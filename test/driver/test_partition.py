@@ -1,0 +1,136 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The cheapest way to put stretches of words into blocks."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+import itertools
+import math
+
+from abdf1_ros.driver.partition import cheapest, Draft, draft, Span, Terms, without_contained
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+
+COMMAND, WORD, LIMIT = 50.0, 2.0, 110
+COSTS = [COMMAND + WORD * words for words in range(LIMIT + 1)]
+TERMS = Terms(COSTS)
+
+SPANS = st.builds(lambda first, words: Span(first, first + words),
+                  st.integers(0, 150), st.sampled_from([1, 1, 1, 2, 5, 20]))
+
+
+def groupings(items: Sequence[Draft]) -> Iterable[list[list[Draft]]]:
+    """Yield every way to put items into groups."""
+    if not items:
+        yield []
+        return
+    head, *rest = items
+    for size in range(len(rest) + 1):
+        for others in itertools.combinations(rest, size):
+            left = [item for item in rest if item not in others]
+            for groups in groupings(left):
+                yield [[head, *others], *groups]
+
+
+def load(drafts: Iterable[Draft], terms: Terms = TERMS) -> float:
+    return sum(terms.cost(entry.span) / entry.period for entry in drafts)
+
+
+def least_load(wanted: Sequence[Draft], terms: Terms = TERMS) -> float:
+    """Return the least load there can be, by trying everything."""
+    def joined(group: Sequence[Draft]) -> Draft:
+        span = Span(min(entry.span.first for entry in group),
+                    max(entry.span.end for entry in group))
+        if len(group) > 1:
+            span = span.aligned(terms.per_element)
+        return Draft(span, min(entry.period for entry in group))
+    return min(load(map(joined, groups), terms) for groups in groupings(wanted))
+
+
+@PROPERTY
+@given(st.lists(SPANS, min_size=1, max_size=6, unique=True), st.sampled_from([1, 3]))
+def test_nothing_is_cheaper_where_all_have_one_period(spans: list[Span], element: int) -> None:
+    terms = Terms(COSTS[:LIMIT // element * element + 1], element)
+    wanted = [Draft(span.aligned(element), 1.0) for span in spans]
+    blocks = cheapest([entry.span for entry in wanted], terms)
+    assert load((Draft(block, 1.0) for block in blocks), terms) == pytest.approx(
+        least_load(list(dict.fromkeys(wanted)), terms))
+    for entry in wanted:
+        assert any(block.holds(entry.span) for block in blocks)
+
+
+@PROPERTY
+@given(st.lists(st.tuples(SPANS, st.sampled_from([0.1, 0.5, 1.0])), min_size=1, max_size=6,
+                unique=True))
+def test_plan_of_several_periods_serves_all_and_is_never_worse_than_apart(
+        wanted: list[tuple[Span, float]]) -> None:
+    needed = defaultdict(list)
+    for span, period in wanted:
+        needed[period].append(span)
+    drafts = draft(needed, TERMS, 0.0)
+    for span, period in wanted:
+        assert any(entry.span.holds(span) and entry.period <= period for entry in drafts)
+    apart = sum(load(Draft(span, period) for span in cheapest(spans, TERMS))
+                for period, spans in needed.items())
+    best = least_load([Draft(span, period) for span, period in wanted])
+    assert best * (1 - 1e-9) <= load(drafts) <= apart * (1 + 1e-9)
+
+
+def test_plan_of_two_periods_is_the_best_there_is() -> None:
+    """A slow one beside a fast block, one within it, and one far from it."""
+    needed = {0.1: [Span(0, 10), Span(14, 16)],
+              1.0: [Span(12, 13), Span(16, 17), Span(60, 61)]}
+    drafts = draft(needed, TERMS, 0.0)
+    assert drafts == [Draft(Span(0, 17), 0.1), Draft(Span(60, 61), 1.0)]
+    wanted = [Draft(span, period) for period, spans in needed.items() for span in spans]
+    assert load(drafts) == pytest.approx(least_load(wanted))
+
+
+def test_on_a_full_line_periods_make_no_difference() -> None:
+    needed = {0.1: [Span(0, 1)], 5.0: [Span(20, 21)]}
+    assert len(draft(needed, TERMS, 0.0)) == 2
+    assert draft(needed, TERMS, 10.0) == [Draft(Span(0, 21), 0.1)]
+
+
+@PROPERTY
+@given(st.lists(SPANS, min_size=1, max_size=30), st.lists(SPANS, max_size=5))
+def test_blocks_keep_to_the_limit_and_around_what_was_refused(
+        spans: list[Span], refused: list[Span]) -> None:
+    terms = Terms(COSTS, refused=refused)
+    needed = [span for span in spans if not any(map(span.holds, refused))]
+    for block in cheapest(needed, terms):
+        assert block.words <= LIMIT
+        assert block in needed or not any(map(block.holds, refused))
+
+
+def test_block_that_cannot_be_has_no_price() -> None:
+    terms = Terms(COSTS, refused=[Span(5, 7)])
+    assert terms.cost(Span(0, LIMIT)) == math.inf
+    assert terms.cost(Span(6, LIMIT)) < math.inf
+    assert terms.cost(Span(0, 6)) < math.inf
+    assert terms.cost(Span(10, 11 + LIMIT)) == math.inf
+
+
+@PROPERTY
+@given(st.lists(SPANS))
+def test_without_contained_keeps_what_no_other_holds(spans: list[Span]) -> None:
+    kept = without_contained(spans)
+    assert kept == sorted(kept)
+    assert set(kept) == {span for span in spans if not any(
+        other.holds(span) and other != span for other in spans)}

@@ -1,0 +1,231 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is said of a write whose reply was lost, after the PLC has been read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.df1.frames import EOT, STX
+from abdf1_ros.driver.forecast import line_model
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
+from abdf1_ros.driver.read_backs import ReadBacks
+from abdf1_ros.driver.transactions import Ending
+from abdf1_ros.errors import CommandTimeout
+import pytest
+from support.driver_bench import DriverBench
+from support.mappings import make_mapping
+
+LOST = Ending(Outcome.UNKNOWN, 'lost', 0, CommandTimeout())
+PATIENCE = 2.0
+EARLY = 10.0
+
+
+def block_of(mapping: Mapping) -> Block:
+    """Return the block that reads a mapping alone."""
+    block, = Planner(line_model(Network()), 1.0).plan([mapping])
+    return block
+
+
+class Doubtful:
+    """One write without a reply, which some block reads."""
+
+    def __init__(self, read: Mapping, mapping: Mapping, values: list[float] | str) -> None:
+        self.block = block_of(read)
+        self.results: list[WriteResult] = []
+        self.backs = ReadBacks(PATIENCE, self.results.append)
+        self.backs.add(Write(mapping, values, EARLY), LOST, [self.block], EARLY)
+
+    def read(self, data: bytes, started: float = EARLY) -> None:
+        """Read the block."""
+        self.backs.read(self.block, data, started, EARLY + 1)
+
+    @property
+    def details(self) -> list[str]:
+        """Return what was said; the outcome stays what it was."""
+        assert all(result.outcome is Outcome.UNKNOWN for result in self.results)
+        return [result.detail for result in self.results]
+
+
+HELD = 'lost; read back: the PLC holds the value'
+OVERTAKEN = 'lost; not read back: a newer write of these words has gone out'
+OTHER = 'lost; read back: the PLC holds another value'
+
+
+@pytest.mark.parametrize(('cells', 'values', 'data', 'detail'), [
+    ({}, [-2], b'\xfe\xff', HELD), ({}, [-2], b'\xff\xff', OTHER),
+    ({'kind': 'bcd16'}, [1234], b'\x34\x12', HELD),
+    ({'kind': 'bcd16'}, [1234], b'\x3a\x12', OTHER),
+    ({'text': 'F8:0'}, [0.1], b'\xcd\xcc\xcc\x3d', HELD),
+    ({'text': 'B3:0/4', 'length': 2}, [1, 0], b'\xd7\xff', HELD),  # neighbours do not count
+    ({'text': 'B3:0/4', 'length': 2}, [1, 0], b'\x20\x00', OTHER),
+    ({'text': 'ST9:0'}, 'ab', b'\x02\x00ba' + bytes(82), HELD),
+    ({'text': 'ST9:0'}, 'ab', b'\x02\x00ab' + bytes(82), OTHER),
+    ({'text': 'ST9:0'}, 'ab', b'\xff\xff' + bytes(84), OTHER)])
+def test_what_is_read_is_compared(cells: dict[str, str], values: list[float] | str, data: bytes,
+                                  detail: str) -> None:
+    mapping = make_mapping(command='ReadWrite', **cells)  # type: ignore[arg-type]
+    doubtful = Doubtful(mapping, mapping, values)
+    assert doubtful.details == []
+    doubtful.read(data)
+    assert doubtful.details == [detail]
+    assert doubtful.results[0].latency == 1.0
+    doubtful.read(data)
+    assert len(doubtful.results) == 1
+
+
+def test_words_are_found_within_a_larger_block() -> None:
+    doubtful = Doubtful(make_mapping('N7:0', length=4), make_mapping('N7:2', 'Write'), [5])
+    doubtful.read(b'\5\0\5\0\5\0\6\0')
+    assert doubtful.details == [HELD]
+
+
+@pytest.mark.parametrize(('text', 'length', 'station'), [
+    ('N7:1', 2, 1), ('N7:0', 1, 2), ('N8:0', 1, 1), ('N7:2', 1, 1)])
+def test_nothing_reads_all_of_the_words(text: str, length: int, station: int) -> None:
+    mapping = make_mapping(text, 'Write', length=length, station=station)
+    doubtful = Doubtful(make_mapping('N7:0', length=2), mapping, [1] * length)
+    assert doubtful.details == ['lost; not read back: no row reads all of these words']
+    assert doubtful.backs.next_due() is None
+
+
+def test_read_that_began_before_the_write_ended_says_nothing() -> None:
+    mapping = make_mapping('N7:0', 'ReadWrite')
+    doubtful = Doubtful(mapping, mapping, [5])
+    doubtful.read(b'\5\0', EARLY - 0.001)
+    assert doubtful.details == []
+
+
+def test_patience_ends() -> None:
+    mapping = make_mapping('N7:0', 'ReadWrite')
+    doubtful = Doubtful(mapping, mapping, [5])
+    assert doubtful.backs.next_due() == EARLY + PATIENCE
+    doubtful.backs.expire(EARLY + PATIENCE - 0.001)
+    assert doubtful.details == []
+    doubtful.backs.expire(EARLY + PATIENCE)
+    assert doubtful.details == ['lost; not read back within 2 s']
+    assert doubtful.backs.next_due() is None
+
+
+@pytest.mark.parametrize(('text', 'is_overtaken'), [('N7:0', True), ('N7:1', False)])
+def test_newer_write_ends_the_wait_for_the_same_words(text: str, is_overtaken: bool) -> None:
+    mapping = make_mapping('N7:0', 'ReadWrite')
+    doubtful = Doubtful(mapping, mapping, [5])
+    doubtful.backs.overtaken(Write(make_mapping(text, 'Write'), [6], EARLY), EARLY)
+    assert doubtful.details == ([OVERTAKEN] if is_overtaken else [])
+
+
+def test_end_of_the_line() -> None:
+    mapping = make_mapping('N7:0', 'ReadWrite')
+    doubtful = Doubtful(mapping, mapping, [5])
+    doubtful.backs.end(EARLY)
+    assert doubtful.details == ['lost; not read back before the line went down']
+
+
+def bench_of(text: str = 'N7:0', **cells: int) -> tuple[DriverBench, Mapping]:
+    """Return a driver that reads and writes one address of a PLC-5, slowly."""
+    mapping = make_mapping(text, 'ReadWrite', period=60_000, **cells)  # type: ignore[arg-type]
+    bench = DriverBench([mapping], settings=DriverSettings(write_timeout=PATIENCE))
+    bench.plc(1, 'PLC5', ('N7:0', 10), ('B3:0', 10))
+    bench.run(1.0)
+    return bench, mapping
+
+
+def no_replies(data: bytes) -> bytes:
+    """Let no message through."""
+    return b'' if data.startswith(STX) else data
+
+
+def not_yet(data: bytes) -> bytes:
+    """Make EOT of each message."""
+    return EOT if data.startswith(STX) else data
+
+
+def nothing(data: bytes) -> bytes:
+    """Let nothing through."""
+    return b''
+
+
+@pytest.mark.parametrize(('which', 'through', 'detail', 'held'), [
+    ('say', no_replies, 'read back: the PLC holds the value', b'\7\0'),
+    ('hear', nothing, 'read back: the PLC holds another value', b'\0\0')])
+def test_lost_reply_and_lost_command_are_told_apart(
+        which: str, through: Callable[[bytes], bytes], detail: str, held: bytes) -> None:
+    bench, mapping = bench_of()
+    setattr(bench.far, which, through)
+    bench.write(mapping, [7])
+    bench.at(bench.clock() + 0.75, lambda: setattr(bench.far, which, bytes))
+    bench.run(1.5)
+    result, = bench.listener.results
+    assert result.outcome is Outcome.UNKNOWN
+    assert result.detail.endswith(f'; {detail}')
+    assert result.latency < 1.2
+    plc_value = bench.listener.values(mapping)[-1]
+    assert plc_value == [int.from_bytes(held, 'little')]
+
+
+def test_late_answer_of_a_station_that_is_still_there() -> None:
+    bench, mapping = bench_of('B3:0/1')
+    bench.far.say = not_yet
+    bench.write(mapping, [1])
+    bench.at(bench.clock() + 1.0, lambda: setattr(bench.far, 'say', bytes))
+    bench.run(3.0)
+    result, = bench.listener.results
+    assert str(result) == ('unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed '
+                           'Out; read back: the PLC holds the value')
+
+
+def test_station_that_stays_away_is_not_waited_for_longer_than_a_write_waits() -> None:
+    bench, mapping = bench_of()
+    bench.far.say = nothing
+    bench.write(mapping, [7])
+    bench.run(0.9)
+    assert bench.listener.results == []
+    bench.run(2.2)
+    result, = bench.listener.results
+    assert result.detail.endswith('; not read back within 2 s')
+    assert 2.7 < result.latency < 3.1
+
+
+def test_lost_port_leaves_no_write_without_a_result() -> None:
+    bench, mapping = bench_of()
+    bench.far.say = nothing
+    bench.write(mapping, [7])
+    bench.run(1.0)
+    bench.lose_port()
+    result, = bench.listener.results
+    assert result.detail.endswith('; not read back before the line went down')
+    bench.far.say = bytes
+    bench.open()
+    bench.run(5.0)
+    assert len(bench.listener.results) == 1
+
+
+def test_second_writer_does_not_make_the_first_one_wrong() -> None:
+    bench, mapping = bench_of()
+    bench.far.say = not_yet
+    bench.write(mapping, [7])
+    bench.at(bench.clock() + 0.5, lambda: bench.write(mapping, [8]))
+    bench.at(bench.clock() + 1.02, lambda: setattr(bench.far, 'say', bytes))
+    bench.run(3.0)
+    assert [result.outcome for result in bench.listener.results] == [
+        Outcome.UNKNOWN, Outcome.WRITTEN]
+    assert bench.listener.results[0].detail.endswith(
+        '; not read back: a newer write of these words has gone out')
+    assert bench.listener.values(mapping)[-1] == [8]

@@ -1,0 +1,267 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which read goes first, and how reads share a line that is too slow for all of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from functools import cache
+from itertools import pairwise
+from statistics import fmean
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.forecast import block_time, intervals, load, PATIENCE
+from abdf1_ros.driver.line_model import LineModel
+from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.driver.points import ReadPoint, Write
+from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
+from abdf1_ros.errors import RemoteError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+from support.mappings import make_mapping
+from support.properties import PROPERTY
+
+LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.0001))
+
+
+@cache
+def make_block(period: int, text: str, length: int) -> Block:
+    mapping = make_mapping(text, plc='SLC', length=length, period=period)
+    block, = Planner(LINE, 0.1).plan([mapping])
+    return block
+
+
+def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:
+    block = make_block(period, text, length)
+    return ReadJob(block, [ReadPoint(block.mappings[0], period / 1000, 1.0)])
+
+
+TOOK = block_time(make_job().block)
+"""Seconds that each of these reads has the line."""
+
+
+def make_queue(*jobs: ReadJob) -> ReadQueue:
+    queue = ReadQueue()
+    queue.replace((), jobs, 0.0)
+    return queue
+
+
+def starts(periods: dict[int, int], seconds: float,
+           took: float = TOOK) -> dict[ReadJob, list[float]]:
+    """Return when each read starts on a line; ``periods`` says how many there are of each."""
+    jobs = [make_job(period) for period, count in periods.items() for _ in range(count)]
+    queue, found, now = make_queue(*jobs), defaultdict(list), 0.0
+    while now < seconds:
+        job = queue.take(now)
+        if job is None:
+            now = queue.next_due() or now
+            continue
+        found[job].append(now)
+        queue.put(job, max(job.due + job.block.period, now))
+        now += took
+    return {job: found[job] for job in jobs}
+
+
+def mean_intervals(periods: dict[int, int], seconds: float = 60.0) -> dict[int, list[float]]:
+    """Return the mean interval (ms) of each read once the line has settled, by period."""
+    means = defaultdict(list)
+    for job, times in starts(periods, seconds).items():
+        settled = [later - earlier for earlier, later in pairwise(times) if earlier > seconds / 4]
+        means[round(1000 * job.block.period)].append(1000 * fmean(settled))
+    return means
+
+
+def needed(periods: dict[int, int]) -> float:
+    """Return the load of a line with so many reads of each period."""
+    return load([make_job(period).block for period, count in periods.items()
+                 for _ in range(count)])
+
+
+def count_for(share: float, period: int) -> int:
+    """Return how many reads of a period need that share of the line."""
+    return round(share * period / 1000 / TOOK)
+
+
+def test_earliest_deadline_goes_first() -> None:
+    slow, fast, slower = make_job(1000), make_job(100), make_job(2000)
+    queue = make_queue(slow, slower, fast)
+    assert [queue.take(0.0) for _ in range(4)] == [fast, slow, slower, None]
+    queue.put(slow, 0.5)  # to be read before 1.5
+    queue.put(fast, 1.35)  # before 1.45
+    queue.put(slower, 0.0)  # before 2.0
+    assert [queue.take(1.4) for _ in range(4)] == [fast, slow, slower, None]
+
+
+def test_nothing_goes_before_it_is_due() -> None:
+    job, other = make_job(100), make_job(1000)
+    queue = make_queue()
+    queue.replace((), [job, other], 5.0)
+    assert (queue.first(4.999), queue.take(4.999), queue.next_due()) == (None, None, 5.0)
+    assert queue.first(5.0) is job
+    assert [queue.take(5.0), queue.take(5.0), queue.next_due()] == [job, other, None]
+
+
+def test_schedule_by_hand() -> None:
+    # 40 ms each: one every 100 ms, one every 200 ms, one every 400 ms, 70 % of the line.
+    found = starts({100: 1, 200: 1, 400: 1}, 0.79, took=0.04)
+    at = [[round(1000 * time) for time in times] for times in found.values()]
+    assert at == [
+        [0, 120, 200, 300, 400, 520, 600, 700],
+        [40, 240, 440, 640],
+        [80, 480]]
+
+
+def test_schedule_by_hand_of_a_line_that_is_too_slow() -> None:
+    # 125 ms each: one every 125 ms, one every 250 ms, 150 % of the line.
+    fast, slow = starts({125: 1, 250: 1}, 1.49, took=0.125).values()
+    assert [round(8 * time) for time in fast] == [0, 1, 3, 4, 6, 7, 9, 10]
+    assert [round(8 * time) for time in slow] == [2, 5, 8, 11]
+
+
+@pytest.mark.parametrize('share', [0.5, 0.8, 0.95])
+def test_periods_are_kept_as_long_as_the_line_is_fast_enough(share: float) -> None:
+    periods = {100: 1, 1000: count_for(share - TOOK / 0.1, 1000)}
+    assert needed(periods) == pytest.approx(share, abs=0.03)
+    for job, times in starts(periods, 30.0).items():
+        period = job.block.period
+        late = [round(time - number * period, 9) for number, time in enumerate(times)]
+        assert 0 <= min(late) <= max(late) <= period
+        if period == 0.1:  # a fast one waits for one other only, which has begun
+            assert max(late) <= TOOK
+
+
+@pytest.mark.parametrize('share', [1.25, 1.5, 2.0, 4.0])
+def test_line_that_is_too_slow_makes_every_period_longer_by_its_load(share: float) -> None:
+    periods = {100: 1, 1000: count_for(share - TOOK / 0.1, 1000)}
+    means = mean_intervals(periods)
+    for period in periods:  # the fast one waits for what has begun, and for the next turn
+        wanted = period * needed(periods)
+        assert 0.95 * wanted <= fmean(means[period]) <= wanted + 2000 * TOOK
+
+
+@pytest.mark.parametrize('periods', [
+    {100: 3, 1000: 60}, {200: 5, 500: 20, 5000: 100}, {0: 10, 100: 3, 1000: 60}, {0: 12}])
+def test_all_of_one_period_fall_behind_alike(periods: dict[int, int]) -> None:
+    for means in mean_intervals(periods).values():
+        assert max(means) - min(means) <= 0.06 * fmean(means)
+
+
+def test_period_that_no_line_can_do_does_not_shut_out_the_others() -> None:
+    means = mean_intervals({10: 30, 1000: 1})
+    once = 1000 * 31 * TOOK
+    assert 1000 < means[1000][0] < 1000 + once
+    assert fmean(means[10]) < 1.1 * once
+
+
+def test_reads_without_a_period_take_what_the_others_leave() -> None:
+    periods = {0: 4, 100: 1, 1000: count_for(0.5, 1000)}
+    means = mean_intervals(periods)
+    assert fmean(means[100]) == pytest.approx(100, rel=0.01)
+    assert fmean(means[1000]) == pytest.approx(1000, rel=0.01)
+    left = 1 - needed({100: 1, 1000: periods[1000]})
+    assert fmean(means[0]) == pytest.approx(4 * 1000 * TOOK / left, rel=0.05)
+
+
+def test_reads_without_a_period_have_their_turn_on_a_full_line() -> None:
+    periods = {0: 4, 1000: count_for(1.5, 1000)}
+    once = 1000 * TOOK * sum(periods.values())
+    means = mean_intervals(periods)
+    assert fmean(means[0]) < (PATIENCE + 1) * once
+    assert fmean(means[1000]) < 1000 * 1.6
+
+
+@settings(PROPERTY, max_examples=20)
+@given(st.dictionaries(st.sampled_from([0, 50, 100, 200, 500, 1000, 2000, 5000]),
+                       st.integers(1, 25), min_size=1, max_size=3))
+def test_forecast_is_what_comes(periods: dict[int, int]) -> None:
+    jobs = [make_job(period) for period, count in periods.items() for _ in range(count)]
+    expected = intervals([job.block for job in jobs])
+    for period, means in mean_intervals(periods, 40.0).items():
+        assert max(means) <= 2 * 1000 * (expected[period / 1000] + TOOK)
+
+
+def test_job_that_is_put_again_is_there_once() -> None:
+    job = make_job(10_000)
+    queue = make_queue(job)
+    queue.put(job, 3.0)
+    queue.put(job, 2.0)
+    assert queue.next_due() == 2.0
+    assert [queue.take(9.0), queue.take(9.0)] == [job, None]
+    assert not queue
+
+
+def test_job_that_was_replaced_never_comes() -> None:
+    old, kept, new = make_job(), make_job(), make_job()
+    queue = make_queue(old, kept)
+    queue.replace([old], [new], 0.0)
+    assert queue.jobs == {kept, new}
+    queue.put(old, 0.0)
+    assert {queue.take(1.0), queue.take(1.0)} == {kept, new}
+    assert queue.take(1.0) is None
+
+
+def test_packets_of_a_long_block_go_one_by_one_and_others_between_them() -> None:
+    long, fast = make_job(10_000, length=354), make_job(100)
+    assert len(long.block.requests) == 3
+    queue = make_queue(long, fast)
+    order = []
+    for number in range(4):
+        for job in (queue.take(0.1 * number), queue.take(0.1 * number)):
+            if job is long and read_packet_of(job, 0.1 * number) is not None:
+                order.append('done')
+            elif job is not None:
+                order.append('long' if job is long else 'fast')
+                queue.put(job, job.due if job.is_under_way else job.due + job.block.period)
+    assert order == ['fast', 'long', 'fast', 'long', 'fast', 'done', 'fast']
+
+
+def read_packet_of(job: ReadJob, now: float) -> bytes | None:
+    """Have a job read its next packet; return what it returns."""
+    steps = job.read_on(now)
+    cmd, _ = next(steps)
+    try:
+        steps.send(Packet(0, 1, cmd | 0x40, 0, 1, bytes(2 * job.block.requests[0].words)))
+    except StopIteration as end:
+        result: bytes | None = end.value
+        return result
+    raise AssertionError('a packet is one request')
+
+
+def test_long_read_begins_anew_after_an_error() -> None:
+    job = make_job(length=236)
+    assert read_packet_of(job, 1.0) is None
+    assert (job.is_under_way, job.started) == (True, 1.0)
+    steps = job.read_on(2.0)
+    next(steps)
+    with pytest.raises(RemoteError):
+        steps.throw(RemoteError(0x10, 0, 'refused'))
+    assert (job.is_under_way, job.started) == (False, 1.0)
+    assert read_packet_of(job, 3.0) is None
+    assert job.started == 3.0
+    job.interrupted()
+    assert not job.is_under_way
+
+
+def test_coverage_of_a_write_is_by_words() -> None:
+    job = make_job(text='N7:5')
+    for text, length, covered in [
+            ('N7:5', 1, True), ('N7:4', 1, False), ('N7:6', 1, False), ('N7:4', 2, True),
+            ('N7:5/3', 1, True), ('N7:4/15', 2, True), ('N7:4/14', 2, False)]:
+        mapping = make_mapping(text, 'Write', plc='SLC', length=length)
+        assert job.covers(Write(mapping, [0] * length, 0.0)) is covered, text

@@ -1,0 +1,173 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Blocks that a station refuses: divided, learned, and joined again around what is bad."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.driver.line_model import LineModel
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.partition import Span
+from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.driver.refusals import Refusals
+from hypothesis import given
+from hypothesis import strategies as st
+from support.mappings import make_mapping
+from support.properties import PROPERTY
+
+LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
+
+
+def words(*elements: int) -> list[Mapping]:
+    return [make_mapping(f'N7:{element}') for element in elements]
+
+
+class Plc:
+    """A PLC that lacks some words, and a driver that reads what is planned round by round."""
+
+    def __init__(self, mappings: Sequence[Mapping], *missing: int) -> None:
+        self.missing = set(missing)
+        self.refused = 0
+        self.failed: set[str] = set()
+        self._planner = Planner(LINE, 0.1)
+        self._refusals = Refusals(self._planner)
+        self.blocks = self._planner.plan(mappings)
+
+    def lacks(self, span: Span) -> bool:
+        """Tell whether a word is not there."""
+        return any(span.first <= word < span.end for word in self.missing)
+
+    def read(self, block: Block) -> bool:
+        """Read a block; return whether other blocks take its place."""
+        tags = {mapping.tag for mapping in block.mappings}
+        if self.lacks(block.span):
+            self.refused += 1
+            self.failed |= tags
+            change = self._refusals.refused(block)
+        else:
+            has_failed = not tags.isdisjoint(self.failed)
+            self.failed -= tags
+            change = self._refusals.recovered(block, self.blocks) if has_failed else None
+        if change is None:
+            return False
+        assert set(change.old) <= set(self.blocks)
+        self.blocks = [other for other in self.blocks if other not in change.old]
+        self.blocks += change.new
+        return True
+
+    def settle(self) -> None:
+        """Read until nothing changes any more."""
+        for _ in range(1000):
+            if not any([block in self.blocks and self.read(block)  # noqa: C419
+                        for block in list(self.blocks)]):
+                return
+        raise AssertionError('it never ends')
+
+    def spans(self) -> list[tuple[int, int]]:
+        """Return first word and end of the blocks."""
+        return sorted((block.span.first, block.span.end) for block in self.blocks)
+
+
+def test_neighbours_of_a_bad_mapping_are_read_together_again() -> None:
+    plc = Plc(words(*range(20)), 7)
+    assert plc.spans() == [(0, 20)]
+    plc.settle()
+    assert plc.spans() == [(0, 7), (7, 8), (8, 20)]
+    assert plc.failed == {'N7:7_1_Read_1'}
+
+
+def test_bad_one_is_found_by_halving() -> None:
+    plc = Plc(words(*range(64)), 41)
+    plc.settle()
+    assert plc.refused <= 1 + 6 + 2  # the whole, its halves, and the bad one as ever
+
+
+def test_gap_that_does_not_exist_is_not_bridged_again() -> None:
+    plc = Plc(words(0, 1, 2, 9, 10, 11), 5)
+    assert plc.spans() == [(0, 12)]
+    plc.settle()
+    assert plc.spans() == [(0, 3), (9, 12)]
+    assert not plc.failed
+    before = plc.refused
+    plc.settle()
+    assert plc.refused == before
+
+
+def test_end_of_a_file_that_is_too_short() -> None:
+    plc = Plc(words(*range(0, 40, 2)), *range(31, 40))
+    plc.settle()
+    assert (0, 31) in plc.spans()
+    assert plc.failed == {f'N7:{n}_1_Read_1' for n in range(32, 40, 2)}
+
+
+def test_bits_of_one_bad_word_stay_in_one_block() -> None:
+    bits = [make_mapping(f'B3:4/{bit}') for bit in range(16)]
+    plc = Plc([*bits, make_mapping('B3:3'), make_mapping('B3:5')], 4)
+    plc.settle()
+    assert plc.spans() == [(3, 4), (4, 5), (5, 6)]
+
+
+def test_mapping_within_a_bad_one_is_read_without_it() -> None:
+    inner, whole = make_mapping('N7:2'), make_mapping('N7:0', length=20)
+    plc = Plc([inner, whole], 15)
+    assert len(plc.blocks) == 1
+    plc.settle()
+    assert plc.spans() == [(0, 20), (2, 3)]
+    assert plc.failed == {whole.tag}
+
+
+def test_mapping_that_has_recovered_is_read_with_its_neighbours_again() -> None:
+    plc = Plc(words(*range(20)), 7)
+    plc.settle()
+    plc.missing.clear()
+    plc.settle()
+    assert plc.spans() == [(0, 20)]
+    assert not plc.failed
+
+
+def test_single_mapping_that_is_refused_is_asked_for_again() -> None:
+    plc = Plc(words(3), 3)
+    plc.settle()
+    assert plc.spans() == [(3, 4)]
+    plc.missing.clear()
+    plc.settle()
+    assert plc.spans() == [(3, 4)]
+    assert not plc.failed
+
+
+@PROPERTY
+@given(st.lists(st.tuples(st.integers(0, 80), st.sampled_from([1, 1, 1, 2, 5])), min_size=1,
+                max_size=25), st.sets(st.integers(0, 90), max_size=6))
+def test_only_mappings_that_are_not_there_fail_and_the_rest_is_read_as_planned(
+        places: list[tuple[int, int]], missing: set[int]) -> None:
+    mappings = [make_mapping(f'N7:{first}', length=length, tag=f'm{number}')
+                for number, (first, length) in enumerate(places)]
+    plc = Plc(mappings, *missing)
+    plc.settle()
+    bad = {mapping.tag for mapping in mappings if plc.lacks(Span(
+        mapping.address.offset, mapping.address.offset + mapping.length))}
+    assert plc.failed == bad
+    read = [mapping.tag for block in plc.blocks for mapping in block.mappings]
+    assert sorted(read) == sorted(mapping.tag for mapping in mappings)
+    for block in plc.blocks:
+        if plc.lacks(block.span):
+            assert len({(mapping.address, mapping.length) for mapping in block.mappings}) == 1
+    plc.missing.clear()
+    plc.settle()
+    assert not plc.failed

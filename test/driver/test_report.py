@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The report on both files: its figures are worked out by hand from the frames on the line."""
+
+from __future__ import annotations
+
+from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.report import Kind, make_report, Report
+import pytest
+from support.mappings import make_mapping
+
+CHARACTER = 10 / 9600  # s; 8 data bits, no parity, 1 stop bit
+# Command of 17 bytes in a frame of 26, ACK 2, poll 4, reply of 13 in a frame of 19, ACK 2.
+TWO_WORDS = 53 * CHARACTER
+ONE_WORD = 51 * CHARACTER  # the reply has one word less
+FULL_DUPLEX = 46 * CHARACTER  # no poll, and no address in front of the command
+TWO_WORDS_SLC = 45 * CHARACTER  # 12 bytes and 10
+ANSWERS = 0.02  # two, of 10 ms
+
+
+def report_of(*mappings: Mapping, period: float = 1.0, response: float = 0.01,
+              **settings: object) -> Report:
+    return make_report(Network(**settings), mappings, period, response)  # type: ignore[arg-type]
+
+
+def texts(report: Report, kind: Kind) -> list[str]:
+    return [remark.text for remark in report.remarks() if remark.kind is kind]
+
+
+@pytest.mark.parametrize('plc, settings, line_time', [
+    ('PLC5', {}, TWO_WORDS), ('SLC', {}, TWO_WORDS_SLC), ('PLC5', {'mode': 'Peer'}, FULL_DUPLEX),
+    ('PLC5', {'baud': 19200}, TWO_WORDS / 2), ('PLC5', {'tx_delay': 5}, TWO_WORDS + 0.015),
+    ('PLC5', {'parity': 'Even'}, TWO_WORDS * 1.1),
+    # BCC is one byte instead of two, in the command and in the reply.
+    ('PLC5', {'error_code': 'BCC'}, TWO_WORDS - 2 * CHARACTER)])
+def test_times_of_one_read(plc: str, settings: dict[str, object], line_time: float) -> None:
+    report = report_of(make_mapping('N7:0', plc=plc, length=2), **settings)
+    block, = report.blocks
+    assert block.line_time == pytest.approx(line_time)
+    assert report.time(block) == report.scan_time == pytest.approx(line_time + ANSWERS)
+    assert report.load == pytest.approx(line_time + ANSWERS)  # of one second
+    assert report.remarks() == []
+
+
+def test_slower_plc_makes_everything_slower() -> None:
+    report = report_of(make_mapping('N7:0', length=2), response=0.03)
+    assert report.scan_time == pytest.approx(TWO_WORDS + 0.06)
+
+
+def test_blocks_go_by_station_and_then_by_row() -> None:
+    report = report_of(make_mapping('N7:0', station=2, item=1), make_mapping('F8:0', item=2),
+                       make_mapping('B3:0', item=3))
+    assert [(block.station, str(block.start)) for block in report.blocks] == [
+        (1, 'F8:0'), (1, 'B3:0'), (2, 'N7:0')]
+
+
+def test_period_that_another_baud_rate_can_keep() -> None:
+    report = report_of(make_mapping('N7:0', length=2, period=50, tag='speed'))
+    assert report.load == pytest.approx((TWO_WORDS + ANSWERS) / 0.05)  # 150.4 %
+    assert report.needed_baud() == 19200  # 27.6 ms and 20 ms of 50 ms
+    assert texts(report, Kind.LOAD) == [
+        'the periods need 150% of the time there is at 9600 baud, so reads come late; '
+        '19200 baud would do']
+    assert texts(report, Kind.PERIOD) == [
+        'speed: a read takes 75.2 ms, the period is 50.0 ms']
+
+
+def test_period_that_no_baud_rate_can_keep() -> None:
+    report = report_of(make_mapping('N7:0', period=15))  # the answers alone take 20 ms
+    assert report.needed_baud() is None
+    assert 'no baud rate is enough, only longer periods' in texts(report, Kind.LOAD)[0]
+
+
+def test_together_the_periods_may_be_too_short_though_none_is() -> None:
+    mappings = [make_mapping('N7:0', length=2, station=station, period=100, item=station)
+                for station in (1, 2)]
+    report = report_of(*mappings)
+    assert report.load == pytest.approx(2 * (TWO_WORDS + ANSWERS) / 0.1)
+    assert texts(report, Kind.PERIOD) == []
+    assert len(texts(report, Kind.LOAD)) == 1
+
+
+@pytest.mark.parametrize('period, warned', [(90, True), (95, False)])
+def test_little_time_left(period: int, warned: bool) -> None:
+    # 75.2 ms are 84 % of 90 ms and 79 % of 95 ms.
+    report = report_of(make_mapping('N7:0', length=2, period=period))
+    assert bool(texts(report, Kind.LOAD)) is warned
+    assert not warned or '84% of the line' in texts(report, Kind.LOAD)[0]
+
+
+def test_as_often_as_the_line_allows_is_no_load() -> None:
+    report = report_of(make_mapping('N7:0', period=0))
+    assert report.load == 0
+    assert report.remarks() == []
+
+
+def test_our_own_station_is_mapped() -> None:
+    mapping = make_mapping('N7:0', station=5, tag='speed')
+    assert texts(report_of(mapping), Kind.STATION) == [
+        'station 5 of speed is our own Station in the net file; '
+        'two nodes of one address cannot talk']
+    assert texts(report_of(mapping, station=6), Kind.STATION) == []
+
+
+def test_served_words_and_broadcasts_clash_with_nothing() -> None:
+    report = report_of(make_mapping('N7:0', 'Serve', station=5),
+                       make_mapping('N7:0', 'Write', station=255, plc='SLC', item=2),
+                       make_mapping('N7:0', 'Write', station=255, item=3))
+    assert report.blocks == ()
+    assert report.remarks() == []
+
+
+def test_two_plc_types_at_one_station() -> None:
+    report = report_of(make_mapping('N7:0', tag='a'), make_mapping('F8:0', 'Write', tag='b'),
+                       make_mapping('B3:0', plc='SLC', tag='c', item=2))
+    assert texts(report, Kind.STATION) == [
+        'station 1 has more than one PLC_Type: PLC5 (a, b), SLC (c)']
+
+
+def test_common_interface_file_is_no_second_plc() -> None:
+    report = report_of(make_mapping('N7:0', plc='SLC'),
+                       make_mapping('011', plc='PLC2', access='CIF', item=2))
+    assert texts(report, Kind.STATION) == []
+
+
+def test_several_stations_in_full_duplex() -> None:
+    mappings = [make_mapping('N7:0', station=station, item=station) for station in (1, 3)]
+    assert texts(report_of(*mappings), Kind.STATION) == []
+    assert 'the map has stations 1, 3' in texts(report_of(*mappings, mode='Peer'),
+                                                Kind.STATION)[0]
+
+
+def test_gap_that_costs_a_second_read() -> None:
+    report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:200', item=2))
+    assert report.scan_time == pytest.approx(2 * (ONE_WORD + ANSWERS))
+    remark, = report.remarks()
+    assert (remark.kind, remark.station) == (Kind.GAP, 1)
+    assert remark.text == (
+        'station 1, N7:0 to N7:200: 2 reads with 0 words that no tag needs take 146.2 ms; '
+        'side by side in the PLC the tags would take 75.2 ms')
+
+
+def test_gap_that_is_read_across() -> None:
+    # 18 words nobody needs are 36 characters, and one more for each of two longer lengths.
+    report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:19', item=2))
+    block, = report.blocks
+    assert block.words == 20
+    text, = texts(report, Kind.GAP)
+    assert '1 read with 18 words that no tag needs' in text
+
+
+def test_neighbours_have_no_gap() -> None:
+    assert report_of(make_mapping('N7:0', item=1), make_mapping('N7:1', item=2)).remarks() == []
+
+
+def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:
+    report = report_of(make_mapping('T4:0.ACC', item=1), make_mapping('T4:200.ACC', item=2))
+    text, = texts(report, Kind.GAP)
+    assert text.startswith('station 1, T4:0.ACC to T4:200.ACC: 2 reads')
+
+
+def test_many_tags_are_not_all_named() -> None:
+    report = report_of(*(make_mapping(f'N7:{number}', period=20, tag=f't{number}', item=number)
+                         for number in range(5)))
+    assert texts(report, Kind.PERIOD)[0].startswith('t0, t1, t2 and 2 more: a read takes')

@@ -1,0 +1,153 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Engineering values: there and back, the rounding, and what cannot be scaled."""
+
+from __future__ import annotations
+
+from array import array
+import math
+
+from abdf1_ros.driver.scaling import Scaling
+from abdf1_ros.driver.values import ValueType
+from abdf1_ros.errors import FormatError
+from hypothesis import assume, given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+
+_WHOLE = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16)
+_SCALES = st.floats(allow_nan=False, allow_infinity=False) | st.floats(0.001, 1000.0)
+
+
+@PROPERTY
+@given(st.sampled_from(_WHOLE), st.floats(-1e6, 1e6), _SCALES, st.data())
+def test_value_just_published_gives_the_same_raw_value_back(
+        kind: ValueType, offset: float, scale: float, data: st.DataObject) -> None:
+    scaling = Scaling(scale, offset)
+    assume(scale != 0 and scaling.fault(kind) is None)
+    low, high = (int(end) for end in kind.range)
+    raw = data.draw(st.lists(st.integers(low, high) | st.sampled_from((low, high))))
+    published = scaling.publish(raw)
+    assert published.typecode == 'f'
+    assert all(map(math.isfinite, published))
+    assert scaling.raw(published, kind) == raw
+
+
+@PROPERTY
+@given(st.sampled_from(_WHOLE), st.integers(-30, 30), st.integers(0, 25), st.booleans())
+def test_finest_scale_beside_a_large_offset(
+        kind: ValueType, exponent: int, ratio: int, down: bool) -> None:
+    scaling = Scaling(2.0 ** exponent * (-1 if down else 1), 2.0 ** (exponent + ratio))
+    low, high = (int(end) for end in kind.range)
+    raw = [low, low + 1, 0, 1, high - 1, high]
+    if ratio < 23:  # one bit less than a float32 has
+        assert scaling.fault(kind) is None
+        assert scaling.raw(scaling.publish(raw), kind) == raw
+    else:
+        assert scaling.fault(kind)
+
+
+@PROPERTY
+@given(st.floats(-2.0**99, 2.0**99, width=32), st.floats(0.001, 1000), st.floats(-1000, 1000))
+def test_floats_come_back_as_near_as_their_digits_allow(
+        raw: float, scale: float, offset: float) -> None:
+    scaling = Scaling(scale, offset)
+    back, = scaling.raw(scaling.publish([raw]), ValueType.FLOAT32)
+    assert back == pytest.approx(raw, rel=1e-6, abs=2e-7 * abs(offset) / scale + 1e-37)
+
+
+@pytest.mark.parametrize('scale, offset, raw, value', [
+    (0.1, 0.0, 215, 21.5), (0.01, -40.0, 6150, 21.5), (-0.5, 0.0, 3, -1.5), (1.0, 0.5, 1, 1.5),
+    (0.001525902, -50.0, 32767, -0.000769)])
+def test_engineering_value(scale: float, offset: float, raw: int, value: float) -> None:
+    scaling = Scaling(scale, offset)
+    published = scaling.publish([raw])
+    assert list(published) == pytest.approx([value], abs=1e-6)
+    assert scaling.raw([value], ValueType.INT16) == [raw]
+
+
+@pytest.mark.parametrize('value, raw', [
+    (0.0, 0), (0.24, 0), (0.25, 0), (0.26, 1), (0.75, 2), (1.25, 2), (1.26, 3), (-0.25, 0),
+    (-0.75, -2), (-1.25, -2), (-0.26, -1)])
+def test_nearest_raw_value_is_written_and_halves_go_to_the_even_one(
+        value: float, raw: int) -> None:
+    assert Scaling(0.5, 0.0).raw([value], ValueType.INT16) == [raw]
+
+
+def test_floats_are_not_rounded_to_whole_numbers() -> None:
+    assert Scaling(2.0, 1.0).raw([1.5], ValueType.FLOAT32) == [0.25]
+
+
+@pytest.mark.parametrize('kind, scaling, value, error', [
+    (ValueType.INT16, Scaling(0.1, 0.0), 3276.76,
+     'value 3276.76 at index 1 is outside -3276.8 to 3276.7, the range of int16 with Scale 0.1, '
+     'Offset 0'),
+    (ValueType.UINT16, Scaling(-0.5, 10.0), 10.5,
+     'value 10.5 at index 1 is outside -32757.5 to 10, the range of uint16 with Scale -0.5, '
+     'Offset 10'),
+    (ValueType.BCD16, Scaling(1.0, 0.0), math.nan,
+     'value nan at index 1 is outside 0 to 9999, the range of bcd16 with Scale 1, Offset 0'),
+    (ValueType.UINT32, Scaling(0.001, 0.0), math.inf,
+     'value inf at index 1 is outside 0 to 4294967.295, the range of uint32 with Scale 0.001, '
+     'Offset 0'),
+    (ValueType.INT32, Scaling(1.0, 0.0), -math.inf,
+     'value -inf at index 1 is outside -2147483648 to 2147483647, the range of int32 with '
+     'Scale 1, Offset 0'),
+    (ValueType.FLOAT32, Scaling(0.5, 0.0), 3e38,
+     'value 3e+38 at index 1 is outside -1.701411733e+38 to 1.701411733e+38, the range of '
+     'float32 with Scale 0.5, Offset 0'),
+    (ValueType.FLOAT32, Scaling(1e-300, 0.0), 1e38,
+     'value 1e+38 at index 1 is outside -3.402823466e-262 to 3.402823466e-262, the range of '
+     'float32 with Scale 1e-300, Offset 0')])
+def test_value_that_the_raw_type_does_not_reach(
+        kind: ValueType, scaling: Scaling, value: float, error: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        scaling.raw([scaling.offset, value], kind)
+    assert str(caught.value) == error
+
+
+@pytest.mark.parametrize('value', [3276.7, 3276.74, -3276.8, -3276.84])
+def test_value_less_than_half_a_step_outside_is_rounded_into_the_range(value: float) -> None:
+    raw, = Scaling(0.1, 0.0).raw([value], ValueType.INT16)
+    assert raw in ValueType.INT16.range
+
+
+@pytest.mark.parametrize('kind, scaling, error', [
+    (ValueType.BOOL, Scaling(), 'Scale and Offset are for numbers, not for bool'),
+    (ValueType.STRING, Scaling(), 'Scale and Offset are for numbers, not for string'),
+    (ValueType.INT16, Scaling(0.001, 20000.0),
+     'a float32 has too few digits to tell the values apart in 19967.232 to 20032.767, the range '
+     'of int16 with Scale 0.001, Offset 20000'),
+    (ValueType.UINT16, Scaling(1e-46),
+     'a float32 has too few digits to tell the values apart in 0 to 6.5535e-42, the range of '
+     'uint16 with Scale 1e-46, Offset 0'),
+    (ValueType.BCD16, Scaling(1e35),
+     'a float32 cannot hold 0 to 9.999e+38, the range of bcd16 with Scale 1e+35, Offset 0'),
+    (ValueType.INT32, Scaling(1.0, -1e39),
+     'a float32 cannot hold -1e+39 to -1e+39, the range of int32 with Scale 1, Offset -1e+39')])
+def test_values_that_cannot_be_scaled(kind: ValueType, scaling: Scaling, error: str) -> None:
+    assert scaling.fault(kind) == error
+
+
+@pytest.mark.parametrize('kind, scaling', [
+    (ValueType.INT16, Scaling(0.001, 2000.0)), (ValueType.INT32, Scaling(0.001)),
+    (ValueType.UINT32, Scaling(1.0)), (ValueType.FLOAT32, Scaling(1000.0, -273.15)),
+    (ValueType.BCD16, Scaling(-0.01, 100.0))])
+def test_values_that_can_be_scaled(kind: ValueType, scaling: Scaling) -> None:
+    assert scaling.fault(kind) is None
+
+
+def test_what_a_float32_cannot_hold_is_published_as_infinite() -> None:
+    assert Scaling(2.0).publish([3e38, math.inf, 1.0]) == array('f', [math.inf, math.inf, 2.0])

@@ -1,0 +1,213 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is said to read, write and identify, one request and reply after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.line_model import LineModel
+from abdf1_ros.driver.network import Network
+from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.driver.transactions import (
+    carry_out,
+    echo,
+    Ending,
+    identify,
+    read_block,
+    read_values,
+    REWRITTEN,
+)
+from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.dialect import Request
+import pytest
+from support.mappings import make_mapping
+
+STATUS = bytes.fromhex('00ee34490535 2f3033202020202020200000060000001000'.replace(' ', ''))
+
+
+def reply(data: bytes = b'', sts: int = 0) -> Packet:
+    return Packet(5, 1, 0x4F, sts, 1, data)
+
+
+def converse(order: Generator[Request, Packet, object],
+             answers: Sequence[Packet | LinkError]) -> tuple[list[Request], object]:
+    """Return the requests of an order that gets these answers, and its result."""
+    requests = [next(order)]
+    for answer in answers:
+        try:
+            requests.append(order.throw(answer) if isinstance(answer, LinkError)
+                            else order.send(answer))
+        except StopIteration as end:
+            return requests, end.value
+    raise AssertionError(f'it wants more: {requests}')
+
+
+def block_of(text: str, length: int, plc: str = 'SLC') -> Block:
+    network = Network()
+    model = LineModel(network.checksum, network.duplex, network.timing)
+    block, = Planner(model, 1.0).plan([make_mapping(text, length=length, plc=plc)])
+    return block
+
+
+def test_block_of_two_packets() -> None:
+    block = block_of('N7:0', 130)  # an SLC gives 118 words at a time
+    first, second = bytes(range(236)), bytes(range(24))
+    requests, data = converse(
+        read_block(block), [reply(first), reply(second)])
+    assert requests == block.commands()
+    assert data == first + second
+
+
+def test_values_of_one_mapping() -> None:
+    block = block_of('N7:3', 2)
+    _, values = converse(read_values(block.mappings[0], block), [reply(b'\x01\x00\xff\xff')])
+    assert list(values) == [1, -1]  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize('answer, error', [
+    (reply(sts=0x50), RemoteError), (reply(b'\1'), FormatError), (CommandTimeout(), LinkError)])
+def test_read_that_fails(answer: Packet | LinkError, error: type[Exception]) -> None:
+    block = block_of('N7:3', 2)
+    with pytest.raises(error):
+        converse(read_values(block.mappings[0], block), [answer])
+
+
+def unsent() -> LinkError:
+    error = CommandTimeout()
+    error.sent = False
+    return error
+
+
+@pytest.mark.parametrize('answers, outcome, done', [
+    ([reply(), reply()], Outcome.WRITTEN, 2),
+    ([reply(sts=0x10)], Outcome.FAILED, 0),
+    ([reply(sts=0x02)], Outcome.UNKNOWN, 0),  # a node on the way has lost it, or its reply
+    ([CommandTimeout()], Outcome.UNKNOWN, 0),
+    ([unsent()], Outcome.NOT_SENT, 0),
+    ([reply(), CommandTimeout()], Outcome.PARTLY, 1),
+    ([reply(), reply(sts=0x10)], Outcome.PARTLY, 1)])
+def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcome,
+                              done: int) -> None:
+    write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
+    requests, ending = converse(carry_out(write), answers)
+    assert isinstance(ending, Ending)
+    assert requests == write.commands[:len(requests)]
+    assert (ending.outcome, ending.done) == (outcome, done)
+    assert (ending.error is None) is (outcome is Outcome.WRITTEN)
+    assert ('(after 1 of 2 packets were written)' in ending.detail) is (
+        outcome is Outcome.PARTLY)
+
+
+@pytest.mark.parametrize('answers, is_unsure', [
+    ([reply(), reply()], False), ([reply(sts=0x10)], False), ([unsent()], False),
+    ([reply(), reply(sts=0x10)], False), ([reply(), unsent()], False),
+    ([reply(sts=0x02)], True), ([CommandTimeout()], True), ([reply(), CommandTimeout()], True)])
+def test_what_a_read_has_to_show(answers: list[Packet | LinkError], is_unsure: bool) -> None:
+    write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
+    _, ending = converse(carry_out(write), answers)
+    assert isinstance(ending, Ending)
+    assert ending.is_unsure is is_unsure
+
+
+def test_broadcast_is_confirmed_by_nobody() -> None:
+    write = Write(make_mapping('N7:0', 'Write', station=255), [7], 0.0)
+    _, ending = converse(carry_out(write), [reply()])
+    assert ending == Ending(Outcome.BROADCAST, '', 1)
+
+
+def bit_write(processor: str | None = '5/01') -> Write:
+    mapping = make_mapping('B3:4/8', 'Write', plc='SLC', length=2, processor=processor)
+    return Write(mapping, [1, 0], 0.0)
+
+
+REFUSED = reply(sts=0x10)
+READ = (0x0F, bytes.fromhex('A2 02 03 85 04 00'))
+
+
+def test_refused_bits_are_written_by_reading_their_word_and_writing_it_back() -> None:
+    write = bit_write()
+    requests, ending = converse(carry_out(write), [REFUSED, reply(b'\xFF\xFE'), reply()])
+    assert requests == [*write.commands, READ, (0x0F, bytes.fromhex('AA 02 03 85 04 00 FF FD'))]
+    assert ending == Ending(Outcome.WRITTEN, REWRITTEN, 1)
+    assert 'a change that the PLC made in between is lost' in REWRITTEN
+
+
+def test_masked_write_that_is_taken_is_all() -> None:
+    assert converse(carry_out(bit_write()), [reply()]) == (
+        bit_write().commands, Ending(Outcome.WRITTEN, '', 1))
+
+
+@pytest.mark.parametrize('processor, sts', [(None, 0x10), ('5/03', 0x10), ('5/01', 0x50)])
+def test_other_refusals_of_bits_stay_failures(processor: str | None, sts: int) -> None:
+    requests, ending = converse(carry_out(bit_write(processor)), [reply(sts=sts)])
+    assert isinstance(ending, Ending)
+    assert (len(requests), ending.outcome, ending.done) == (1, Outcome.FAILED, 0)
+
+
+def test_words_are_never_read_and_written_back() -> None:
+    mapping = make_mapping('B3:4', 'Write', plc='SLC', processor='5/01')
+    requests, ending = converse(carry_out(Write(mapping, [3], 0.0)), [REFUSED])
+    assert isinstance(ending, Ending)
+    assert (len(requests), ending.outcome) == (1, Outcome.FAILED)
+
+
+@pytest.mark.parametrize('answers, outcome', [
+    ([reply(sts=0x50)], Outcome.FAILED), ([reply(sts=0x02)], Outcome.FAILED),
+    ([reply(b'\1')], Outcome.FAILED), ([CommandTimeout()], Outcome.NOT_SENT),
+    ([reply(b'\1\2'), reply(sts=0x10)], Outcome.FAILED),
+    ([reply(b'\1\2'), reply(sts=0x02)], Outcome.UNKNOWN),
+    ([reply(b'\1\2'), CommandTimeout()], Outcome.UNKNOWN),
+    ([reply(b'\1\2'), unsent()], Outcome.NOT_SENT)])
+def test_writing_back_that_fails(answers: list[Packet | LinkError], outcome: Outcome) -> None:
+    _, ending = converse(carry_out(bit_write()), [REFUSED, *answers])
+    assert isinstance(ending, Ending)
+    assert (ending.outcome, ending.done) == (outcome, 0)
+    assert ending.error is not None
+
+
+def test_reason_for_a_word_that_cannot_be_read_names_both_refusals() -> None:
+    _, ending = converse(carry_out(bit_write()), [REFUSED, reply(sts=0x50)])
+    assert isinstance(ending, Ending)
+    assert ending.detail == (
+        'STS 10: illegal command, format or length; its word cannot be read to be written back: '
+        'STS 50: address not there, or memory protected')
+
+
+def test_bits_of_two_words_of_which_one_fails_are_partly_written() -> None:
+    mapping = make_mapping('B3:4/15', 'Write', plc='SLC', length=2, processor='ML1000')
+    write = Write(mapping, [1, 1], 0.0)
+    requests, ending = converse(carry_out(write), [
+        REFUSED, reply(b'\0\0'), reply(), REFUSED, CommandTimeout()])
+    assert requests[3:] == [write.commands[1], (0x0F, bytes.fromhex('A2 02 03 85 05 00'))]
+    assert isinstance(ending, Ending)
+    assert (ending.outcome, ending.done) == (Outcome.PARTLY, 1)
+
+
+def test_identify() -> None:
+    requests, identity = converse(identify(), [reply(STATUS)])
+    assert requests == [(0x06, b'\x03')]
+    assert str(identity).startswith('SLC 5/03')
+
+
+def test_echo() -> None:
+    assert converse(echo(b'\1\2'), [reply(b'\1\2')]) == ([(0x06, b'\x00\1\2')], None)
+
+
+def test_echo_of_something_else() -> None:
+    with pytest.raises(FormatError, match='01 02 came back as 01'):
+        converse(echo(b'\1\2'), [reply(b'\1')])

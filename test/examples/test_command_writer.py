@@ -1,0 +1,149 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command writer, against a bridge with a simulator and against one that only listens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import runpy
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+import pytest
+from std_msgs.msg import Int16MultiArray
+from support.launch_stand_in import SOURCE
+from support.ros import Observer, Process
+from support.simulator_process import Files, make_files
+
+EXAMPLE = SOURCE / 'examples' / 'command_writer.py'
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return make_files(tmp_path_factory.mktemp('writer'))
+
+
+@pytest.fixture(scope='module')
+def simulator(files: Files) -> Iterator[Process]:
+    with files.start_simulator() as simulator, \
+            Process('node', *files.args(), '-r', '__ns:=/writing') as node:
+        node.wait_for(f'{files.port}: open')
+        yield simulator
+        node.end()
+
+
+def write(*args: str, node: str = '/writing/abdf1') -> tuple[int, str]:
+    """Return the exit status and the last line."""
+    with Process(EXAMPLE, '--timeout', '15', *args, '--node', node) as writer:
+        status = writer.result()
+    assert 'Traceback' not in writer.text
+    return status, writer.lines[-1]
+
+
+@pytest.mark.parametrize('words', [
+    ('recipe', '1', '2', '3', '4'), ('setpoint', '0.1'), ('name', 'Tank', '5'), ('lamp', '1'),
+    ('digits', '0x10', '99')])
+def test_value_that_the_plc_has_taken_is_written(
+        simulator: Process, words: tuple[str, ...]) -> None:
+    status, line = write(*words)
+    assert status == 0, line
+    assert line.startswith(f'{words[0]}: written (')
+
+
+def test_value_that_the_bridge_refuses_is_not_written(simulator: Process) -> None:
+    status, line = write('recipe', '1', '2', '3', '5000')
+    assert status == 1
+    assert line.startswith('recipe: not written: refused: value 5000 at index 3')
+
+
+def test_value_that_no_reply_confirms_is_unknown(simulator: Process) -> None:
+    simulator.say('slow 2 100000')
+    try:
+        status, line = write('setpoint', '3.5')
+    finally:
+        simulator.say('normal 2')
+    assert status == 3
+    assert line.startswith('setpoint: unknown whether written')
+
+
+def test_nobody_who_listens_is_not_written() -> None:
+    assert write('recipe', '1', '--timeout', '0.5', node='/nobody') == (
+        1, 'not written: /nobody does not listen to write/recipe')
+
+
+@pytest.mark.parametrize(('words', 'text'), [
+    (('recipe', '1', '2', '3', 'x'), '1 2 3 x: cannot be sent: invalid literal for int()'),
+    (('recipe', '1', '2', '3', '70000'), '1 2 3 70000: cannot be sent: signed short integer'),
+    (('a b', '1'), "1: cannot be sent: topic name '/writing/abdf1/write/a b' is invalid"),
+])
+def test_what_is_no_value_is_refused(
+        simulator: Process, words: tuple[str, ...], text: str) -> None:
+    status, line = write(*words)
+    assert status == 2
+    assert line.startswith(text)
+
+
+# A bridge that answers as the test wants
+
+Answer = Callable[[list[int]], list[tuple[str, str, str]]]
+
+
+def answered(answer: Answer, *args: str) -> tuple[int, list[str]]:
+    """Return exit status and lines; ``answer`` gives tag, text and value of each result."""
+    with Observer() as observer:
+        results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
+
+        def take(message: Int16MultiArray) -> None:
+            for tag, text, value in answer(list(message.data)):
+                pairs = [KeyValue(key='value', value=value),
+                         KeyValue(key='latency_ms', value='1.0')]
+                results.publish(DiagnosticStatus(name=tag, message=text, values=pairs))
+
+        observer.node.create_subscription(Int16MultiArray, '/fake/write/lamps', take, 10)
+        with Process(EXAMPLE, 'lamps', '7', '--node', '/fake', *args) as writer:
+            observer.until(lambda: not writer.is_running, 'the writer to end')
+            return writer.result(), writer.lines
+
+
+def test_results_of_other_mappings_and_other_writers_are_not_taken() -> None:
+    status, lines = answered(lambda data: [
+        ('recipe', 'not written: refused', '[7]'), ('lamps', 'not written: refused', '[8]'),
+        ('lamps', 'written', '[7]'), ('lamps', 'unknown whether written', '[7]')])
+    assert (status, lines) == (0, ['lamps: written (1.0 ms)'])
+
+
+def test_no_result_in_time_is_unknown() -> None:
+    status, lines = answered(lambda data: [], '--timeout', '4')
+    assert (status, lines) == (3, ['unknown whether written: no result within 4 s'])
+
+
+def test_every_mapping_of_the_topic_has_to_be_written() -> None:
+    tags = ('--tags', 'north', 'south', '--timeout', '4')
+    assert answered(lambda data: [('north', 'written', '[7]'), ('south', 'written', '[7]')],
+                    *tags)[0] == 0
+    status, lines = answered(lambda data: [('north', 'written', '[7]')], *tags)
+    assert (status, lines) == (
+        3, ['north: written (1.0 ms)', 'unknown whether written: no result within 4 s'])
+
+
+@pytest.mark.parametrize(('message', 'status'), [
+    ('written', 0),
+    ('not written: superseded by a newer value', 1),
+    ('not written: the PLC refused it: STS 10', 1),
+    ('only partly written: ...', 3),
+    ('unknown whether written: ...', 3),
+    ('sent to all stations; nobody confirms a broadcast', 3),
+])
+def test_text_of_a_result_decides_the_exit_status(message: str, status: int) -> None:
+    assert runpy.run_path(str(EXAMPLE))['judge'](message) == status

@@ -1,0 +1,134 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recorder, and the rosbag2 commands that are shown beside it, against a real bridge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import csv
+from datetime import datetime, timedelta, UTC
+from pathlib import Path
+import re
+import shlex
+import signal
+
+from abdf1_ros.paths import config_file
+import pytest
+from support.launch_stand_in import SOURCE
+from support.ros import Observer, Process, ros_args
+from support.simulator_process import Files, make_files, READS
+
+EXAMPLE = SOURCE / 'examples' / 'recorder.py'
+COMMANDS = SOURCE / 'examples' / 'recording.md'
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return make_files(tmp_path_factory.mktemp('recorder'))
+
+
+@pytest.fixture(scope='module')
+def bridge(files: Files) -> Iterator[Process]:
+    with files.start_simulator(), \
+            Process('node', *files.args(), '-r', '__ns:=/recorded') as node:
+        yield node
+        node.end()
+
+
+def rows_of(path: Path) -> list[list[str]]:
+    with path.open(newline='', encoding='utf-8') as file:
+        head, *rows = csv.reader(file)
+    assert head == ['time', 'topic', 'address', 'values']
+    return rows
+
+
+def test_every_read_topic_is_recorded(bridge: Process, tmp_path: Path) -> None:
+    path = tmp_path / 'line.csv'
+    with Process(EXAMPLE, str(path), '--node', '/recorded/abdf1', '--seconds', '7') as recorder:
+        assert recorder.result() == 0, recorder.text
+    rows = rows_of(path)
+    assert recorder.lines == [f'{len(rows)} messages in {path}']
+    last = {row[1]: row for row in rows}
+    assert last.keys() == READS.keys()
+    for topic, (_, address, values) in READS.items():
+        shown = [values] if isinstance(values, str) else [str(value) for value in values]
+        assert last[topic][2:] == [address, *shown]
+        age = datetime.now(UTC) - datetime.fromisoformat(last[topic][0])
+        assert timedelta(0) < age < timedelta(minutes=1)
+
+
+def test_signal_leaves_a_complete_file(bridge: Process, tmp_path: Path) -> None:
+    path = tmp_path / 'line.csv'
+    with Observer() as observer, \
+            Process(EXAMPLE, str(path), '--node', '/recorded/abdf1') as recorder:
+        observer.until(lambda: path.exists() and path.stat().st_size > 2000, 'some rows')
+        recorder.end(signal.SIGTERM)
+    rows = rows_of(path)
+    assert recorder.lines == [f'{len(rows)} messages in {path}']
+    assert all(row[1] in READS for row in rows)
+
+
+def test_bridge_that_is_not_there_is_said(tmp_path: Path) -> None:
+    with Process(EXAMPLE, str(tmp_path / 'x.csv'), '--node', '/x', '--wait', '0.5') as recorder:
+        assert recorder.result() == 1
+    assert recorder.lines == ['/x is not there, or has no read topic']
+
+
+def test_file_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+    path = tmp_path / 'none' / 'x.csv'
+    with Process(EXAMPLE, str(path)) as recorder:
+        assert recorder.result() == 2
+    assert recorder.lines == [f'{path}: cannot be written: No such file or directory']
+
+
+# rosbag2
+
+
+def commands() -> list[list[str]]:
+    blocks = re.findall('```\n(.*?)```', COMMANDS.read_text(encoding='utf-8'), re.DOTALL)
+    return [shlex.split(line) for block in blocks for line in block.splitlines()]
+
+
+def topics_of(command: list[str]) -> list[str]:
+    """Return the topics that a command names after ``--topics``."""
+    if '--topics' not in command:
+        return []
+    return command[command.index('--topics') + 1:]
+
+
+def test_topics_of_the_rosbag2_commands_exist() -> None:
+    named = {topic for command in commands() for topic in topics_of(command)}
+    patterns = [command[command.index('--regex') + 1]
+                for command in commands() if '--regex' in command]
+    assert named
+    assert patterns
+    arguments = ros_args(f'map_file:={config_file("map.csv")}', 'port:=/dev/ttyS99')
+    with Observer() as observer, Process('node', *arguments) as node:
+        def topics() -> set[str]:
+            return {name for name, _ in observer.node.get_topic_names_and_types()}
+
+        observer.until(lambda: named <= topics(), lambda: f'{named - topics()}')
+        ours = {name for name in topics() if name.startswith('/abdf1/')} | {'/diagnostics'}
+        node.end()
+    for pattern in patterns:
+        assert {name for name in ours if re.fullmatch(pattern, name)} == ours
+
+
+def test_nothing_that_would_be_executed_is_played_back() -> None:
+    played = [command for command in commands() if command[:3] == ['ros2', 'bag', 'play']]
+    assert played
+    for command in played:
+        assert topics_of(command)  # without names it would play everything
+        assert not [topic for topic in topics_of(command) if '/write/' in topic]

@@ -1,0 +1,120 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Inputs to begin with: those made of vectors and real files, and the stored finds.
+
+A stored corpus is a text file, one input a line in hexadecimal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.driver.network import FIELDS
+from abdf1_ros.pccc import plc5, slc
+from support.vectors import CAPTURED, commands, MESSAGES, VECTORS
+
+TARGETS = ('frames', 'addresses', 'net_csv', 'map_csv', 'typed_data', 'server', 'links')
+
+_FOLDER = Path(__file__).resolve().parent / 'corpus'
+_CONFIG = Path(__file__).resolve().parent.parent.parent / 'config'
+
+_ADDRESSES = (
+    'N7:0', 'N7:0/3', 'n100:255', 'O:017/12', 'I:003', 'O:2.0', 'I:1.0/3', 'I:30.255', 'S:1',
+    'S2:1/15', 'B3:1/5', 'B3/21', 'B3;1', 'T4:0.ACC', 'T4:0/DN', 'T4:0.2', 'C5:0.PRE', 'C5:0/CU',
+    'R6:0.POS', 'R6:0/IN', 'F8:0', 'A10:0', 'D11:0', 'ST9:0', 'L10:0', '#N7:0', '$N7:0',
+    'ST999:779', 'N999:999', 'N256:0', 'T4:0.3', 'F8:0/1', 'I:088')
+
+# One script for each mode: time, polls, a reply, a command for us, a write, the loss of the port.
+_SCRIPT = bytes.fromhex(
+    '0405 0700 0205 0001020304 0405 0701 0204 F0060000 0500 0405 0701 0203 000000 0702 0704'
+    '0309 68000001000702 0515 0405 0600 0420')
+
+
+# What was found once, and is no more.
+_FOUND = {
+    # A served PLC-3 word range write to a word inside a structure that has no name.
+    'server': ('0F0000002102240423FF' + 55 * 'B6',)}
+
+
+def seeds(target: str) -> list[bytes]:
+    """Return the inputs made for a target."""
+    return [*_SEEDS[target](), *map(bytes.fromhex, _FOUND.get(target, ()))]
+
+
+def stored(target: str) -> list[bytes]:
+    """Return the stored inputs of a target."""
+    path = _FOLDER / f'{target}.hex'
+    return [bytes.fromhex(line) for line in path.read_text(encoding='ascii').splitlines()]
+
+
+def store(target: str, inputs: Iterable[bytes]) -> None:
+    """Replace the stored inputs of a target."""
+    lines = sorted((data.hex() for data in set(inputs)), key=lambda line: (len(line), line))
+    (_FOLDER / f'{target}.hex').write_text(
+        ''.join(f'{line}\n' for line in lines), encoding='ascii')
+
+
+def _frames() -> Iterable[bytes]:
+    yield from (entry.frame for entry in VECTORS)
+    yield from (entry.frame for entry in CAPTURED)
+
+
+def _addresses() -> Iterable[bytes]:
+    return (text.encode() for text in _ADDRESSES)
+
+
+def _net_csv() -> Iterable[bytes]:
+    yield from ((_CONFIG / name).read_bytes() for name in ('net.csv', 'peer_net.csv'))
+    for entry in FIELDS.values():
+        for value in (entry.default, entry.low, entry.high, *entry.choices):
+            yield f'{entry.column}\n{value}\n'.encode()
+
+
+def _map_csv() -> Iterable[bytes]:
+    yield from ((_CONFIG / name).read_bytes() for name in ('map.csv', 'peer_map.csv'))
+    yield (','.join(COLUMNS) + '\r\n').encode('utf-8-sig')
+    for plc in ('PLC5', 'SLC'):
+        for address in _ADDRESSES:
+            yield ('Tag;Command;Address;Station;PLC_Type;Length\n'
+                   f'a;ReadWrite;{address};1;{plc};2\nb;Serve;{address};5;{plc};1\n').encode()
+
+
+def _typed_data() -> Iterable[bytes]:
+    for entry in commands(plc5.TYPED_WRITE, plc5.TYPED_READ, plc5.READ_MODIFY_WRITE):
+        for start in (7, 11, 15, 16):
+            yield entry.link_data[start:]
+    yield from (bytes.fromhex(text) for text in ('9309430100', '93094A030001000000', '0024'))
+
+
+def _server() -> Iterable[bytes]:
+    known = commands(
+        plc5.TYPED_WRITE, plc5.TYPED_READ, plc5.READ_MODIFY_WRITE, slc.LOGICAL_READ,
+        slc.LOGICAL_WRITE, slc.MASKED_WRITE)
+    yield from (b'\x0f' + entry.link_data[6:] for entry in known)
+    for entry in MESSAGES:
+        if entry.header is not None and not entry.header[2] & 0x40:
+            yield entry.link_data[2:3] + entry.link_data[6:]
+
+
+def _links() -> Iterable[bytes]:
+    return (bytes((mode,)) + _SCRIPT for mode in range(16))
+
+
+_SEEDS = {
+    'frames': _frames, 'addresses': _addresses, 'net_csv': _net_csv, 'map_csv': _map_csv,
+    'typed_data': _typed_data, 'server': _server, 'links': _links}

@@ -1,0 +1,163 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Commands and replies in words."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.pccc.describe import command_name, describe
+from hypothesis import given, strategies
+import pytest
+from support.vectors import MESSAGES, Vector
+
+
+def command(data: str, cmd: int = 0x0F) -> Packet:
+    return Packet(1, 5, cmd, 0, 0x1234, bytes.fromhex(data))
+
+
+@pytest.mark.parametrize(('data', 'text'), [
+    ('A2 08 07 89 1E 00', 'protected typed logical read N7:30, 4 words'),
+    ('A2 02 05 87 02 02', 'protected typed logical read C5:2.ACC, 1 word'),
+    ('A2 0C 04 86 01 00', 'protected typed logical read T4:1, 2 elements'),
+    ('A2 08 08 8A 04 00', 'protected typed logical read F8:4, 2 elements'),
+    ('A2 02 01 8C 01 03', 'protected typed logical read I:1.3, 1 word'),
+    ('A2 54 09 8D 01 00', 'protected typed logical read ST9:1, 1 element'),
+    ('A2 04 07 89 1E 02', 'protected typed logical read N7:30 + 2 words, 2 words'),
+    ('A2 03 07 89 FF 00 01 00', 'protected typed logical read N7:256, 3 bytes'),
+    ('A2 04 00 82 07 00', 'protected typed logical read file 0 type 82 element 7, 2 words'),
+    ('AA 04 07 89 00 00 01 00 FF FF', 'protected typed logical write N7:0 = 1 -1'),
+    ('AA 04 08 8A 00 00 00 00 AC 41', 'protected typed logical write F8:0 = 21.5'),
+    ('AA 04 0A 91 00 00 90 EE FE FF', 'protected typed logical write L10:0 = -70000'),
+    ('AA 02 05 87 02 01 F4 01', 'protected typed logical write C5:2.PRE = 500'),
+    ('AA 02 05 87 02 00 00 20', 'protected typed logical write C5:2 = 2000'),
+    ('AA 03 07 89 00 00 01 02 03', 'protected typed logical write N7:0 = 01 02 03'),
+    ('AB 02 03 85 01 00 08 00 08 00', 'masked write B3:1 mask 0008 = 0008'),
+    ('68 00 00 0A 00 07 00 07 00 0A 00', 'typed read N7:0, 10 elements'),
+    ('68 00 00 01 00 0F 00 04 02 02 01 00', 'typed read T4:2.ACC, 1 element'),
+    ('68 00 00 01 00 07 00 01 0A 01 00', 'typed read I:012, 1 element'),
+    ('68 00 00 01 00 07 00 0A 05 01 00', 'typed read file 10:5, 1 element'),
+    ('68 00 00 01 00 0F 00 0C 0A 02 01 00', 'typed read file 12:10.2, 1 element'),
+    ('68 0A 00 1E 00 07 00 07 00 0A 00', 'typed read N7:0, 10 elements (from 10 of 30)'),
+    ('67 00 00 02 00 07 00 07 05 95 09 42 01 00 FE FF', 'typed write N7:5 = 1 -2'),
+    ('67 00 00 01 00 07 00 0A 05 99 09 06 94 08 00 00 AC 41', 'typed write F10:5 = 21.5'),
+    ('67 00 00 01 00 07 00 07 00 42', 'typed write N7:0 = nothing (from 0 of 1)'),
+    ('AA 00 07 89 00 00', 'protected typed logical write N7:0 = nothing'),
+    ('67 00 00 01 00 07 00 03 05 93 09 42 10 00', 'typed write B3:5 = 0010'),
+    ('26 07 00 03 01 F7 FF 08 00', 'read-modify-write B3:1 AND FFF7 OR 0008'),
+    ('26 07 00 03 01 F7 FF 08 00 07 00 03 02 FF FF 01 00',
+     'read-modify-write B3:1 AND FFF7 OR 0008, B3:2 AND FFFF OR 0001'),
+    ('A1 02 07 89 1E', 'protected typed logical read N7:30, 1 word'),
+    ('A9 02 07 89 1E 05 00', 'protected typed logical write N7:30 = 5'),
+    ('01 00 00 0A 00 07 00 07 00 14', 'word range read N7:0, 10 words'),
+    ('01 72 00 56 01 2C 08 FF 04 01 00 E4',
+     'word range read B260:0, 114 words (from 114 of 342)'),
+    ('01 00 00 01 00 2C 06 02 03 02', 'word range read E3.1.6.2.0.3, 1 word'),
+    ('01 00 00 01 00 2E 01 08 0A 00 02', 'word range read B10:0, 1 word'),
+    ('01 00 00 01 00 34 03 04 02 02', 'word range read T:4.ACC, 1 word'),
+    ('00 00 00 02 00 07 00 07 05 01 00 FF FF', 'word range write N7:5 = 0001 FFFF'),
+    ('02 07 00 03 01 08 00 01 00', 'bit write B3:1 set 0008 reset 0001'),
+    ('04 00 00 04 00 0C 08 0A 08', 'file read B10:0, 4 words'),
+])
+def test_data_table_commands(data: str, text: str) -> None:
+    assert describe(command(data)) == text
+    assert describe(command(data, 0x2F)) == text  # with high priority
+
+
+@pytest.mark.parametrize(('cmd', 'data', 'text'), [
+    (0x01, '20 00 02', 'unprotected read 020 (ADDR 32), 2 bytes'),
+    (0x08, '12 00 FF FF', 'unprotected write 011 (ADDR 18) = FFFF'),
+    (0x00, '12 00 01 02 03', 'protected write 011 (ADDR 18) = 01 02 03'),
+    (0x05, '20 00 08 01', 'unprotected bit write 020 (ADDR 32) low byte set 08 reset 01'),
+    (0x02, '20 00 08 01 21 00 00 80', 'protected bit write 020 (ADDR 32) low byte set 08 '
+     'reset 01, 020 (ADDR 33) high byte set 00 reset 80'),
+    (0x06, '01 00 00 1C', 'read diagnostic counters at 0, 28 bytes'),
+    (0x06, '07', 'reset diagnostic counters'), (0x0F, '3A 02', 'set CPU mode 02'),
+    (0x07, '04', 'enter download mode'), (0x04, '01 02', 'physical read 01 02'),
+    (0x06, '00 01 02', 'echo 01 02'), (0x06, '03', 'diagnostic status'),
+    (0x0F, 'E7 01 02', 'command 0F/E7 01 02'), (0x0F, 'E7', 'command 0F/E7'),
+    (0x0F, '', 'command 0F'), (0x0E, '01 02', 'command 0E 01 02')])
+def test_other_commands(cmd: int, data: str, text: str) -> None:
+    assert describe(command(data, cmd)) == text
+
+
+@pytest.mark.parametrize('data', [
+    'A2', 'A2 08 07', 'A2 08 07 89 1E 00 01', 'AA 04 07 89 00 00 01', '68 00 00 01 00 10',
+    '67 00 00 01 00 07 00 07 00 42 01', '26', 'A9 02 07 89 1E 05 00 01'])
+def test_malformed_commands_are_given_as_bytes(data: str) -> None:
+    text = describe(command(data))
+    assert ', malformed (' in text
+    assert text.endswith(f'): {data}')
+
+
+@pytest.mark.parametrize(('asked', 'data', 'text'), [
+    ('A2 04 07 89 00 00', '34 12 FE FF', '4660 -2'),
+    ('A2 04 03 85 00 00', '34 12 FE FF', '1234 FFFE'),
+    ('A2 04 08 8A 00 00', '00 00 AC 41', '21.5'),
+    ('A2 03 07 89 00 00', '01 02 03', '01 02 03'),
+    ('A1 06 04 86 01', '00 E0 64 00 2A 00', 'E000 0064 002A'),
+    ('AA 02 07 89 00 00 01 00', '', 'done'),
+    ('68 00 00 02 00 07 00 07 00 02 00', '95 09 42 34 12 FE FF', '4660 -2'),
+    ('68 00 00 01 00 07 00 03 00 01 00', '93 09 42 34 12', '1234'),
+    ('68 00 00 01 00 07 00 08 00 01 00', '99 09 06 94 08 00 00 AC 41', '21.5'),
+    ('68 00 00 01 00 07 00 07 00 01 00', '95 09', '95 09'),
+    ('01 00 00 02 00 07 00 07 00 04', '34 12 FE FF', '1234 FFFE'),
+    ('00 00 00 01', '01 02', '01 02'), ('E7', '01 02', '01 02')])
+def test_replies(asked: str, data: str, text: str) -> None:
+    request = command(asked)
+    assert describe(request.reply(bytes.fromhex(data)), request) == text
+
+
+def test_reply_without_its_command_is_bytes() -> None:
+    assert describe(command('').reply(b'\x34\x12')) == '34 12'
+
+
+def test_refusals() -> None:
+    assert describe(command('').reply(sts=0x50)) == \
+        'STS 50: address not there, or memory protected'
+    assert describe(command('').reply(b'\x06', 0xF0)) == \
+        'STS F0 EXT STS 06: address does not point to something usable'
+
+
+def test_command_name() -> None:
+    assert command_name(command('A2 02')) == '0F/A2'
+    assert command_name(command('A2 02', 0x2F)) == '0F/A2'
+    assert command_name(command('A2 02').reply(b'\x01')) == '0F'
+    assert command_name(command('00 02', 0x01)) == '01'
+    assert command_name(command('')) == '0F'
+
+
+@pytest.mark.parametrize('vector', [
+    pytest.param(vector, id=vector.name) for vector in MESSAGES
+    if vector.valid and len(vector.link_data) >= 6])
+def test_every_vector_has_a_text_of_one_line(vector: Vector) -> None:
+    assert describe(vector.packet).isprintable()
+    assert ('malformed' in describe(vector.packet)) is vector.name.endswith('_short')
+
+
+@given(strategies.integers(0, 255), strategies.binary(max_size=40), strategies.binary(max_size=40))
+def test_any_bytes_have_a_text(cmd: int, data: bytes, answer: bytes) -> None:
+    request = Packet(1, 5, cmd & ~0x40, 0, 1, data)
+    assert describe(request).isprintable()
+    assert describe(request.reply(answer), request).isprintable()
+    assert describe(request.reply(answer, 0xF0), request).isprintable()
+
+
+@given(strategies.sampled_from(
+    (0x00, 0x01, 0x02, 0x04, 0x26, 0x67, 0x68, 0xA1, 0xA2, 0xA9, 0xAA, 0xAB)),
+       strategies.binary(max_size=40), strategies.binary(max_size=40))
+def test_any_parameters_have_a_text(fnc: int, data: bytes, answer: bytes) -> None:
+    request = Packet(1, 5, 0x0F, 0, 1, bytes((fnc,)) + data)
+    assert describe(request).isprintable()
+    assert describe(request.reply(answer), request).isprintable()

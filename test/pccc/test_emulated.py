@@ -1,0 +1,73 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The processor that an emulated PLC claims to be."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import decode_identity
+import pytest
+from support.vectors import pair
+
+
+def test_slc_has_the_layout_of_the_vectors() -> None:
+    ours = EmulatedProcessor(PlcType.SLC, is_full_duplex=True).encode()
+    theirs = pair('diag_status_slc504')[1].data
+    assert len(ours) == len(theirs) == 24
+    assert ours[:3] == theirs[:3]  # mode, type extender, full duplex
+    assert ours[3] == 0x49  # a 5/03
+    assert ours[5:16] == b'5/03       '
+    assert ours[16:20] == b'\0\0\x06\0'  # no major error, remote run
+    assert ours[23] == theirs[23] == 0xFC  # no owner of the program
+    assert EmulatedProcessor(PlcType.SLC).encode()[2] == 0x36  # half duplex
+
+
+def test_plc5_has_the_layout_of_the_vectors() -> None:
+    ours = EmulatedProcessor(PlcType.PLC5).encode()
+    theirs = pair('diag_status_plc5_40')[1].data
+    assert len(ours) == len(theirs) == 36
+    assert ours[:3] == theirs[:3]  # remote run, PLC-5, 5/40
+
+
+@pytest.mark.parametrize(('plc_type', 'size', 'first'), [
+    (PlcType.PLC3, 18, b'\x02\x47'), (PlcType.PLC2, 10, b'\x02\x14')])
+def test_older_families(plc_type: PlcType, size: int, first: bytes) -> None:
+    data = EmulatedProcessor(plc_type).encode()
+    assert (len(data), data[:2]) == (size, first)
+
+
+@pytest.mark.parametrize(('plc_type', 'texts'), [
+    (PlcType.SLC, ('RUN', 'REM PROG', 'REM RUN', 'REM TEST')),
+    (PlcType.PLC5, ('RUN', 'REM PROG', 'REM RUN', 'REM TEST')),
+    (PlcType.PLC3, ('RUN', 'PROG', 'RUN', 'TEST')),
+    (PlcType.PLC2, ('RUN', 'REM PROG', 'RUN', 'REM TEST'))])
+def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -> None:
+    settings = (Setting.RUN, Setting.PROGRAM, Setting.REMOTE, Setting.TEST)
+    identities = [decode_identity(EmulatedProcessor(plc_type, setting).encode())
+                  for setting in settings]
+    assert tuple(identity.mode_text for identity in identities) == texts
+    assert [identity.is_running for identity in identities] == [True, False, True, False]
+    assert not any(identity.faults for identity in identities)
+
+
+@pytest.mark.parametrize(('plc_type', 'fault'), [
+    (PlcType.SLC, 'major error 0x0020, processor halted'),
+    (PlcType.PLC5, 'major processor fault (word S:11 says which)'),
+    (PlcType.PLC3, 'major processor fault'),
+    (PlcType.PLC2, 'no communication between module and processor')])
+def test_fault_is_read_back(plc_type: PlcType, fault: str) -> None:
+    identity = decode_identity(EmulatedProcessor(plc_type, Setting.FAULT).encode())
+    assert (identity.faults, identity.is_running) == ((fault,), False)

@@ -1,0 +1,72 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands of a PLC-2 against printed and computed frames."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.plc2 import BasicBitWrite, BasicRead, BasicWrite, ByteChange
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+from support.vectors import vector
+
+changes = st.builds(
+    lambda address, mask, bits: ByteChange(address, bits & mask, ~bits & mask),
+    st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.integers(0, 0xFF))
+
+
+@pytest.mark.parametrize(('name', 'cmd', 'request_'), [
+    ('516_fd_plc2_read_cmd', 0x01, BasicRead(0x11, 2)),
+    ('plc2_write_unprot_req_fd_crc', 0x08, BasicWrite(0o11 * 2, b'\xFF\xFF')),
+    ('cif_read_word_req_fd_crc', 0x01, BasicRead(9, 2))])
+def test_vectors(name: str, cmd: int, request_: BasicRead | BasicWrite) -> None:
+    packet = vector(name).packet
+    assert packet.cmd == cmd
+    assert packet.data == request_.encode()
+    assert type(request_).read(Reader(packet.data)) == request_
+
+
+def test_bit_write_has_four_bytes_for_each_byte() -> None:
+    request = BasicBitWrite((ByteChange(0x20, 0x01, 0x80), ByteChange(0x21, 0x00, 0x0F)))
+    assert request.encode() == bytes.fromhex('20 00 01 80 21 00 00 0F')
+
+
+@PROPERTY
+@given(st.lists(changes, min_size=1, max_size=60))
+def test_bit_write_is_read_back(entries: list[ByteChange]) -> None:
+    request = BasicBitWrite(tuple(entries))
+    assert BasicBitWrite.read(Reader(request.encode())) == request
+
+
+@pytest.mark.parametrize('data', ['', '20 00', '20 00 01', '20 00 01 00 21', '20 00 03 01'])
+def test_what_is_no_bit_write(data: str) -> None:
+    with pytest.raises(FormatError):
+        BasicBitWrite.read(Reader(bytes.fromhex(data)))
+
+
+def test_more_than_60_bytes_are_no_bit_write() -> None:
+    one = ByteChange(0, 1, 0).encode()
+    assert len(BasicBitWrite.read(Reader(one * 60)).changes) == 60
+    with pytest.raises(FormatError, match='^61 bytes to modify, 60 are allowed$'):
+        BasicBitWrite.read(Reader(one * 61))
+
+
+@pytest.mark.parametrize('data', ['', '20', '20 00', '20 00 02 01'])
+def test_what_is_no_read(data: str) -> None:
+    with pytest.raises(FormatError):
+        BasicRead.read(Reader(bytes.fromhex(data)))

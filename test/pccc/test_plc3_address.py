@@ -1,0 +1,97 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Addresses of a PLC-3."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.plc3_address import last_element, SECTIONS
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.properties import PROPERTY
+
+PLC3 = PlcType.PLC3
+
+
+@pytest.mark.parametrize(('text', 'levels', 'shown', 'offset'), [
+    ('B10:0', 'E3.1.8.10.0.0', 'B10:0', 0), ('b260;5/3', 'E3.1.8.260.0.5/3', 'B260:5/03', 5),
+    ('N0:9999', 'E3.1.5.0.0.9999', 'N0:9999', 9999), ('D7:1', 'E3.1.7.7.0.1', 'D7:1', 1),
+    ('A9:8', 'E3.1.9.9.0.8', 'A9:8', 8), ('S:5', 'E3.1.13.0.0.5', 'S:5', 5),
+    ('O:17', 'E3.1.1.0.0.17', 'O:0017', 15), ('I3:7777/17', 'E3.1.2.3.0.7777/17',
+                                              'I3:7777/17', 4095),
+    ('T:4.ACC', 'E3.1.3.0.4.2', 'T:4.ACC', 14), ('T0:4.2', 'E3.1.3.0.4.2', 'T:4.ACC', 14),
+    ('T:4/DN', 'E3.1.3.0.4.0/15', 'T:4.CTL/15', 12), ('T:4.DN', 'E3.1.3.0.4.0/15',
+                                                      'T:4.CTL/15', 12),
+    ('T:4.CTL/17', 'E3.1.3.0.4.0/17', 'T:4.CTL/17', 12),
+    ('C:9999.PRE', 'E3.1.4.0.9999.1', 'C:9999.PRE', 29998)])
+def test_both_forms_name_the_same_place(text: str, levels: str, shown: str,
+                                        offset: int) -> None:
+    address = Address.parse(text, PLC3)
+    assert address == Address.parse(levels, PLC3)
+    assert (str(address), address.offset) == (shown, offset)
+
+
+@PROPERTY
+@given(st.sampled_from(list(SECTIONS)), st.integers(0, 999), st.data(),
+       st.one_of(st.none(), st.integers(0, 15)))
+def test_every_address_is_read_back(kind: FileType, file: int, data: st.DataObject,
+                                    bit: int | None) -> None:
+    element = data.draw(st.integers(0, last_element(kind)))
+    word = data.draw(st.integers(0, 2)) if kind.is_structure else 0
+    address = Address(PLC3, kind, 0 if kind.is_structure else file, element, word, bit)
+    assert Address.parse(str(address), PLC3) == address
+    assert address.offset < address.area_size
+    whole = Address(PLC3, kind, address.file, element, word)
+    assert address.at_offset(address.offset) == whole
+
+
+def test_last_word_of_each_file_is_the_last_of_its_area() -> None:
+    for text in ('O:7777', 'N7:9999', 'T:9999.ACC'):
+        address = Address.parse(text, PLC3)
+        assert address.offset + 1 == address.area_size
+
+
+@pytest.mark.parametrize(('text', 'right'), [
+    ('N7', 'as in N7:0'), ('020', 'as in N7:0'), ('N:0', 'give the file number, as in N7:0'),
+    ('F8:0', 'F is no file type of a PLC-3'), ('ST9:0', 'ST is no file type of a PLC-3'),
+    ('I:018', 'octal, as in I:017'), ('E3.1.2.0.0.18', 'octal, as in I:017'),
+    ('N7:0/8', 'PLC-3 bits are octal'),
+    ('N7:0.ACC', 'words of N files have no members'), ('T:4', 'say which word, as in T:0.ACC'),
+    ('T:4.POS', 'POS is no member here; members of T: CTL, PRE, ACC, EN, TT, DN'),
+    ('T:4.3', '3 is no member here'), ('T:4.ACC/DN', 'PLC-3 bits are octal'),
+    ('E3.1.8.10.0', 'or E3.1.8.10.0.5'), ('N7:0/DN', 'PLC-3 bits are octal')])
+def test_what_is_no_address(text: str, right: str) -> None:
+    with pytest.raises(AddressSyntaxError) as fault:
+        Address.parse(text, PLC3)
+    assert right in str(fault.value)
+
+
+@pytest.mark.parametrize(('text', 'right'), [
+    ('E2.1.8.10.0.0', 'only the data table, E3.1, can be read'),
+    ('E3.2.8.10.0.0', 'only the data table, E3.1, can be read'),
+    ('E3.1.6.0.0.0', 'section 6 is not known; sections: 1 (O), 2 (I), 3 (T)'),
+    ('E3.1.8.0.1.0', 'section 8 has no structures'), ('E3.1.3.0.1.3', 'are 0, 1 and 2'),
+    ('E3.1.8.1000.0.0', 'files run from 0 to 999'), ('N1000:0', 'files run from 0 to 999'),
+    ('T4:0.ACC', 'the T file of a PLC-3 is file 0'), ('E3.1.4.1.0.0', 'the C file of a PLC-3'),
+    ('N7:10000', 'elements of N run from 0 to 9999'), ('N7:0/20', 'bits run from 0 to 17'),
+    ('E3.1.8.0.0.10000', 'elements of B run from 0 to 9999'),
+    ('I:10000', 'elements of I run from 0 to 7777 (octal)')])
+def test_out_of_range(text: str, right: str) -> None:
+    with pytest.raises(AddressRangeError) as fault:
+        Address.parse(text, PLC3)
+    assert right in str(fault.value)

@@ -1,0 +1,94 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Word range requests to a PLC-3 and a PLC-5."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Transfer
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.word_range_dialect import PLC3, PLC5_WORD_RANGE, WordRangeDialect
+import pytest
+from support.vectors import vector
+
+FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
+
+
+def at(text: str, family: str = 'PLC3') -> Address:
+    """Return an address."""
+    return Address.parse(text, PlcType(family))
+
+
+@pytest.mark.parametrize('number', [1, 2, 3])
+def test_packets_of_a_printed_transfer(number: int) -> None:
+    whole = Transfer(at('E3.1.8.10.0.0'), 342)
+    part = whole.start.at_offset(114 * (number - 1))
+    packet = vector(f'516_fd_plc3_wrr_cmd{number}').packet
+    assert PLC3.read(part, 114, whole) == (packet.cmd, packet.data)
+
+
+@pytest.mark.parametrize(('name', 'request_'), [
+    ('plc5_wrr_F8_req_fd_crc', PLC5_WORD_RANGE.read(at('F8:0', 'PLC5'), 2)),
+    ('plc5_wrr_max_req_fd_crc', PLC5_WORD_RANGE.read(at('N7:0', 'PLC5'), 122)),
+    ('plc5_wrw_N7_req_fd_crc',
+     PLC5_WORD_RANGE.write(at('N7:10', 'PLC5'), b'\x10\x10\x07\0'))])
+def test_vectors(name: str, request_: tuple[int, bytes]) -> None:
+    packet = vector(name).packet
+    assert (packet.cmd, packet.data) == request_
+
+
+def test_float_of_the_vectors() -> None:
+    reply = vector('plc5_wrr_F8_rep_fd_crc').packet
+    address = at('F8:0', 'PLC5')
+    assert PLC5_WORD_RANGE.read_data(address, 2, reply.data) == b'\0\0\x7A\x44'  # 1000.0
+    _, data = PLC5_WORD_RANGE.write(address, b'\0\0\x7A\x44')
+    assert data.endswith(reply.data)
+
+
+@pytest.mark.parametrize(('text', 'family', 'encoded'), [
+    ('N7:5', 'PLC3', '2C 05 07 05'), ('B260:300', 'PLC3', '2C 08 FF 04 01 FF 2C 01'),
+    ('T:9.ACC', 'PLC3', '3C 03 00 09 02'), ('C:0.PRE', 'PLC3', '2C 04 00 01'),
+    ('I:017', 'PLC3', '2C 02 00 0F'), ('S:3', 'PLC3', '2C 0D 00 03'),
+    ('T4:2.ACC', 'PLC5', '0F 00 04 02 02'), ('T4:2', 'PLC5', '07 00 04 02'),
+    ('B3:300', 'PLC5', '07 00 03 FF 2C 01'), ('I:012', 'PLC5', '07 00 01 0A')])
+def test_addresses(text: str, family: str, encoded: str) -> None:
+    dialect: WordRangeDialect = FAMILIES[PlcType(family)]
+    assert dialect.read(at(text, family), 1) == (
+        0x0F, bytes.fromhex(f'01 00 00 01 00 {encoded} 02'))
+
+
+@pytest.mark.parametrize(('text', 'family', 'encoded'), [
+    ('B10:5', 'PLC3', '02 2C 08 0A 05 00 01 08 00'),
+    ('B3:4', 'PLC5', '26 07 00 03 04 F7 FE 00 01')])
+def test_write_bits(text: str, family: str, encoded: str) -> None:
+    request = FAMILIES[PlcType(family)].write_bits(at(text, family), 0x0108, 0xFF00)
+    assert request == (0x0F, bytes.fromhex(encoded))
+
+
+@pytest.mark.parametrize(('family', 'letters', 'read', 'write'), [
+    ('PLC3', 'N', 122, 114), ('PLC3', 'T', 120, 114), ('PLC5', 'N', 122, 115),
+    ('PLC5', 'F', 122, 114), ('PLC5', 'T', 120, 114), ('PLC5', 'ST', 84, 84)])
+def test_limits_are_whole_elements(family: str, letters: str, read: int, write: int) -> None:
+    dialect, kind = FAMILIES[PlcType(family)], FileType(letters)
+    assert (dialect.max_read(kind), dialect.max_write(kind)) == (read, write)
+
+
+@pytest.mark.parametrize(('text', 'family'), [
+    ('N999:9000', 'PLC3'), ('I999:7000', 'PLC3'), ('T:9000.CTL', 'PLC3'), ('N999:900', 'PLC5'),
+    ('F999:900', 'PLC5'), ('T999:900', 'PLC5')])
+def test_largest_write_fits_with_the_longest_address(text: str, family: str) -> None:
+    dialect, address = FAMILIES[PlcType(family)], at(text, family)
+    _, data = dialect.write(address, bytes(2 * dialect.max_write(address.file_type)))
+    assert len(data) - 5 <= 240  # FNC, offset and total do not count

@@ -1,0 +1,144 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which reply belongs to which command, and what is said twice."""
+
+from __future__ import annotations
+
+from abdf1_ros.capture import Direction
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.conversation import Conversation, Facts
+from abdf1_ros.sniffer.entries import Mark
+import pytest
+
+COMMAND = Packet(1, 5, 0x0F, 0, 7, b'\xa2')
+REPLY = COMMAND.reply(b'\x01')
+
+
+class Talk(Conversation):
+    """A conversation between a master (out) and slaves (in)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = 0.0
+
+    def out(self, packet: Packet) -> Facts:
+        return self._say(packet, Direction.OUT, True)
+
+    def back(self, packet: Packet) -> Facts:
+        return self._say(packet, Direction.IN, False)
+
+    def _say(self, packet: Packet, direction: Direction, from_master: bool) -> Facts:
+        self.now += 0.5
+        return self.take(packet, self.now, direction, from_master)
+
+
+@pytest.fixture
+def talk() -> Talk:
+    return Talk()
+
+
+def test_reply_finds_its_command(talk: Talk) -> None:
+    assert talk.out(COMMAND) == Facts()
+    talk.out(Packet(2, 5, 0x0F, 0, 7))
+    assert talk.back(REPLY) == Facts(COMMAND, 1.0)
+    assert [open_one.command.dst for open_one in talk.unanswered()] == [2]
+
+
+def test_reply_to_nothing_and_to_another_command(talk: Talk) -> None:
+    assert talk.back(REPLY).marks == (Mark.STRAY,)
+    talk.out(COMMAND)
+    assert talk.back(Packet(5, 1, 0x46, 0, 7)).marks == (Mark.WRONG_COMMAND,)
+    assert len(talk.unanswered()) == 1
+
+
+def test_again_without_ack_is_a_retransmission_with_ack_a_duplicate(talk: Talk) -> None:
+    talk.out(COMMAND)
+    assert talk.out(COMMAND).marks == (Mark.RETRANSMISSION,)
+    talk.acknowledge(Direction.IN)
+    assert talk.out(COMMAND).marks == (Mark.DUPLICATE,)
+    assert talk.back(REPLY) == Facts(COMMAND, 1.5)  # since it was said first
+    assert talk.back(REPLY) == Facts(COMMAND, None, (Mark.RETRANSMISSION,))
+    talk.acknowledge(Direction.OUT)
+    assert talk.back(REPLY) == Facts(COMMAND, None, (Mark.DUPLICATE,))
+
+
+def test_an_ack_is_for_what_went_the_other_way(talk: Talk) -> None:
+    talk.out(COMMAND)
+    talk.back(Packet(5, 2, 0x0F, 0, 7))
+    talk.acknowledge(Direction.OUT)
+    assert talk.out(COMMAND).marks == (Mark.RETRANSMISSION,)
+    talk.acknowledge(Direction.IN)
+    assert talk.out(COMMAND).marks == (Mark.DUPLICATE,)
+
+
+def test_only_the_last_message_of_a_path_can_be_repeated(talk: Talk) -> None:
+    talk.out(COMMAND)
+    talk.out(Packet(1, 5, 0x0F, 0, 8))
+    assert talk.out(COMMAND).marks == ()
+
+
+def test_program_that_never_changes_its_tns(talk: Talk) -> None:
+    for count in range(3):
+        marks = (Mark.DUPLICATE,) if count else ()
+        assert talk.out(COMMAND) == Facts(marks=marks)
+        talk.acknowledge(Direction.IN)
+        assert talk.back(REPLY) == Facts(COMMAND, 0.5, marks)
+        talk.acknowledge(Direction.OUT)
+
+
+def test_message_from_slave_to_slave_is_relayed(talk: Talk) -> None:
+    command = Packet(7, 2, 0x0F, 0, 9)
+    assert talk.back(command).marks == ()
+    assert talk.out(command).marks == (Mark.RELAYED,)
+    assert talk.back(command.reply()) == Facts(command, 1.0)
+    assert talk.out(command.reply()) == Facts(command, None, (Mark.RELAYED,))
+    assert talk.unanswered() == []
+
+
+def test_broadcast_has_no_reply(talk: Talk) -> None:
+    talk.out(Packet(255, 5, 0x0F, 0, 7))
+    assert talk.unanswered() == []
+
+
+def test_command_that_waits_too_long(talk: Talk) -> None:
+    talk.out(COMMAND)
+    assert list(talk.expired(10.5)) == []
+    assert [entry.command for entry in talk.expired(10.6)] == [COMMAND]
+    assert list(talk.expired(100.0)) == []
+    assert talk.back(REPLY).marks == (Mark.STRAY,)
+
+
+def test_answered_commands_are_forgotten_in_silence(talk: Talk) -> None:
+    talk.out(COMMAND)
+    talk.back(REPLY)
+    assert list(talk.expired(100.0)) == []
+    assert talk.back(REPLY).marks == (Mark.RETRANSMISSION, Mark.STRAY)
+
+
+def test_tns_used_for_something_else_gives_the_first_command_up(talk: Talk) -> None:
+    talk.out(COMMAND)
+    talk.out(Packet(1, 5, 0x0F, 0, 7, b'\xaa'))
+    assert [entry.command for entry in talk.expired(talk.now)] == [COMMAND]
+    assert [entry.command.data for entry in talk.unanswered()] == [b'\xaa']
+
+
+def test_without_times_there_is_a_limit_too() -> None:
+    talk = Conversation()
+    given_up = []
+    for tns in range(2000):
+        talk.take(Packet(1, 5, 0x0F, 0, tns), None, Direction.UNKNOWN, True)
+        given_up += [entry.command.tns for entry in talk.expired(None)]
+    assert given_up == list(range(1000))
+    assert len(talk.unanswered()) == 1000

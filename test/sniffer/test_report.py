@@ -1,0 +1,117 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Entries and summaries as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.listener import LineKind
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.entries import Entry, Kind, Mark
+from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
+from abdf1_ros.sniffer.summary import Summary
+import pytest
+
+OUT, IN = Direction.OUT, Direction.IN
+HALF = LineKind(Checksum.CRC, Duplex.HALF)
+COMMAND = Entry(
+    0.5, OUT, Kind.COMMAND, '5 to 1, TNS 1234: echo 01', 1, Checksum.CRC, True,
+    Packet(1, 5, 0x06, 0, 0x1234, b'\x00\x01'), marks=(Mark.RETRANSMISSION,))
+REPLY = Entry(
+    1.25, IN, Kind.REPLY, '1 to 5, TNS 1234: 01', 1, Checksum.CRC, True,
+    Packet(5, 1, 0x46, 0, 0x1234, b'\x01'), 0.75)
+REFUSAL = Entry(1.0, IN, Kind.REPLY, 'STS 50: no', 1, Checksum.CRC, True,
+                Packet(5, 1, 0x46, 0x50, 0x1234))
+DAMAGED = Entry(2.0, IN, Kind.DAMAGED, 'wrong check', 1, Checksum.BCC, False)
+POLL = Entry(None, Direction.UNKNOWN, Kind.POLL, '', 16, Checksum.BCC, True)
+NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
+
+
+@pytest.mark.parametrize(('entry', 'text'), [
+    (COMMAND, '     0.500000 >   1 command  5 to 1, TNS 1234: echo 01 | CRC good | '
+              'RETRANSMISSION'),
+    (REPLY, '     1.250000 <   1 reply    1 to 5, TNS 1234: 01 | CRC good | 750.0 ms'),
+    (DAMAGED, '     2.000000 <   1 damaged  wrong check | BCC BAD'),
+    (POLL, '            - ?  16 poll     BCC good'),
+    (NOISE, '     3.000000 <     noise    2 bytes outside of any frame'),
+    (Entry(0.0, IN, Kind.ACK, station=1), '     0.000000 <   1 ACK')])
+def test_text(entry: Entry, text: str) -> None:
+    assert text_line(entry) == text
+
+
+@pytest.mark.parametrize(('entry', 'shade'), [
+    (COMMAND, '\x1b[33m'), (REFUSAL, '\x1b[31m'), (DAMAGED, '\x1b[31m'), (POLL, '\x1b[2m'),
+    (NOISE, '\x1b[31m')])
+def test_colour(entry: Entry, shade: str) -> None:
+    assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
+
+
+def test_what_is_well_has_no_colour() -> None:
+    assert text_line(REPLY, colour=True) == text_line(REPLY)
+
+
+def test_json() -> None:
+    assert json.loads(json_line(COMMAND)) == {
+        'time': 0.5, 'direction': '>', 'kind': 'command', 'station': 1,
+        'text': '5 to 1, TNS 1234: echo 01', 'check': 'CRC', 'valid': True,
+        'marks': ['retransmission'], 'dst': 1, 'src': 5, 'command': '06/00', 'sts': 0,
+        'tns': 0x1234, 'data': '0001'}
+    assert json.loads(json_line(REPLY))['latency_ms'] == 750.0
+    assert json.loads(json_line(NOISE)) == {
+        'time': 3.0, 'direction': '<', 'kind': 'noise', 'text': '2 bytes outside of any frame',
+        'bytes': 2}
+
+
+@pytest.fixture
+def summary() -> Summary:
+    summary = Summary(9600)
+    summary.take(Chunk(0.0, OUT, bytes(600)))
+    summary.take(Chunk(2.0, IN, bytes(360)))
+    for entry in (COMMAND, REPLY, REFUSAL, DAMAGED, POLL, NOISE,
+                  Entry(2.0, IN, Kind.SILENCE, station=16)):
+        summary.add(entry)
+    return summary
+
+
+def test_summary(summary: Summary) -> None:
+    head, seen, faults, latency, _, one, sixteen = summary_lines(summary, HALF)
+    assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
+                    'line load 50.0% at 9600 baud')
+    assert seen == '  seen: 1 commands, 2 replies, 1 of them with an error, 1 polls'
+    assert faults == ('  faults: 1 damaged, 2 bytes of noise, 1 retransmissions, '
+                      '1 polls and messages without answer')
+    assert latency == '  replies after: mean 750.0 ms, max 750.0 ms'
+    assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '1', '0', '750.0', '750.0']
+    assert sixteen.split() == ['16', '1', '1', *'000000', '-', '-']
+
+
+def test_summary_of_nothing() -> None:
+    assert list(summary_lines(Summary(), LineKind())) == [
+        'summary: 0 bytes', '  seen: none', '  faults: none']
+
+
+def test_summary_as_json(summary: Summary) -> None:
+    found = json.loads(summary_json(summary, HALF))
+    assert {name: found[name] for name in (
+        'kind', 'seconds', 'bytes', 'check', 'duplex', 'baud', 'load', 'errors', 'damaged')} == {
+            'kind': 'summary', 'seconds': 2.0, 'bytes': {'>': 600, '<': 360}, 'check': 'CRC',
+            'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 1}
+    assert found['stations']['1']['latency_ms'] == {'mean': 750.0, 'max': 750.0}
+    assert found['stations']['16']['counts'] == {'poll': 1, 'silence': 1}
+    assert found['marks'] == {'retransmission': 1}

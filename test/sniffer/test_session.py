@@ -1,0 +1,305 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From bytes to entries: on vectors, whole conversations, and anything else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.master_line import MasterSettings
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.entries import Entry, Kind, Mark
+from abdf1_ros.sniffer.session import Session
+from hypothesis import given, strategies
+import pytest
+from support.multidrop import MasterBench
+from support.vectors import CAPTURED, Vector, VECTORS
+from support.virtual_line import Noise, QUIET
+
+OUT, IN, UNKNOWN = Direction.OUT, Direction.IN, Direction.UNKNOWN
+COMMAND = Packet(1, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
+REPLY = COMMAND.reply(bytes.fromhex('34 12 FE FF'))
+WORDS = 'protected typed logical read N7:0, 2 words'
+
+
+def master(packet: Packet, checksum: Checksum = Checksum.CRC) -> bytes:
+    return frames.master_frame(packet.dst, packet.encode(), checksum)
+
+
+def message(packet: Packet, checksum: Checksum = Checksum.CRC) -> bytes:
+    return frames.message_frame(packet.encode(), checksum)
+
+
+TRANSACTION = [(OUT, master(COMMAND)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
+               (IN, message(REPLY)), (OUT, frames.ACK), (OUT, frames.poll_frame(1)),
+               (IN, frames.EOT)]
+
+
+def decode(said: Iterable[tuple[Direction, bytes]], session: Session | None = None,
+           pause: float = 0.01) -> list[Entry]:
+    """Return the entries of a conversation in which something is said every ``pause`` s."""
+    session = session or Session()
+    found: list[Entry] = []
+    for count, (direction, data) in enumerate(said):
+        found += session.feed(Chunk(count * pause, direction, data))
+    return [*found, *session.finish()]
+
+
+def kinds(entries: Iterable[Entry]) -> list[Kind]:
+    return [entry.kind for entry in entries]
+
+
+def one_wire(said: Iterable[tuple[Direction, bytes]]) -> Iterator[tuple[Direction, bytes]]:
+    """Yield the same, heard on a line where nobody can tell who speaks."""
+    for _, data in said:
+        yield UNKNOWN, data
+
+
+@pytest.mark.parametrize('directions', [list, one_wire])
+def test_transaction(directions: type[list[tuple[Direction, bytes]]]) -> None:
+    entries = decode(directions(TRANSACTION))
+    assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.POLL, Kind.REPLY, Kind.ACK, Kind.POLL,
+                              Kind.EOT]
+    assert [entry.direction for entry in entries] == [OUT, IN, OUT, IN, OUT, OUT, IN]
+    assert [entry.station for entry in entries] == [1] * 7
+    command, reply = entries[0], entries[3]
+    assert command.text == f'5 to 1, TNS 1234: {WORDS}'
+    assert reply.text == '1 to 5, TNS 1234: 4660 -2'
+    assert (reply.packet, reply.checksum, reply.valid) == (REPLY, Checksum.CRC, True)
+    assert reply.latency == pytest.approx(0.03)
+    assert entries[2].valid
+    assert not any(entry.marks for entry in entries)
+
+
+@pytest.mark.parametrize('checksum', list(Checksum))
+@pytest.mark.parametrize('given', [False, True])
+def test_check_is_found_or_given(checksum: Checksum, given: bool) -> None:
+    said = [(OUT, master(COMMAND, checksum)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
+            (IN, message(REPLY, checksum)), (OUT, frames.ACK)]
+    session = Session(checksum if given else None, Duplex.HALF if given else None)
+    entries = decode(one_wire(said), session)
+    assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.POLL, Kind.REPLY, Kind.ACK]
+    assert {entry.checksum for entry in entries if entry.packet} == {checksum}
+    assert (session.kind.checksum, session.kind.duplex) == (checksum, Duplex.HALF)
+
+
+def test_wrong_check_is_marked_and_taken_no_further() -> None:
+    damaged = bytearray(master(COMMAND))
+    damaged[7] ^= 0x01
+    bad, silence, good = decode([(OUT, bytes(damaged)), (OUT, master(COMMAND))],
+                                Session(Checksum.CRC))[:3]
+    assert (bad.kind, bad.valid, bad.checksum) == (Kind.DAMAGED, False, Checksum.CRC)
+    assert bad.text.startswith('wrong check: ')
+    assert '; reads like ' in bad.text
+    assert silence.kind is Kind.SILENCE
+    assert (good.kind, good.marks) == (Kind.COMMAND, ())
+
+
+def test_poll_with_a_wrong_check() -> None:
+    entry = decode([(OUT, b'\x10\x05\x01\xfe')])[0]
+    assert (entry.kind, entry.station, entry.valid) == (Kind.POLL, 1, False)
+
+
+def test_repetitions_are_marked() -> None:
+    command, reply = (OUT, master(COMMAND)), (IN, message(REPLY))
+    ack, answer, poll = (IN, frames.ACK), (OUT, frames.ACK), (OUT, frames.poll_frame(1))
+    entries = decode([command, command, ack, command, ack, poll, reply, poll, reply, answer,
+                      poll, reply, answer])
+    marks = [entry.marks for entry in entries if entry.packet]
+    assert marks == [(), (Mark.RETRANSMISSION,), (Mark.DUPLICATE,), (), (Mark.RETRANSMISSION,),
+                     (Mark.DUPLICATE,)]
+
+
+def test_slaves_that_do_not_answer() -> None:
+    poll = (OUT, frames.poll_frame(2))
+    entries = decode([poll, poll, (OUT, master(COMMAND)), (OUT, master(COMMAND)), poll,
+                      (IN, frames.EOT), poll])
+    silent = [(entry.text, entry.station) for entry in entries if entry.kind is Kind.SILENCE]
+    assert silent == [('no answer to the poll', 2), ('no answer to the poll', 2),
+                      ('no answer to the message', 1), ('no answer to the message', 1)]
+
+
+def test_broadcast_needs_no_answer() -> None:
+    entries = decode([(OUT, master(Packet(255, 5, 0x0F, 0, 1))), (OUT, frames.poll_frame(1))])
+    assert kinds(entries) == [Kind.COMMAND, Kind.POLL]
+
+
+def test_command_without_reply() -> None:
+    entries = decode([(OUT, master(COMMAND)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
+                      (IN, frames.EOT)])
+    assert (entries[-1].kind, entries[-1].station, entries[-1].text) == (
+        Kind.UNANSWERED, 1, f'5 to 1, TNS 1234: {WORDS}')
+    assert entries[-1].time == pytest.approx(0.03)
+
+
+def test_command_is_given_up_while_the_line_goes_on() -> None:
+    said = [(OUT, master(COMMAND)), (IN, frames.ACK)]
+    said += [(OUT, frames.poll_frame(1)), (IN, frames.EOT)] * 10
+    entries = decode(said, pause=1.0)
+    (entry,) = (entry for entry in entries if entry.kind is Kind.UNANSWERED)
+    assert entry.time == 11.0
+
+
+def test_full_duplex() -> None:
+    whole = message(REPLY)
+    back = Packet(5, 1, 0x0F, 0, 0x0001, bytes.fromhex('AA 02 07 89 00 00 05 00'))
+    session = Session()
+    entries = decode([(OUT, message(COMMAND)), (IN, frames.ACK), (IN, whole[:9]),
+                      (IN, frames.ACK + whole[9:]), (OUT, frames.NAK), (OUT, frames.ENQ),
+                      (IN, message(back))], session)
+    assert session.kind.duplex is Duplex.FULL
+    assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.ACK, Kind.REPLY, Kind.NAK, Kind.ENQ,
+                              Kind.COMMAND, Kind.UNANSWERED]
+    assert [entry.text for entry in entries[4:6]] == [
+        'refuses the message', 'asks for the last answer']
+    assert [entry.station for entry in entries if entry.packet] == [1, 1, 5, 5]
+
+
+def test_noise_is_counted_and_told_once() -> None:
+    entries = decode([(IN, b'\x01\x02'), (IN, b'\x03'), (IN, frames.EOT), (IN, b'\xff')])
+    assert [(entry.kind, entry.size) for entry in entries] == [
+        (Kind.NOISE, 3), (Kind.EOT, 0), (Kind.NOISE, 1)]
+
+
+def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> None:
+    said = [(OUT, master(COMMAND)[:12]), (OUT, frames.poll_frame(1))]
+    assert kinds(decode(said, pause=1.0)) == [Kind.NOISE, Kind.POLL]
+    assert kinds(decode(said, pause=0.1)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
+
+
+def test_unknown_symbol() -> None:
+    (entry,) = decode([(IN, b'\x10\x1b')])
+    assert (entry.kind, entry.text) == (Kind.UNKNOWN, 'DLE 1B')
+
+
+def test_master_resets_the_line() -> None:
+    entries = decode([(UNKNOWN, frames.poll_frame(1)), (UNKNOWN, frames.NAK)])
+    assert (entries[-1].text, entries[-1].direction) == ('resets all slaves', OUT)
+
+
+@pytest.mark.parametrize('vector', [
+    pytest.param(vector, id=vector.name) for vector in VECTORS if vector.frame])
+def test_vectors(vector: Vector) -> None:
+    entries = [entry for entry in decode([(UNKNOWN, vector.frame)],
+                                         Session(vector.checksum, vector.duplex))
+               if entry.kind is not Kind.UNANSWERED]
+    if not vector.is_message:
+        assert kinds(entries) in ([Kind.POLL], [Kind.EOT], [Kind.ACK], [Kind.NAK], [Kind.ENQ])
+        return
+    entry = entries[-1]
+    if not vector.valid:
+        assert (entry.kind, entry.valid) == (Kind.DAMAGED, False)
+    elif vector.header is None:  # shorter than a header, or with nothing to compare
+        assert entry.kind in (Kind.COMMAND, Kind.REPLY, Kind.DAMAGED)
+    else:
+        assert entry.valid
+        assert entry.packet == vector.packet
+
+
+def test_capture_of_a_real_line() -> None:
+    """Three full-duplex transactions with CRC, as a radio modem has passed them on."""
+    recorded = [entry for entry in CAPTURED if entry.checksum is Checksum.CRC]
+    session = Session()
+    entries = decode([(OUT if entry.direction == 'tx' else IN, entry.frame)
+                      for entry in recorded], session)
+    assert session.kind.checksum is Checksum.CRC
+    assert session.kind.duplex is Duplex.FULL
+    assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.REPLY, Kind.ACK] * 3
+    assert not any(entry.marks for entry in entries)
+
+
+def test_recording_without_times() -> None:
+    session = Session()
+    entries: list[Entry] = []
+    for _, data in TRANSACTION:
+        entries += session.feed(Chunk(None, UNKNOWN, data))
+    assert [*session.finish()] == []
+    assert kinds(entries) == kinds(decode(TRANSACTION))
+    assert {entry.latency for entry in entries} == {None}
+
+
+def listen(bench: MasterBench) -> list[Chunk]:
+    """Keep, from now on, what arrives at both ends of a line, damaged as it is."""
+    heard: list[Chunk] = []
+
+    def keep(machine: Machine, direction: Direction) -> None:
+        receive = machine.receive_data
+
+        def received(data: bytes, now: float) -> None:
+            heard.append(Chunk(now, direction, data))
+            receive(data, now)
+
+        setattr(machine, 'receive_data', received)
+
+    keep(bench.far, OUT)
+    keep(bench.master.machine, IN)
+    return heard
+
+
+@pytest.mark.parametrize('noise', [QUIET, Noise(0.002, 0.002, 0.002, 0.002)])
+def test_conversation_of_a_master_and_two_slaves(noise: Noise) -> None:
+    bench = MasterBench(1, 2, settings=MasterSettings(5, Checksum.CRC, timeout=0.2))
+    bench.line.noise = noise
+    heard = listen(bench)
+    bench.start()
+    for _ in range(60):
+        for number in (1, 2):
+            errand = bench.ask(number)
+            bench.line.run(lambda errand=errand: errand.result is not None, 60.0)
+    session = Session()
+    entries = [entry for chunk in heard for entry in session.feed(chunk)]
+    entries += session.finish()
+    assert (session.kind.checksum, session.kind.duplex) == (Checksum.CRC, Duplex.HALF)
+    for number in (1, 2):
+        new = [entry for entry in entries if entry.kind is Kind.COMMAND
+               and entry.station == number and not entry.marks]
+        assert [entry.packet for entry in new] == bench[number].served
+    if noise is QUIET:
+        assert set(kinds(entries)) == {Kind.COMMAND, Kind.ACK, Kind.POLL, Kind.REPLY}
+        assert sum(entry.latency is not None for entry in entries) == 120
+    else:
+        assert {Kind.DAMAGED, Kind.NOISE, Kind.SILENCE} <= set(kinds(entries))
+        assert any(Mark.DUPLICATE in entry.marks or Mark.RETRANSMISSION in entry.marks
+                   for entry in entries)
+
+
+@given(strategies.lists(strategies.tuples(
+    strategies.floats(0, 1e6), strategies.sampled_from(Direction), strategies.one_of(
+        strategies.binary(max_size=20),
+        strategies.sampled_from([data for _, data in TRANSACTION]))), max_size=30),
+    strategies.sampled_from([None, *Checksum]), strategies.sampled_from([None, *Duplex]))
+def test_any_bytes_in_any_chunks(
+        said: list[tuple[float, Direction, bytes]], checksum: Checksum | None,
+        duplex: Duplex | None) -> None:
+    session = Session(checksum, duplex)
+    for chunk in said:
+        for entry in session.feed(Chunk(*chunk)):
+            assert entry.text.isprintable()
+    assert all(entry.text.isprintable() for entry in session.finish())
+
+
+@given(strategies.data())
+def test_chunks_do_not_matter(data: strategies.DataObject) -> None:
+    whole = b''.join(part for _, part in TRANSACTION)
+    cuts = sorted(data.draw(strategies.sets(strategies.integers(0, len(whole)))))
+    parts = [whole[begin:end] for begin, end in zip([0, *cuts], [*cuts, len(whole)])]
+    expected = [(entry.kind, entry.text) for entry in decode(TRANSACTION)]
+    assert [(entry.kind, entry.text)
+            for entry in decode([(UNKNOWN, part) for part in parts])] == expected

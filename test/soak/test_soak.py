@@ -1,0 +1,59 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A faulty line for a while; ``day.py`` is the same for a day."""
+
+from __future__ import annotations
+
+from collections import deque
+import gc
+import tracemalloc
+
+import pytest
+from soak.faulty_line import FaultyLine, FLOOD, MODES
+from soak.memory import container_lengths
+
+# Bytes that tables with a bound (causes in the log, stations that messages name) still take.
+MOST_GROWTH = 150_000
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_faults_cannot_grow_memory(mode: str) -> None:
+    rig = FaultyLine(mode)
+    rig.trouble()  # fills caches, and what is learned at first
+    rig.settle()
+    tracemalloc.start()
+    try:
+        rig.trouble()
+        rig.settle()
+        gc.collect()
+        grown, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert grown < MOST_GROWTH
+    rig.check_bounds()
+    assert [rig.faults[kind] for kind in rig.kinds] == [2] * len(rig.kinds)
+    reads = rig.ear.reads
+    rig.run(30.0)
+    assert rig.ear.reads > reads + 20  # and then all is well again
+    assert rig.asked > 2 * FLOOD
+
+
+def test_long_containers_are_found() -> None:
+    class Keeper:
+        def __init__(self) -> None:
+            self.inner = {'a': deque(range(7)), 'b': [{1: set(range(9))}]}
+
+    lengths = container_lengths(Keeper())
+    assert (lengths['deque'], lengths['set'], lengths['list']) == (7, 9, 1)

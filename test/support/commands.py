@@ -1,0 +1,65 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Commands of the package in this process, and the simulators that they talk to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import signal
+
+import pytest
+from support.ros import Process
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a command has said, and its exit status."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def lines(self) -> list[str]:
+        """Return the lines of its standard output, with single spaces."""
+        return [' '.join(line.split()) for line in self.out.splitlines()]
+
+
+def call(main: Callable[[Sequence[str]], int], capsys: pytest.CaptureFixture[str],
+         *args: str) -> Said:
+    """Run a command; its signal handlers are taken away again, and options may be wrong."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    capsys.readouterr()
+    try:
+        status = main(args)
+    except SystemExit as ending:
+        assert isinstance(ending.code, int)
+        status = ending.code
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    captured = capsys.readouterr()
+    assert 'Traceback' not in captured.err
+    return Said(status, captured.out, captured.err)
+
+
+@contextmanager
+def running_simulator(*options: str) -> Iterator[Process]:
+    """Run a simulator until the end of the block."""
+    with Process('simulator', *options) as simulator:
+        simulator.wait_for('simulator: station')
+        yield simulator

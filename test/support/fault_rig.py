@@ -1,0 +1,148 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node, the simulator, and a box between them that spoils their line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from support.fault_box import FaultBox
+from support.ros import (
+    EVERYTHING,
+    Inbox,
+    Observer,
+    OK,
+    Process,
+    ros_args,
+    until_status,
+    values_in,
+)
+from support.simulator_process import Files, make_files
+
+SPEEDS = (1200, -800)  # of station 1
+SETPOINT = 21.5  # of station 2
+
+# What results begin with.
+UNKNOWN = 'unknown whether written: '
+NOT_SENT = 'not written: not sent: '
+NO_ANSWER = '2509 ERR_INACTIVE_STATION: Slave Station (2) Inactive'
+
+
+def is_unanswered(result: str) -> bool:
+    """
+    Tell whether a write had no answer of station 2.
+
+    What was on its way when the fault began decides whether the write was sent.
+    """
+    return result.startswith((UNKNOWN + NO_ANSWER, NOT_SENT + NO_ANSWER))
+
+
+@dataclass(slots=True)
+class Rig:
+    """Processes, and what is heard of the node."""
+
+    observer: Observer
+    files: Files
+    simulator: Process
+    node: Process
+    diagnostics: Inbox
+    results: Inbox
+    speeds: Inbox
+    setpoint: Inbox
+    publisher: Any = None
+
+    def until_well(self) -> None:
+        """Wait until every mapping is read."""
+        until_status(self.diagnostics, 'mappings', OK)
+        until_status(self.diagnostics, 'link', OK)
+
+    def status(self, name: str, level: bytes, *words: str) -> DiagnosticStatus:
+        """Wait for a status with this level and these words."""
+        return until_status(self.diagnostics, name, level,
+                            lambda status: all(word in status.message for word in words))
+
+    def recovers(self, limit: float) -> None:
+        """Wait for new values of both stations, for ``limit`` s at most, and good diagnostics."""
+        began = time.monotonic()
+        self.diagnostics.clear()
+        before = len(self.speeds), len(self.setpoint)
+        self.observer.until(
+            lambda: len(self.speeds) > before[0] and len(self.setpoint) > before[1],
+            'new values')
+        duration = time.monotonic() - began
+        self.until_well()
+        print(f'values are back after {duration:.2f} s')
+        assert duration < limit
+
+    def write(self, value: float) -> str:
+        """Write the set point of station 2; return the text of the result."""
+        if self.publisher is None:
+            self.publisher = self.observer.publisher(
+                Float32MultiArray, '/abdf1/write/setpoint')
+        self.results.clear()
+        self.publisher.publish(Float32MultiArray(data=[value]))
+        return str(self.results.first().message)
+
+    def has_read_only(self, *setpoints: float) -> bool:
+        """Tell whether the true speeds and those set points are all that has ever come."""
+        return {tuple(values_in(message)) for message in self.speeds} <= {SPEEDS} and \
+            {values_in(message)[0] for message in self.setpoint} <= {*setpoints}
+
+    def restart_simulator(self) -> None:
+        """Start the simulator that has ended anew."""
+        self.simulator.result()
+        self.simulator = self.files.start_simulator()
+
+
+@contextmanager
+def rigged(observer: Observer, files: Files, port: str, simulator: Process,
+           *assignments: str, program: str | Path = 'node') -> Iterator[Rig]:
+    """Run the node on ``port`` while the block runs, against a simulator that runs already."""
+    inboxes = {
+        'diagnostics': observer.diagnostics(port), 'results': observer.results(),
+        'speeds': observer.listen(Int16MultiArray, '/abdf1/read/speeds', EVERYTHING),
+        'setpoint': observer.listen(Float32MultiArray, '/abdf1/read/setpoint', EVERYTHING)}
+    arguments = ros_args(f'net_file:={files.net}', f'map_file:={files.map}', f'port:={port}',
+                         *assignments)
+    with Process(program, *arguments) as node:
+        rig = Rig(observer, files, simulator, node, **inboxes)
+        try:
+            yield rig
+            rig.node.end()
+        finally:
+            rig.simulator.__exit__()  # the one that runs by now
+    for inbox in inboxes.values():
+        observer.forget(inbox)
+    if rig.publisher is not None:
+        observer.node.destroy_publisher(rig.publisher)
+
+
+@contextmanager
+def boxed(
+        observer: Observer, folder: Path, *assignments: str) -> Iterator[tuple[Rig, FaultBox]]:
+    """Run simulator, box and node, all of them well when the block begins."""
+    files = make_files(folder)
+    simulator = files.start_simulator()
+    with FaultBox(files.port, folder / 'line') as box, rigged(
+            observer, files, str(box.name), simulator, *assignments) as rig:
+        rig.until_well()
+        yield rig, box

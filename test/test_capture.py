@@ -1,0 +1,145 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Captures: written, read again, limited, refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.capture import CaptureWriter, Chunk, Direction, is_capture_line, read_capture
+from abdf1_ros.errors import Problem
+from hypothesis import given, strategies
+import pytest
+
+CHUNKS = [Chunk(0.0, Direction.OUT, b'\x10\x05\x01\xff'),
+          Chunk(0.00421, Direction.IN, b'\x10\x04'),
+          Chunk(3600.5, Direction.UNKNOWN, b'\x00')]
+TEXT = """\
+# abdf1_ros capture 1
+# baud: 19200
+0.000000 > 10 05 01 FF
+0.004210 < 10 04
+3600.500000 ? 00
+"""
+
+
+def lines_of(path: Path) -> list[str]:
+    return path.read_text(encoding='ascii').splitlines()
+
+
+def chunks_of(path: Path) -> list[Chunk]:
+    return list(read_capture(str(path), lines_of(path), {}))
+
+
+def test_format(tmp_path: Path) -> None:
+    writer = CaptureWriter(tmp_path / 'x', settings={'baud': '19200'})
+    for chunk in CHUNKS:
+        writer.write(chunk)
+    assert (tmp_path / 'x').read_text(encoding='ascii') == TEXT  # before it is closed
+    writer.close()
+    settings: dict[str, str] = {}
+    assert list(read_capture('x', TEXT.splitlines(), settings)) == CHUNKS
+    assert settings == {'baud': '19200'}
+
+
+@given(strategies.builds(
+    Chunk, strategies.integers(0, 10**12).map(lambda micros: micros / 1e6),
+    strategies.sampled_from(Direction), strategies.binary(min_size=1, max_size=50)))
+def test_round_trip(chunk: Chunk) -> None:
+    (again,) = read_capture('x', ['# abdf1_ros capture 1', str(chunk)], {})
+    assert again.time == pytest.approx(chunk.time, abs=1e-6)
+    assert again[1:] == chunk[1:]
+
+
+def test_blank_lines_remarks_and_a_second_head_may_stand_anywhere() -> None:
+    head, *rest = TEXT.splitlines()
+    text = [head, '', '# port lost', *rest, head, '# check: BCC', '   ', *rest]
+    settings: dict[str, str] = {}
+    assert list(read_capture('x', text, settings)) == CHUNKS * 2
+    assert settings == {'baud': '19200', 'check': 'BCC'}
+
+
+def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
+    path, old = tmp_path / 'x', tmp_path / 'x.1'
+    writer = CaptureWriter(path, 1000, {'baud': '9600'})
+    for count in range(200):
+        writer.write(Chunk(count / 10, Direction.IN, bytes((count,))))
+        size = path.stat().st_size + (old.stat().st_size if old.exists() else 0)
+        assert size <= 1000
+    writer.close()
+    last = chunks_of(old) + chunks_of(path)
+    assert [chunk.data[0] for chunk in last] == list(range(200 - len(last), 200))
+    assert len(last) > 20
+    assert lines_of(path)[:2] == ['# abdf1_ros capture 1', '# baud: 9600']
+    assert sorted(file.name for file in tmp_path.iterdir()) == ['x', 'x.1']
+
+
+def test_older_capture_is_put_aside(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    for chunk in CHUNKS:
+        writer = CaptureWriter(path)
+        writer.write(chunk)
+        writer.close()
+    assert chunks_of(path) == CHUNKS[2:]
+    assert chunks_of(tmp_path / 'x.1') == CHUNKS[1:2]
+
+
+def test_other_files_are_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    path.write_text('important', encoding='ascii')
+    with pytest.raises(OSError, match='is no capture; give another name'):
+        CaptureWriter(path)
+    assert path.read_text(encoding='ascii') == 'important'
+    with pytest.raises(OSError, match='is no capture'):
+        CaptureWriter(Path('/dev/null'))
+    with pytest.raises(OSError, match='is no capture'):
+        CaptureWriter(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        CaptureWriter(tmp_path / 'nowhere' / 'x')
+
+
+def test_settings_of_any_text_stay_on_their_line(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    CaptureWriter(path, settings={'port': '/dev/s\xe9rie\n0 > 10 04\udcff'}).close()
+    assert lines_of(path)[1:] == ['# port: /dev/s\\xe9rie\\n0 > 10 04\\udcff']
+    assert chunks_of(path) == []
+
+
+def test_empty_file_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    path.touch()
+    CaptureWriter(path).close()
+    assert chunks_of(path) == []
+
+
+@pytest.mark.parametrize('line', [
+    '0.1 > 10 0', '0.1 > zz', '0.1 = 10 04', '0.1', 'soon > 10 04', '> 10 04', 'x'])
+def test_bad_line_is_named(line: str) -> None:
+    with pytest.raises(Problem, match='should be seconds, ">", "<" or "[?]", and bytes') as caught:
+        list(read_capture('a.cap', ['# abdf1_ros capture 1', '', line], {}))
+    assert str(caught.value).startswith('a.cap:3: ')
+
+
+@pytest.mark.parametrize('time', ['nan', 'inf', '-inf'])
+def test_time_is_a_number(time: str) -> None:
+    with pytest.raises(Problem, match='a.cap:2: .* is no number of seconds'):
+        list(read_capture('a.cap', ['# abdf1_ros capture 1', f'{time} > 10 04'], {}))
+
+
+def test_other_version_is_refused() -> None:
+    assert is_capture_line('# abdf1_ros capture 2')
+    assert not is_capture_line('# baud: 9600')
+    with pytest.raises(Problem, match='a.cap:1: ".* capture 2" should be ".* capture 1"'):
+        list(read_capture('a.cap', ['# abdf1_ros capture 2'], {}))

@@ -1,0 +1,84 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the package depends on: keys that rosdep knows, and exact versions for tests and tools."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+import re
+import sys
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
+KEYS = dict(line.split() for line in
+            (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
+            if line and not line.startswith('#'))
+PINNED = ('ros.txt', 'test.txt', 'tools.txt', 'fuzz.txt', 'audit.txt')
+
+# The key that brings a module which has another name.
+BRINGS = {'serial': 'python3-serial'}
+
+
+def keys(kind: str) -> set[str]:
+    """Return the keys of package.xml of one kind, such as "exec_depend"."""
+    return {entry.text or '' for entry in MANIFEST.iter(kind)}
+
+
+def imported(folder: str) -> set[str]:
+    """Return the modules that the files of a folder import, without those of Python itself."""
+    found = set()
+    for path in (ROOT / folder).rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split('.')[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.split('.')[0])
+    return found - sys.stdlib_module_names - {'abdf1_ros'}
+
+
+def test_rosdep_knows_every_key() -> None:
+    named = {entry.text for entry in MANIFEST if entry.tag.endswith('depend')}
+    assert named == KEYS.keys()
+    assert set(KEYS.values()) == {'jazzy', 'python.yaml'}
+    assert {key for key, source in KEYS.items() if source == 'python.yaml'} == {
+        key for key in KEYS if key.startswith('python3-')}
+
+
+@pytest.mark.parametrize('folder', ['abdf1_ros', 'launch'])
+def test_users_get_what_is_imported(folder: str) -> None:
+    assert {BRINGS.get(module, module) for module in imported(folder)} <= keys('exec_depend')
+
+
+def test_users_get_no_more_than_is_imported() -> None:
+    used = {BRINGS.get(module, module)
+            for folder in ('abdf1_ros', 'launch') for module in imported(folder)}
+    assert keys('exec_depend') == used
+
+
+@pytest.mark.parametrize('name', PINNED)
+def test_tools_of_developers_are_pinned(name: str) -> None:
+    lines = (ROOT / 'requirements' / name).read_text(encoding='utf-8').splitlines()
+    needs = [line for line in lines if line and not line.startswith('#')]
+    assert needs
+    pin = re.compile(r'[A-Za-z0-9_.-]+(\[[a-z]+\])?==[0-9][0-9.]*[0-9]( +# .*)?')
+    assert [line for line in needs if not pin.fullmatch(line)] == []
+
+
+def test_every_file_of_requirements_is_looked_at() -> None:
+    assert {path.name for path in (ROOT / 'requirements').iterdir()} == {*PINNED, 'rosdep.txt'}

@@ -1,0 +1,233 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Deployment files: what can be checked of them without installing them."""
+
+from __future__ import annotations
+
+import configparser
+from fnmatch import fnmatch
+import json
+import os
+from pathlib import Path
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+
+import pytest
+from support.launch_stand_in import SOURCE
+from support.ros import get_parameters, Observer, PATIENCE
+
+DEPLOY = SOURCE / 'deploy'
+UNIT = DEPLOY / 'abdf1@.service'
+RULES = DEPLOY / '99-abdf1.rules'
+DOCKERFILE = DEPLOY / 'Dockerfile'
+SETUP = (SOURCE / 'setup.py').read_text(encoding='utf-8')
+EXECUTABLES = set(re.findall(r"f'(\w+) = \{PACKAGE\}", SETUP))
+
+
+# systemd
+
+
+def unit() -> dict[str, dict[str, list[str]]]:
+    """Return the settings of the unit by section; each may be there several times."""
+    sections: dict[str, dict[str, list[str]]] = {}
+    for line in UNIT.read_text(encoding='utf-8').splitlines():
+        if line.startswith('['):
+            section = sections.setdefault(line.strip('[]'), {})
+        elif line and not line.startswith('#'):
+            key, _, value = line.partition('=')
+            section.setdefault(key, []).append(value)
+    return sections
+
+
+def test_unit_has_the_syntax_of_systemd() -> None:
+    parser = configparser.ConfigParser(strict=False, interpolation=None)
+    parser.optionxform = str  # type: ignore[assignment,method-assign]
+    parser.read_string(UNIT.read_text(encoding='utf-8'))
+    assert parser.sections() == ['Unit', 'Service', 'Install']
+
+
+@pytest.mark.skipif(not shutil.which('systemd-analyze'), reason='there is no systemd here')
+def test_systemd_finds_nothing_wrong(tmp_path: Path) -> None:
+    instance = shutil.copy(UNIT, tmp_path / 'abdf1@press.service')
+    result = subprocess.run(['systemd-analyze', 'verify', '--man=no', str(instance)],
+                            check=False, capture_output=True, text=True, timeout=PATIENCE)
+    assert (result.returncode, result.stderr) == (0, '')
+
+
+def test_unit_starts_again_after_what_may_pass_only() -> None:
+    service = unit()['Service']
+    assert service['Restart'] == ['on-failure']
+    assert service['RestartPreventExitStatus'] == ['2']  # faulty files
+    assert service['KillSignal'] == ['SIGINT']
+    assert unit()['Unit']['StartLimitIntervalSec'] == ['0']
+
+
+def test_unit_may_open_serial_ports_only() -> None:
+    service = unit()['Service']
+    assert service['DevicePolicy'] == ['closed']
+    assert set(service['DeviceAllow']) == {
+        'char-ttyS rw', 'char-ttyUSB rw', 'char-ttyACM rw'}
+    assert service['SupplementaryGroups'] == ['dialout']
+    assert service['User'] != ['root']
+    assert service['CapabilityBoundingSet'] == ['']
+
+
+def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(tmp_path: Path) -> None:
+    """Run ExecStart as it stands, with an installation and an /etc/abdf1 of our own."""
+    install, etc = tmp_path / 'install', tmp_path / 'etc'
+    node = install / 'lib' / 'abdf1_ros' / 'node'
+    node.parent.mkdir(parents=True)
+    node.write_text(f'#!/bin/sh\nexec {sys.executable} -m abdf1_ros.node "$@"\n')
+    node.chmod(0o755)
+    (install / 'setup.bash').write_text(f'cd {SOURCE}\n')
+    etc.mkdir()
+    (etc / 'press.yaml').write_text(
+        '/**: {ros__parameters: {port: /dev/ttyS99, stale_after: 9.0}}\n')
+    service = unit()['Service']
+    (command,) = service['ExecStart']
+    settings = dict(entry.split('=', 1) for entry in service['Environment'])
+    assert settings['ABDF1_INSTALL'] == '/opt/abdf1'
+    assert settings['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    words = [word.replace('%i', 'press').replace('/etc/abdf1', str(etc))
+             for word in shlex.split(command)]
+    environment = os.environ | settings | {
+        'ABDF1_INSTALL': str(install), 'ROS_LOG_DIR': str(tmp_path)}
+    with Observer() as observer, subprocess.Popen(words, env=environment) as process:
+        try:
+            assert get_parameters(observer, 'stale_after', node='/press') == [9.0]
+            process.send_signal(signal.Signals[service['KillSignal'][0]])
+            assert process.wait(PATIENCE) == 0
+        finally:
+            process.kill()
+
+
+# udev
+
+ITEM = re.compile(r'(\w+)(\{\w+\})?(==|!=|\+=|=)"([^"]*)"')
+MATCHES = {'SUBSYSTEM', 'ATTRS', 'ATTR', 'KERNELS', 'ACTION', 'DRIVER'}
+
+
+def rules() -> list[list[tuple[str, str, str, str]]]:
+    """Return the items (key, attribute, operator, value) of each rule."""
+    found = []
+    for line in RULES.read_text(encoding='utf-8').splitlines():
+        if line and not line.startswith('#'):
+            items = line.split(', ')
+            assert all(ITEM.fullmatch(item) for item in items), line
+            found.append([ITEM.fullmatch(item).groups('') for item in items])  # type: ignore
+    return found
+
+
+def test_rules_match_before_they_set() -> None:
+    for rule in rules():
+        operators = [operator for _, _, operator, _ in rule]
+        assert operators == sorted(operators, key=lambda operator: operator != '==')
+        assert operators[0] == '=='
+        assert all(key in MATCHES for key, _, operator, _ in rule if operator == '==')
+
+
+def test_every_adapter_gets_one_name_and_the_group_that_may_open_it() -> None:
+    names = []
+    for rule in rules():
+        if ('SUBSYSTEM', '', '==', 'tty') not in rule:
+            continue
+        assert ('GROUP', '', '=', 'dialout') in rule
+        assert ('MODE', '', '=', '0660') in rule
+        assert ('ENV', '{ID_MM_DEVICE_IGNORE}', '=', '1') in rule
+        names += [value for key, _, operator, value in rule if (key, operator) == (
+            'SYMLINK', '+=')]
+    three_lines = (SOURCE / 'config' / 'three_lines.yaml').read_text(encoding='utf-8')
+    assert names == re.findall(r'port: /dev/(\S+)', three_lines)
+
+
+def test_latency_timer_is_set_for_ftdi() -> None:
+    assert [('ACTION', '', '==', 'add'), ('SUBSYSTEM', '', '==', 'usb-serial'),
+            ('DRIVER', '', '==', 'ftdi_sio'), ('ATTR', '{latency_timer}', '=', '1')] in rules()
+
+
+@pytest.mark.skipif(not shutil.which('udevadm'), reason='there is no udev here')
+def test_udev_finds_nothing_wrong() -> None:
+    result = subprocess.run(['udevadm', 'verify', str(RULES)], check=False,
+                            capture_output=True, text=True, timeout=PATIENCE)
+    if 'Unknown command' in result.stderr:
+        pytest.skip('this udev is too old to verify')
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+# Docker
+
+
+def instructions() -> list[tuple[str, str]]:
+    """Return the instructions of the Dockerfile, lines joined."""
+    text = DOCKERFILE.read_text(encoding='utf-8')
+    lines = [line for line in text.splitlines() if not line.startswith('#')]
+    joined = '\n'.join(lines).replace('\\\n', ' ')
+    return [(word, rest) for word, _, rest in (
+        line.partition(' ') for line in joined.splitlines() if line)]
+
+
+def test_image_is_the_official_one_and_runs_as_an_ordinary_user() -> None:
+    words = [word for word, _ in instructions()]
+    assert instructions()[0] == ('FROM', 'ros:jazzy-ros-base')
+    assert ('USER', 'abdf1') in instructions()
+    assert words.index('RUN') < words.index('USER') < words.index('ENTRYPOINT')
+    assert ('STOPSIGNAL', 'SIGINT') in instructions()
+    script = next(rest for word, rest in instructions() if word == 'RUN')
+    assert 'rosdep install' in script
+
+
+def test_first_word_is_the_executable(tmp_path: Path) -> None:
+    """Run the entry point as Docker does, with an installation of our own."""
+    command = dict(instructions())
+    entry, default = json.loads(command['ENTRYPOINT']), json.loads(command['CMD'])
+    assert default == ['node']
+    for name in EXECUTABLES:
+        script = tmp_path / 'lib' / 'abdf1_ros' / name
+        script.parent.mkdir(parents=True, exist_ok=True)
+        script.write_text(f'#!/bin/sh\necho {name} "$@"\n')
+        script.chmod(0o755)
+    (tmp_path / 'setup.bash').write_text('')
+    entry = [word.replace('/opt/abdf1', str(tmp_path)) for word in entry]
+    for words, expected in ((default, 'node\n'), (['simulator', '--pty', 'a b'],
+                                                  'simulator --pty a b\n')):
+        assert subprocess.check_output([*entry, *words], text=True) == expected
+
+
+def test_all_that_is_installed_reaches_the_image() -> None:
+    allowed = [line.removeprefix('!') for line in (
+        DEPLOY / 'Dockerfile.dockerignore').read_text(encoding='utf-8').splitlines()
+        if line.startswith('!')]
+    wanted = {'package.xml', 'setup.py', 'setup.cfg', 'LICENSE', 'abdf1_ros/node.py',
+              'abdf1_ros/df1/frames.py', 'abdf1_ros/py.typed', 'resource/abdf1_ros'}
+    wanted |= {f'{folder}/x' for folder in re.findall(r"glob\('(\w+)/", SETUP)}
+    for name in wanted:
+        assert any(fnmatch(name, pattern.replace('**/', '*')) or name.startswith(f'{pattern}/')
+                   for pattern in allowed), name
+
+
+# The document
+
+
+def test_commands_and_files_of_the_document_exist() -> None:
+    text = (SOURCE / 'docs' / 'deployment.md').read_text(encoding='utf-8')
+    for name in re.findall(r'\b((?:deploy|config|launch|docs)/[\w@./-]+\w)', text):
+        assert (SOURCE / name).exists(), name
+    for name in re.findall(r'abdf1_ros (\w+) --', text):
+        assert name in EXECUTABLES
+    assert EXECUTABLES >= {'node', 'simulator', 'monitor', 'sniff', 'check', 'plc'}

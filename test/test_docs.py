@@ -1,0 +1,214 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The documentation names only what exists, links to it, and says nothing twice."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import fields
+from functools import cache
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+from abdf1_ros.driver.columns import MAP_COLUMNS
+from abdf1_ros.driver.network import FIELDS, load_network
+from abdf1_ros.messages import Message
+from abdf1_ros.node_parameters import Parameters
+import pytest
+import serial.serialposix
+from support import documents
+from support.simulator_process import STATUSES
+
+ROOT = documents.ROOT
+COMMANDS = tuple(re.findall(r"'(\w+) = \{PACKAGE\}", (ROOT / 'setup.py').read_text('utf-8')))
+OURS = re.compile(rf'(?:ros2 run abdf1_ros |python3? -m abdf1_ros\.|^(?:\$ )?)'
+                  rf'({"|".join(COMMANDS)})\b(.*)')
+PARAMETERS = {entry.name for entry in fields(Parameters)} | {
+    entry.parameter for entry in FIELDS.values()}
+TOPICS = {'read', 'write', *re.findall(r"'~/(\w+)'", (
+    ROOT / 'abdf1_ros' / 'node.py').read_text('utf-8'))}
+AT_HOME = {'fuzz'}  # folders that a page puts into the user's home
+TARGETS = set(re.findall(r'^([\w-]+):', (ROOT / 'Makefile').read_text('utf-8'), re.MULTILINE))
+VARIABLES = set(re.findall(r'^(\w+) \?=', (ROOT / 'Makefile').read_text('utf-8'), re.MULTILINE))
+
+
+@cache
+def help_of(*command: str) -> str:
+    """Return what a command says with --help."""
+    done = subprocess.run(
+        [sys.executable, '-m', f'abdf1_ros.{command[0]}', *command[1:], '--help'], text=True,
+        capture_output=True, check=True, timeout=60, env=os.environ | {'COLUMNS': '200'})
+    return done.stdout
+
+
+@cache
+def subcommands(command: str) -> frozenset[str]:
+    """Return the subcommands of a command."""
+    return frozenset(re.findall(r'^    (\w+)  ', help_of(command).partition('options:')[0],
+                                re.MULTILINE))
+
+
+def code(name: str) -> Iterator[str]:
+    """Yield every line of code on a page, in blocks and in the text."""
+    page = documents.text(name)
+    for block in documents.blocks(page):
+        yield from block.replace('\\\n', ' ').splitlines()
+    yield from documents.spans(page)
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_links_lead_somewhere(name: str) -> None:
+    page = documents.text(name)
+    for target in re.findall(r'\]\(([^)]+)\)', page):
+        if target.startswith(('http://', 'https://')):
+            continue
+        path, _, anchor = target.partition('#')
+        file = (ROOT / name).parent / path if path else ROOT / name
+        assert file.exists(), target
+        if anchor:
+            assert anchor in documents.anchors(file.read_text('utf-8')), target
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = documents.text('docs/README.md')
+    pages = {name.removeprefix('docs/') for name in documents.NAMES if name.startswith('docs/')}
+    assert [name for name in pages - {'README.md'} if f'({name})' not in index] == []
+
+
+def test_every_command_and_topic_is_in_the_reference() -> None:
+    commands, topics = (documents.text(f'docs/reference/{name}.md')
+                        for name in ('commands', 'topics'))
+    assert 'node' in COMMANDS
+    assert 'active_stations' in TOPICS
+    assert [command for command in COMMANDS if f'| `{command}' not in commands] == []
+    assert [topic for topic in TOPICS if f'| `~/{topic}' not in topics] == []
+
+
+def test_every_status_is_in_the_reference() -> None:
+    page = documents.text('docs/reference/diagnostics.md')
+    names = {re.sub(r'\d+', 'n', status) for status in STATUSES}
+    assert [name for name in names if f'| `abdf1: {name}` |' not in page] == []
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_rows_of_a_table_have_as_many_cells_as_its_head(name: str) -> None:
+    widths: list[int] = []
+    for line in documents.without_code(documents.text(name)).splitlines():
+        if line.startswith('|'):
+            widths.append(len(re.findall(r'(?<!\\)\|', line)))
+            assert widths[-1] == widths[0], line
+        else:
+            widths = []
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_commands_and_their_options_exist(name: str) -> None:
+    for line in code(name):
+        match = OURS.search(line)
+        if match is None or match[1] == 'node':
+            continue
+        command, rest = match[1], match[2].partition('#')[0]
+        words = rest.split()
+        sub = [words[0]] if words and words[0] in subcommands(command) else []
+        for option in re.findall(r'(?<=\s)(--[a-z][\w-]*)', rest):
+            assert option in help_of(command, *sub), line
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_parameters_exist(name: str) -> None:
+    for line in code(name):
+        named = set(re.findall(r'(?:-p |^)([a-z_.]+):=', line))
+        assert named <= PARAMETERS | {'net_file', 'map_file'}, line
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_topics_exist(name: str) -> None:
+    for line in code(name):
+        named = set(re.findall(r'(?<![\w/.])(?:~|/abdf1)/([a-z_]+)\b(?!\.)', line))
+        assert named <= TOPICS | AT_HOME, line
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_make_targets_exist(name: str) -> None:
+    for line in code(name):
+        for words in re.findall(r'^(?:\S+ )?make ([^#]*)', line):
+            for word in re.sub(r"'[^']*'", '', words).split():
+                variable, is_set, _ = word.partition('=')
+                assert variable in (VARIABLES if is_set else TARGETS), line
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_files_exist(name: str) -> None:
+    for span in documents.spans(documents.text(name)):
+        if re.fullmatch(r'[\w./@*-]+/[\w.@*-]+\.(py|csv|yaml|json|md|rules|service|txt)', span) \
+                and not span.startswith('/'):
+            places = (ROOT, ROOT / 'abdf1_ros', (ROOT / name).parent)
+            assert any(list(place.glob(span)) for place in places), span
+
+
+@pytest.mark.parametrize('name', documents.NAMES)
+def test_columns_exist(name: str) -> None:
+    known = {entry.column for entry in FIELDS.values()} | {
+        column.name for column in MAP_COLUMNS}
+    for column in re.findall(r'`(\w+)` = ', documents.text(name)):
+        assert column in known
+
+
+@pytest.mark.parametrize(('name', 'lines'), [
+    (name, block) for name in documents.NAMES for block in documents.blocks(documents.text(name))
+    if block.startswith('Station,')])
+def test_net_files_that_are_shown_are_good(name: str, lines: str, tmp_path: Path) -> None:
+    file = tmp_path / 'net.csv'
+    file.write_text(lines, encoding='utf-8')
+    assert load_network(str(file)).station == 5, name
+
+
+def test_no_sentence_is_said_twice() -> None:
+    said: Counter[str] = Counter()
+    for name in documents.NAMES:
+        for paragraph in re.split(r'\n\s*\n|\n\s*[-|]|\|', documents.prose(documents.text(name))):
+            for sentence in re.split(r'(?<=[.:?]) ', ' '.join(paragraph.split())):
+                if len(sentence.split()) >= 9:
+                    said[sentence] += 1
+    assert [sentence for sentence, times in said.items() if times > 1] == []
+
+
+@cache
+def printed() -> str:
+    """Return all texts of the program, of pyserial's port and of the system, one a line."""
+    sources = [*(ROOT / 'abdf1_ros').rglob('*.py'), Path(serial.serialposix.__file__)]
+    texts = [entry.template for entry in Message] + [os.strerror(number) for number in (2, 13)]
+    for source in sources:
+        texts += [node.value for node in ast.walk(ast.parse(source.read_text('utf-8')))
+                  if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    return '\n'.join(texts)
+
+
+def test_troubleshooting_quotes_what_is_printed() -> None:
+    quoted = [span for span in documents.spans(documents.text('docs/troubleshooting.md'))
+              if re.match(r'[\w ]*[a-z]+ [a-z]+', span) and not OURS.search(span)
+              and not re.search(r'--| -\w|\.csv|/dev|make ', span)]
+    assert len(quoted) > 10
+    for span in quoted:
+        pieces = re.split(r'[:;"]|\.\.\.|\b[\dA-F]+\b|\d+ of \d+', span)
+        for piece in pieces:
+            phrase = piece.strip(' :,(){}')
+            if len(phrase.split()) > 1:
+                assert phrase in printed(), span

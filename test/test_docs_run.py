@@ -1,0 +1,90 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The blocks of the documentation that are marked to run do what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+import pytest
+from support import documents
+from support.ros import Process
+
+PORT = '/tmp/plc'
+PAGES = [name for name in documents.NAMES
+         if documents.blocks(documents.text(name), only_run=True)]
+
+
+@pytest.fixture(scope='module')
+def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Run the simulator that the pages start in another terminal."""
+    name = tmp_path_factory.mktemp('line') / 'plc'
+    with Process('simulator', '--pty', str(name)) as simulator:
+        simulator.wait_for('stations 1 (PLC5), 2 (SLC) on')
+        yield name
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """Return an environment in which the commands have their short names."""
+    folder = tmp_path / 'bin'
+    folder.mkdir()
+    for command in ('plc', 'check', 'sniff', 'simulator'):
+        script = folder / command
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m abdf1_ros.{command} "$@"\n')
+        script.chmod(0o755)
+    paths = {'PATH': f'{folder}:{os.environ["PATH"]}', 'PYTHONPATH': str(documents.ROOT)}
+    return os.environ | paths
+
+
+def plain(line: str) -> str:
+    """Return a line without what may differ: numbers and blanks."""
+    return ' '.join(re.sub(r'\d+(\.\d+)?', '0', line).split())
+
+
+def expect(shown: list[str], said: list[str]) -> None:
+    """Fail unless all lines of a page have been said, in their order; "..." is anything."""
+    rest = iter([plain(line) for line in said])
+    for line in shown:
+        if line != '...':
+            assert plain(line) in rest, f'{line!r} is not in {said}'
+
+
+@pytest.mark.parametrize('name', PAGES)
+def test_marked_blocks_do_what_they_show(name: str, port: Path, environment: dict[str, str],
+                                         tmp_path: Path) -> None:
+    for block in documents.blocks(documents.text(name), only_run=True):
+        for part in block.replace(PORT, str(port)).split('$ ')[1:]:
+            command, *shown = part.splitlines()
+            done = subprocess.run(
+                ['bash', '-c', command], cwd=tmp_path, env=environment, text=True,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False)
+            assert done.returncode == 0, f'{command}: {done.stdout}'
+            expect(shown, done.stdout.splitlines())
+
+
+def test_both_tutorials_at_the_line_are_run() -> None:
+    assert {'docs/tutorials/panel.md', 'docs/tutorials/interlocks.md'} <= set(PAGES)
+
+
+def test_lines_have_to_come_in_their_order() -> None:
+    expect(['a 1', '...', 'c'], ['a 22', 'b', 'c'])
+    with pytest.raises(AssertionError):
+        expect(['c', 'a 1'], ['a 1', 'c'])

@@ -1,0 +1,129 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files of recorded bytes, as several programs write them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.dumps import read_hex, Recording
+from abdf1_ros.errors import Problem
+from hypothesis import given, strategies
+import pytest
+
+DATA = bytes.fromhex('100501ff1004') + bytes(range(256))
+
+
+def joined(lines: list[str]) -> bytes:
+    return b''.join(chunk.data for chunk in read_hex('x', lines))
+
+
+def xxd(data: bytes) -> list[str]:
+    """Return what xxd prints."""
+    return [f'{at:08x}: {part.hex(" ", -2):<39}  {_characters(part)}'
+            for at, part in _parts(data)]
+
+
+def hexdump(data: bytes) -> list[str]:
+    """Return what hexdump -C prints, lines that repeat left out."""
+    lines, last = [], b''
+    for at, part in _parts(data):
+        if part != last or len(part) < 16:
+            left, right = part[:8].hex(' '), part[8:].hex(' ')
+            lines.append(f'{at:08x}  {left:<23}  {right:<23}  |{_characters(part)}|')
+        elif lines[-1] != '*':
+            lines.append('*')
+        last = part
+    return [*lines, f'{len(data):08x}'] if data else []
+
+
+def _parts(data: bytes) -> list[tuple[int, bytes]]:
+    return [(at, data[at:at + 16]) for at in range(0, len(data), 16)]
+
+
+def _characters(data: bytes) -> str:
+    return ''.join(chr(byte) if 32 <= byte < 127 else '.' for byte in data)
+
+
+@pytest.mark.parametrize('text', [
+    '10 05 01 FF', '100501ff', '1005 01ff', '0x10, 0x05, 0x01, 0xFF', '10,05,01,FF',
+    '  10 05 01 FF  ', '# a poll\n10 05\n\n01 FF\n'])
+def test_bytes_alone(text: str) -> None:
+    assert joined(text.splitlines()) == b'\x10\x05\x01\xff'
+
+
+@given(strategies.one_of(
+    strategies.binary(max_size=70),
+    strategies.tuples(strategies.binary(min_size=1, max_size=2), strategies.integers(1, 80)).map(
+        lambda pair: pair[0] * pair[1])))
+def test_dumps_with_offsets(data: bytes) -> None:
+    assert joined(xxd(data)) == data
+    assert joined(hexdump(data)) == data
+
+
+def test_lines_left_out_by_hexdump() -> None:
+    data = b'\x10\x05' + bytes(100)
+    assert '*' in hexdump(data)
+    assert joined(hexdump(data)) == data
+    data = bytes(160)  # the last line is whole, so the offset alone ends the repetition
+    assert hexdump(data)[1:] == ['*', '000000a0']
+    assert joined(hexdump(data)) == data
+
+
+@pytest.mark.parametrize('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
+def test_bad_line_is_named(line: str) -> None:
+    with pytest.raises(Problem, match='is no hexadecimal dump; write bytes as in') as caught:
+        joined(['10 04', line])
+    assert str(caught.value).startswith('x:2: ')
+
+
+def chunks(path: Path, content: bytes, is_binary: bool = False) -> list[Chunk]:
+    path.write_bytes(content)
+    return list(Recording(path, is_binary).chunks())
+
+
+def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    poll = Chunk(None, Direction.UNKNOWN, b'\x10\x05\x01\xff')
+    assert chunks(path, b'10 05 01 FF\r\n') == [poll]
+    assert chunks(path, b'# abdf1_ros capture 1\r\n0.5 > 10 05 01 FF\r\n') == [
+        Chunk(0.5, Direction.OUT, poll.data)]
+    assert chunks(path, poll.data, True) == [poll]
+    assert chunks(path, b'') == []
+
+
+def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:
+    found = chunks(tmp_path / 'x', DATA * 100, True)
+    assert b''.join(chunk.data for chunk in found) == DATA * 100
+
+
+def test_binary_file_taken_for_text(tmp_path: Path) -> None:
+    with pytest.raises(Problem, match=r'x:1: this is no text; for a file of raw bytes give --b'):
+        chunks(tmp_path / 'x', DATA)
+
+
+def test_settings_and_percent(tmp_path: Path) -> None:
+    path = tmp_path / 'x'
+    path.write_text('# abdf1_ros capture 1\n# check: BCC\n0 > 10\n1 > 20\n', encoding='ascii')
+    recording = Recording(path)
+    percents = [recording.percent for _ in recording.chunks()]
+    assert recording.settings == {'check': 'BCC'}
+    assert 0 < percents[0] < percents[1] == 100
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        Recording(tmp_path / 'nothing')

@@ -1,0 +1,115 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What happens to processes and clocks, done to a real node; see docs/faults.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import itertools
+from pathlib import Path
+import signal
+import time
+
+import pytest
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int16MultiArray, UInt8MultiArray
+from support.fault_rig import rigged, SETPOINT
+from support.ros import Observer, Process
+from support.simulator_process import make_files
+
+TOO_OLD = 'not written: not sent: waited longer than '
+HERE = Path(__file__).resolve().parent
+
+
+@pytest.fixture(scope='module')
+def observer() -> Iterator[Observer]:
+    with Observer() as observer:
+        yield observer
+
+
+def test_subscriber_that_stalls_does_not_hold_up_the_others(
+        observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    arrivals: list[float] = []
+    subscription = observer.node.create_subscription(
+        Int16MultiArray, '/abdf1/read/speeds',
+        lambda message: arrivals.append(time.monotonic()), 10)
+    with rigged(observer, files, str(files.port), files.start_simulator()) as rig, \
+            Process(HERE / 'support' / 'stalling_subscriber.py') as stalling:
+        rig.until_well()
+        stalling.wait_for('got')
+        stalling.send(signal.SIGSTOP)
+        arrivals.clear()
+        observer.until(lambda: len(arrivals) > 30, 'values of three seconds')
+        pauses = [later - earlier for earlier, later in itertools.pairwise(arrivals)]
+        print(f'longest pause between values {max(pauses):.3f} s')
+        assert max(pauses) < 0.5
+        assert rig.write(3.0) == 'written'
+        lines = len(stalling.lines)
+        stalling.send(signal.SIGCONT)
+        stalling.wait_for('got', after=lines)
+        stalling.send(signal.SIGINT)
+    observer.node.destroy_subscription(subscription)
+
+
+def test_node_is_stopped_and_goes_on(observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    with rigged(observer, files, str(files.port), files.start_simulator(),
+                'write_timeout:=0.5') as rig:
+        rig.until_well()
+        watched = observer.listen(Int16MultiArray, '/abdf1/read/speeds',
+                                  QoSProfile(depth=1, deadline=Duration(seconds=2)))
+        watched.first()
+        publisher = observer.publisher(UInt8MultiArray, '/abdf1/write/flags')
+        rig.node.send(signal.SIGSTOP)
+        watched.deadlines.clear()
+        for _ in range(3):
+            publisher.publish(UInt8MultiArray(data=[1, 1, 1]))
+        published = time.monotonic()
+        observer.until(lambda: watched.deadlines, 'the deadline of the reader')
+        observer.until(lambda: time.monotonic() - published > 0.6, 'the pulses to become old')
+        flags = observer.listen(UInt8MultiArray, '/abdf1/read/flags', QoSProfile(depth=100))
+        rig.node.send(signal.SIGCONT)
+        rig.recovers(1.0)
+        observer.until(lambda: len(rig.results) == 3, 'a result for each pulse')
+        assert {result.message for result in rig.results} == {f'{TOO_OLD}0.5 s for the line'}
+        flags.next()
+        flags.next()
+        assert all(list(message.data) == [0, 0, 0] for message in flags)
+        assert rig.has_read_only(SETPOINT)
+        observer.forget(flags)
+        observer.forget(watched)
+        observer.node.destroy_publisher(publisher)
+
+
+def test_clock_steps(observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    with rigged(observer, files, str(files.port), files.start_simulator(),
+                program=HERE / 'support' / 'stepping_node.py') as rig:
+        rig.until_well()
+        lines = len(rig.node.lines)
+        rig.node.send(signal.SIGUSR1)
+        rig.node.wait_for('the clock has stepped')
+        rig.recovers(1.0)
+        # Here the publisher's clock has not stepped, as if it were another host.
+        assert rig.write(3.0) == f'{TOO_OLD}2 s for the line'
+        for _ in range(2):  # an hour back, and then behind the publisher
+            after = len(rig.node.lines)
+            rig.node.send(signal.SIGUSR2)
+            rig.node.wait_for('the clock has stepped', after=after)
+            rig.recovers(1.0)
+            assert rig.write(4.0) == 'written'
+        assert 'ERROR' not in '\n'.join(rig.node.lines[lines:])

@@ -1,0 +1,230 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What happens to a line, done to a real node and a real simulator; see docs/faults.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+import signal
+import struct
+
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+import pytest
+from support.fault_rig import (
+    boxed,
+    is_unanswered,
+    NO_ANSWER,
+    NOT_SENT,
+    rigged,
+    SETPOINT,
+    UNKNOWN,
+)
+from support.ros import (
+    details,
+    ERROR,
+    Observer,
+    OK,
+    Process,
+    until_status,
+    WARN,
+    write_csv,
+)
+from support.simulator_process import (
+    make_files,
+    MAP_HEADER,
+    NET_HEADER,
+    NET_ROW,
+    SIMULATOR_HEADER,
+)
+
+REFUSED = 'not written: the PLC refused it: '
+NOT_UNDERSTOOD = 'STS 10: illegal command, format or length'
+
+US, OTHER_MASTER = 5, 6
+
+
+@pytest.fixture(scope='module')
+def observer() -> Iterator[Observer]:
+    with Observer() as observer:
+        yield observer
+
+
+@pytest.mark.parametrize('way', ['to_node', 'to_plc'])
+def test_only_one_direction_works(observer: Observer, tmp_path: Path, way: str) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        setattr(box, way, False)
+        assert is_unanswered(rig.write(3.0))
+        rig.node.wait_for('[ERROR]', NO_ANSWER)
+        rig.status('link', ERROR, 'port open, but none of 2 stations answers')
+        rig.status('mappings', ERROR, '25 failed')
+        assert rig.write(4.0) == NOT_SENT + NO_ANSWER
+        setattr(box, way, True)
+        rig.recovers(3.0)
+        rig.node.wait_for('[INFO]', 'station 2 answers again')
+        assert rig.has_read_only(SETPOINT, 3.0)
+
+
+def test_adapter_begins_to_echo_and_ends(observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        for value, echoes in ((3.0, True), (4.0, False)):
+            box.echoes = echoes
+            rig.recovers(1.0)
+            assert rig.write(value) == 'written'
+            rig.setpoint.values([value])
+        assert 'ERROR' not in rig.node.text
+
+
+def test_line_babbles(observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        box.babbles = True
+        results = [rig.write(3.0 + number) for number in range(5)]
+        assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
+                   for text in results)
+        rig.node.wait_for('[INFO]', '2514 NTC_INVALID_SYMBOL')
+        box.babbles = False
+        rig.recovers(3.0)
+        assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
+
+
+def foreign_traffic(random: Random) -> bytes:
+    """Return what another master says and hears; some of it looks as if it were for us."""
+    wrong_value = struct.pack('<f', 99.0)  # as long as a reply with the set point
+    replies = [Packet(station, 2, 0x4F, 0, random.randrange(0x10000), wrong_value).encode()
+               for station in (OTHER_MASTER, US)]
+    return random.choice([
+        frames.poll_frame(7), frames.EOT, frames.ACK,
+        frames.master_frame(2, replies[0], Checksum.CRC),
+        *(frames.message_frame(reply, Checksum.CRC) for reply in replies)])
+
+
+def test_second_master_on_the_line(observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        random, said = Random(1), []
+
+        def talk(data: bytes) -> bytes:
+            if random.random() > 0.3:
+                return b''
+            said.append(foreign_traffic(random))
+            return said[-1]
+
+        box.overhear = talk
+        rig.node.wait_for('[ERROR]', '2510 ERR_WRONG_MESSAGE')
+        results = [rig.write(3.0 + number) for number in range(5)]
+        assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
+                   for text in results)
+        observer.until(lambda: len(said) > 100, 'more traffic')
+        assert 'unusable reply' not in rig.node.text  # no reply of others was taken for ours
+        assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
+        box.overhear = lambda data: b''
+        rig.recovers(3.0)
+
+
+def test_plc_loses_power_in_the_middle_of_a_write(
+        observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        command = struct.pack('<f', 3.0)
+        sent: list[bytes] = []
+
+        def cut(data: bytes) -> bytes:
+            if sent:  # the poll for the reply, so the command was acknowledged
+                rig.simulator.send(signal.SIGKILL)
+            elif command in data:
+                sent.append(data)
+            return b''
+
+        box.overhear = cut
+        assert rig.write(3.0).startswith(UNKNOWN + NO_ANSWER)
+        box.overhear = lambda data: b''
+        rig.status('link', ERROR, 'port open, but none of 2 stations answers')
+        rig.restart_simulator()
+        rig.recovers(3.0)
+        assert rig.has_read_only(SETPOINT)  # it is not written again
+
+
+def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path, 'processor_period:=1.0') as (rig, _):
+        data = rig.files.simulator.read_text()
+        write_csv(rig.files.simulator, SIMULATOR_HEADER, [
+            '1,SLC,N7:0,64,5,,', '1,SLC,F8:0,8,5,,', '2,PLC5,N7:0,64,5,,', '2,PLC5,F8:0,8,5,,'])
+        rig.simulator.send(signal.SIGKILL)
+        rig.simulator.result()
+        rig.diagnostics.clear()
+        rig.simulator = Process('simulator', '--pty', str(rig.files.port), '--data',
+                                str(rig.files.simulator))
+        for name, processor in (('station 1', 'SLC '), ('station 2', 'PLC-5')):
+            until_status(rig.diagnostics, name, OK, lambda status, processor=processor: details(
+                status)['processor'].startswith(processor))
+        assert rig.write(3.0) == REFUSED + NOT_UNDERSTOOD
+        rig.node.wait_for('[ERROR]', f'speeds (N7:0 at station 1): {NOT_UNDERSTOOD}')
+        rig.diagnostics.clear()
+        rig.status('link', OK)  # both answer
+        rig.status('mappings', ERROR, '25 failed')
+        rig.files.simulator.write_text(data)
+        rig.simulator.send(signal.SIGKILL)
+        rig.restart_simulator()
+        rig.recovers(10.0)
+        assert rig.has_read_only(SETPOINT)
+
+
+@pytest.mark.parametrize('fault, text', [
+    ('delay 2 300', 'written'),
+    ('delay 2 3000', UNKNOWN + '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
+def test_station_is_slow(
+        observer: Observer, tmp_path: Path, fault: str, text: str) -> None:
+    with boxed(observer, tmp_path) as (rig, _):
+        rig.simulator.say(fault)
+        assert rig.write(3.0).startswith(text)
+        rig.status('mappings', ERROR)
+        rig.status('link', OK)  # it answers its polls
+        rig.simulator.say('normal 2')
+        rig.recovers(3.0)
+        assert rig.has_read_only(SETPOINT, 3.0)
+
+
+def test_sink_of_a_slave_is_full(observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path) as (rig, _):
+        rig.simulator.say('full 2')
+        assert is_unanswered(rig.write(3.0))
+        rig.node.wait_for('[INFO]', '2519 NTC_NAK_LIMIT_EXCEEDED', '[station 2]')
+        rig.status('station 2', ERROR, 'inactive')
+        rig.status('link', WARN, '1 of 2 stations do not answer')
+        rig.speeds.next()  # the living go on
+        rig.simulator.say('normal 2')
+        rig.recovers(3.0)
+        assert rig.has_read_only(SETPOINT)
+
+
+def test_sink_of_a_peer_is_full(observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    write_csv(files.net, f'Mode,{NET_HEADER}', [f'Peer,{NET_ROW}'])
+    write_csv(files.map, MAP_HEADER, [
+        'speeds,Read,N7:0,1,PLC5,2', 'setpoint,ReadWrite,F8:0,1,PLC5'])
+    simulator = Process('simulator', '--pty', str(files.port), '--data', str(files.simulator),
+                        '--full-duplex', '1')
+    simulator.wait_for('stations 1 (PLC5) on')
+    with rigged(observer, files, str(files.port), simulator) as rig:
+        rig.until_well()
+        rig.simulator.say('full 1')
+        assert is_unanswered(rig.write(3.0).replace('(1)', '(2)'))
+        rig.node.wait_for('[INFO]', '2517 NTC_RCVD_NAK_SYMBOL')
+        rig.node.wait_for('[INFO]', '2519 NTC_NAK_LIMIT_EXCEEDED')
+        rig.status('link', ERROR, 'none of 1 stations answers')
+        rig.simulator.say('normal 1')
+        rig.recovers(3.0)
+        assert rig.has_read_only(12.5)

@@ -1,0 +1,111 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What happens to ports, done to a real node and a real simulator; see docs/faults.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import signal
+
+from abdf1_ros.driver.network import Network
+from abdf1_ros.port import open_port
+import pytest
+from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
+from support.ros import ERROR, Observer, Process
+from support.simulator_process import Files, make_files
+
+REFUSED = 'not written: refused: the port is not open'
+
+
+@pytest.fixture(scope='module')
+def observer() -> Iterator[Observer]:
+    with Observer() as observer:
+        yield observer
+
+
+@pytest.mark.parametrize('is_elsewhere', [False, True], ids=['same-name', 'another-device'])
+def test_device_vanishes_and_returns(
+        observer: Observer, tmp_path: Path, is_elsewhere: bool) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        assert rig.write(3.0) == 'written'
+        device = os.readlink(box.name)
+        box.unplug()
+        rig.status('link', ERROR, 'cannot open the port: ')
+        rig.node.wait_for('[ERROR]', f'{box.name}: the port was lost: ')
+        rig.node.wait_for('[ERROR]', f'{box.name}: cannot open the port: ', 'No such file')
+        rig.status('mappings', ERROR, '25 failed')
+        rig.status('station 2', ERROR, 'unknown: the port is not open')
+        assert rig.write(4.0) == REFUSED
+        lines = len(rig.node.lines)
+        box.plug(other_than=device if is_elsewhere else '')
+        assert not is_elsewhere or os.readlink(box.name) != device
+        rig.recovers(2.0)
+        rig.node.wait_for('[INFO]', f'{box.name}: open', after=lines)
+        assert rig.has_read_only(SETPOINT, 3.0)
+
+
+def test_port_is_busy(observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    simulator = files.start_simulator()
+    other = open_port(Network(com_port=str(files.port)))
+    with rigged(observer, files, str(files.port), simulator) as rig:
+        rig.node.wait_for('[ERROR]', 'cannot open the port: Could not exclusively lock port')
+        rig.status('link', ERROR, 'cannot open the port: Could not exclusively lock port')
+        assert rig.write(4.0) == REFUSED
+        assert not rig.speeds
+        other.close()
+        rig.recovers(2.0)
+        assert rig.has_read_only(SETPOINT)
+        assert rig.node.text.count('cannot open the port') == 1  # not once for each attempt
+
+
+def start_tcp_simulator(files: Files, address: str = '127.0.0.1:0') -> tuple[Process, str]:
+    """Return the process and the URL of its port."""
+    simulator = Process('simulator', '--tcp', address, '--data', str(files.simulator))
+    line = simulator.wait_for(' on socket://')
+    return simulator, line.split(' on ')[1].split(',')[0]
+
+
+def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    simulator, url = start_tcp_simulator(files)
+    with rigged(observer, files, url, simulator) as rig:
+        rig.until_well()
+        simulator.send(signal.SIGSTOP)
+        assert is_unanswered(rig.write(3.0))
+        rig.status('link', ERROR, 'port open, but none of 2 stations answers')
+        assert rig.write(4.0) == NOT_SENT + NO_ANSWER
+        simulator.send(signal.SIGCONT)
+        rig.recovers(3.0)
+        # What the connection has kept is answered late, and recognised as late.
+        rig.node.wait_for('[ERROR]', '2510 ERR_WRONG_MESSAGE')
+        assert rig.has_read_only(SETPOINT, 3.0)
+
+
+def test_process_at_the_far_end_of_tcp_ends_and_returns(
+        observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    simulator, url = start_tcp_simulator(files)
+    with rigged(observer, files, url, simulator) as rig:
+        rig.until_well()
+        simulator.send(signal.SIGKILL)
+        simulator.result()
+        rig.status('link', ERROR, 'cannot open the port: ')
+        assert rig.write(4.0) == REFUSED
+        rig.simulator, _ = start_tcp_simulator(files, url.removeprefix('socket://'))
+        rig.recovers(2.0)
+        assert rig.has_read_only(SETPOINT)

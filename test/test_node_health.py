@@ -1,0 +1,250 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the node says of its PLCs' processors and counters, first by itself, then in reality."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import time
+
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.health import StationHealth
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.network import Network
+from abdf1_ros.node_health import health_values, LinkCounterService, trouble
+from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.port import LinkThread
+from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from std_srvs.srv import Trigger
+from support.driver_bench import Recorder
+from support.mappings import make_mapping
+from support.ros import details, Inbox, Observer, OK, Process, until_status, WARN
+from support.simulator_process import Files, make_files
+
+NOW = 1000.0
+SLC = Identity('SLC', 'SLC 5/03', 'B', '3', Mode.REMOTE_RUN, 'REM RUN')
+
+
+def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
+    """Return an SLC in that mode."""
+    return Identity('SLC', 'SLC 5/03', 'B', '3', mode, text, faults)
+
+
+@pytest.mark.parametrize(('identity', 'text'), [
+    (None, None), (SLC, None), (with_mode(Mode.RUN, 'RUN'), None),
+    (with_mode(None, 'mode 0x05'), None), (Identity('', '1770-KF2'), None),
+    (with_mode(Mode.REMOTE_PROGRAM, 'REM PROG'), 'in program mode (REM PROG)'),
+    (with_mode(Mode.REMOTE_TEST_SCAN, 'REM TEST, single scan'),
+     'in test mode (REM TEST, single scan)'),
+    (with_mode(Mode.PROGRAM, 'PROG', 'major error 0x0020, processor halted'),
+     'major error 0x0020, processor halted (PROG)'),
+    (with_mode(Mode.RUN, 'RUN', 'bad RAM'), 'bad RAM (RUN)')])
+def test_what_keeps_a_processor_from_its_work(identity: Identity | None,
+                                              text: str | None) -> None:
+    assert trouble(identity) == text
+
+
+def test_values_before_anything_is_known() -> None:
+    assert health_values(StationHealth(), NOW) == {
+        'processor': 'unknown (not asked yet)', 'mode': 'unknown', 'faults': 'unknown'}
+
+
+def test_values_of_a_processor() -> None:
+    identity = Identity('SLC', 'SLC 5/03', 'B', '3', Mode.RUN, 'RUN', ('halted',),
+                        ('forces active', 'testing edits'))
+    health = StationHealth(str(identity), identity, NOW - 2.5, {'messages sent': '7'})
+    assert health_values(health, NOW) == {
+        'processor': 'SLC 5/03 series B revision 3, RUN', 'mode': 'RUN (2.5 s ago)',
+        'faults': 'halted; forces active; testing edits', 'link counter messages sent': '7'}
+
+
+def test_values_without_faults_and_without_counters() -> None:
+    health = StationHealth(str(SLC), SLC, NOW, no_counters='STS 10: illegal')
+    values = health_values(health, NOW)
+    assert (values['faults'], values['link counters']) == ('none', 'STS 10: illegal')
+    gateway = Identity('', '1770-KF2')
+    assert health_values(StationHealth('x', gateway, NOW), NOW)['mode'] == 'none (0.0 s ago)'
+
+
+# The service, with a driver that nothing moves
+
+
+class Desk:
+    """A node that has the service, and a client that has called it."""
+
+    def __init__(self, observer: Observer) -> None:
+        self.observer = observer
+        mappings = [make_mapping('N7:0', 'Write', station=station) for station in (1, 2)]
+        self.driver = Driver(
+            Network(), mappings, DriverSettings(), Recorder(time.monotonic))
+        self.driver.is_online = True
+        self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
+        self.service = LinkCounterService(self.driver, self.link)
+        observer.node.create_service(Trigger, '~/read', self.service.answer,
+                                     callback_group=MutuallyExclusiveCallbackGroup())
+        client = observer.node.create_client(Trigger, '~/read')
+        observer.until(client.service_is_ready, 'the service')
+        self.answer = client.call_async(Trigger.Request())
+        self.ticks: list[float] = []
+        observer.node.create_timer(0.01, lambda: self.ticks.append(time.monotonic()))
+
+    def work(self, replies: dict[int, bytes]) -> None:
+        """Let stations answer; the service looks for it afterwards."""
+        wanted = self.driver.health.counters_wanted
+        self.observer.until(lambda: len(wanted) == 2, 'requests')
+        while not wanted.isdisjoint(replies):
+            task = self.driver.next_task(self.driver.machine.now)
+            assert task is not None
+            is_echo = task.command.data[0] == 0
+            task.reply(task.command.reply(b'' if is_echo else replies[task.command.dst]))
+        self.service.check(time.monotonic())
+
+    def result(self) -> tuple[bool, str]:
+        """Return what the client gets."""
+        self.observer.until(self.answer.done, 'an answer')
+        return self.answer.result().success, self.answer.result().message
+
+    def ticks_pass(self) -> None:
+        """Wait until the node has done something else a few times."""
+        self.ticks.clear()
+        self.observer.until(lambda: len(self.ticks) > 3, 'ticks')
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    with Observer('desk') as observer:
+        desk = Desk(observer)
+        yield desk
+        desk.link.stop()
+
+
+def test_service_waits_without_holding_up_the_node(desk: Desk) -> None:
+    desk.work({})
+    desk.ticks_pass()
+    assert not desk.answer.done()
+    desk.work({1: b'\1\2', 2: b'\3\4'})
+    assert desk.result() == (True, 'station 1: bytes 01 02; station 2: bytes 03 04')
+
+
+def test_service_gives_up(desk: Desk) -> None:
+    desk.work({1: b'\1\2'})
+    desk.service.check(time.monotonic() + 4.0)
+    desk.ticks_pass()
+    assert not desk.answer.done()
+    desk.service.check(time.monotonic() + 6.0)
+    assert desk.result() == (False, 'station 1: bytes 01 02; station 2: no answer yet')
+
+
+def test_service_ends_with_the_port(desk: Desk) -> None:
+    desk.work({})
+    desk.driver.health.end('port lost: unplugged')
+    desk.service.check(time.monotonic())
+    assert desk.result() == (
+        False, 'station 1: port lost: unplugged; station 2: port lost: unplugged')
+
+
+# With the simulator
+
+
+class Bridge:
+    """A node that runs against a simulator."""
+
+    def __init__(self, files: Files, observer: Observer) -> None:
+        self.observer = observer
+        self.diagnostics: Inbox = observer.diagnostics(files.port)
+        self.simulator: Process
+        self.node: Process
+
+    def until(self, level: bytes, text: str, station: int = 2) -> dict[str, str]:
+        """Wait until the status of a station says this; return its values."""
+        self.diagnostics.clear()
+
+        def says(status: DiagnosticStatus) -> bool:
+            return status.message == text
+
+        return details(until_status(self.diagnostics, f'station {station}', level, says))
+
+    def ask(self) -> Trigger.Response:
+        """Call the service."""
+        return self.observer.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
+
+
+@pytest.fixture(scope='module')
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
+    files = make_files(tmp_path_factory.mktemp('health'))
+    arguments = files.args('diagnostics_period:=0.25', 'processor_period:=0.3')
+    with Observer() as observer:
+        bridge = Bridge(files, observer)
+        with files.start_simulator() as bridge.simulator, \
+                Process('node', *arguments) as bridge.node:
+            until_status(bridge.diagnostics, 'mappings', OK)
+            yield bridge
+            bridge.node.end()
+
+
+def test_processors_are_named(bridge: Bridge) -> None:
+    values = bridge.until(OK, 'OK: station 1 active', 1)
+    assert values['processor'] == 'PLC-5/40 series A revision A, REM RUN'
+    values = bridge.until(OK, 'OK: station 2 active')
+    assert values['processor'] == 'SLC 5/03 series A revision 1, REM RUN'
+    assert values['mode'].startswith('REM RUN (')
+    assert values['faults'] == 'none'
+
+
+def test_program_mode_and_fault_are_warnings(bridge: Bridge) -> None:
+    bridge.simulator.say('mode 2 program')
+    bridge.until(WARN, 'WARN: station 2 active, but in program mode (REM PROG)')
+    bridge.simulator.say('mode 2 fault')
+    values = bridge.until(
+        WARN, 'WARN: station 2 active, but major error 0x0020, processor halted (REM PROG)')
+    assert values['faults'] == 'major error 0x0020, processor halted'
+    assert values['error replies'] == '0'
+    bridge.simulator.say('mode 2 run')
+    assert bridge.until(OK, 'OK: station 2 active')['mode'].startswith('RUN (')
+
+
+def test_link_counters_are_read_by_the_service(bridge: Bridge) -> None:
+    assert not [name for name in bridge.until(OK, 'OK: station 1 active', 1)
+                if name.startswith('link counter')]
+    response = bridge.ask()
+    assert response.success, response.message
+    first, second = response.message.split('; ')
+    assert first.startswith('station 1: modem lines none on, messages sent ')
+    assert second.startswith('station 2: modem lines none on, messages sent ')
+    values = bridge.until(OK, 'OK: station 2 active')
+    assert f'messages sent {values["link counter messages sent"]},' in second
+    assert int(values['link counter polls received']) > 0
+
+
+def test_service_tells_of_a_refusal(bridge: Bridge) -> None:
+    bridge.simulator.say('error 2 10')
+    response = bridge.ask()
+    bridge.simulator.say('normal 2')
+    assert not response.success
+    first, second = response.message.split('; ')
+    assert first.startswith('station 1: modem lines')
+    assert second == 'station 2: STS 10: illegal command, format or length'
+
+
+def test_service_without_a_port(tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    with Observer() as observer, Process('node', *files.args(), '-r', '__node:=alone') as node:
+        response = observer.call(Trigger, '/alone/read_link_counters', Trigger.Request())
+        node.end()
+    assert (response.success, response.message) == (
+        False, 'nobody to ask: the port is not open')

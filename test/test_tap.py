@@ -1,0 +1,123 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Listening on a port, and between two."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+import os
+from pathlib import Path
+
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.driver.network import Network
+from abdf1_ros.tap import is_pty, Tap
+import pytest
+from support.ptys import PATIENCE, Pty, read_exactly
+
+
+@pytest.fixture
+def ptys(tmp_path: Path) -> Iterator[tuple[Pty, Pty]]:
+    pair = Pty(tmp_path / 'a'), Pty(tmp_path / 'b')
+    yield pair
+    for pty in pair:
+        pty.close()
+
+
+def tap(*names: object) -> Tap:
+    return Tap([str(name) for name in names], Network())
+
+
+def hear(listening: Tap, count: int) -> list[Chunk]:
+    """Return chunks until they have ``count`` bytes, the bytes of one direction joined."""
+    found: dict[Direction, bytes] = {}
+    for chunk in listening.chunks(PATIENCE, PATIENCE, lambda: None):
+        assert chunk.time is not None
+        assert 0 <= chunk.time < PATIENCE
+        found[chunk.direction] = found.get(chunk.direction, b'') + chunk.data
+        if sum(map(len, found.values())) >= count:
+            break
+    return [Chunk(None, direction, data) for direction, data in found.items()]
+
+
+def test_one_port_is_listened_to(ptys: tuple[Pty, Pty]) -> None:
+    with tap(ptys[0].name) as listening:
+        ptys[0].write(b'\x10\x04')
+        assert hear(listening, 2) == [Chunk(None, Direction.UNKNOWN, b'\x10\x04')]
+
+
+def test_everything_is_passed_on_both_ways(ptys: tuple[Pty, Pty]) -> None:
+    one, other = ptys
+    every = bytes(range(256))
+    with tap(one.name, other.name) as listening:
+        one.write(every)
+        assert other.read(256) == every
+        other.write(every[::-1])
+        assert one.read(256) == every[::-1]
+        assert hear(listening, 512) == [
+            Chunk(None, Direction.OUT, every), Chunk(None, Direction.IN, every[::-1])]
+
+
+def test_new_pseudo_terminal_takes_its_name_away(ptys: tuple[Pty, Pty], tmp_path: Path) -> None:
+    name = tmp_path / 'new'
+    with tap(f'pty:{name}', ptys[1].name) as listening:
+        assert listening.names == [str(name), str(ptys[1].name)]
+        descriptor = os.open(name, os.O_RDWR | os.O_NOCTTY)
+        os.write(descriptor, b'\x10\x05')
+        assert ptys[1].read(2) == b'\x10\x05'
+        ptys[1].write(b'\x10\x04')
+        assert read_exactly(descriptor, 2) == b'\x10\x04'
+        os.close(descriptor)
+    assert not name.is_symlink()
+
+
+def test_port_that_cannot_be_opened(ptys: tuple[Pty, Pty], tmp_path: Path) -> None:
+    first = tmp_path / 'first'
+    with pytest.raises(OSError, match=f'{tmp_path}/none: .*No such file'):
+        tap(f'pty:{first}', tmp_path / 'none')
+    assert not first.is_symlink()  # the first has been closed again
+
+
+def test_lost_port_ends_it_with_an_error(ptys: tuple[Pty, Pty]) -> None:
+    with tap(ptys[0].name, ptys[1].name) as listening:
+        ptys[1].close()
+        with pytest.raises(OSError, match='.'):
+            list(listening.chunks(PATIENCE, PATIENCE, lambda: None))
+
+
+def test_it_ends_when_told_or_when_the_time_is_up(ptys: tuple[Pty, Pty]) -> None:
+    with tap(ptys[0].name) as listening:
+        listening.stop()
+        assert list(listening.chunks(math.inf, PATIENCE, lambda: None)) == []
+        assert list(listening.chunks(0.0, PATIENCE, lambda: None)) == []
+
+
+def test_silence_is_told(ptys: tuple[Pty, Pty]) -> None:
+    told: list[int] = []
+    with tap(ptys[0].name) as listening:
+        def idle() -> None:
+            told.append(1)
+            if len(told) == 3:
+                listening.stop()
+
+        assert list(listening.chunks(PATIENCE, 0.01, idle)) == []
+    assert len(told) == 3
+
+
+@pytest.mark.parametrize(('name', 'expected'), [
+    ('pty', True), ('pty:/tmp/x', True), ('/dev/ttyUSB0', False), ('socket://h:1', False),
+    ('ptys', False)])
+def test_is_pty(name: str, expected: bool) -> None:
+    assert is_pty(name) is expected

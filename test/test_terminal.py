@@ -1,0 +1,109 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables, colours and progress."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+from abdf1_ros import terminal
+from abdf1_ros.terminal import colour, is_terminal, prepare_output, Progress, RED, table
+import pytest
+
+
+class Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture(autouse=True)
+def environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('TERM', 'xterm')
+    monkeypatch.delenv('NO_COLOR', raising=False)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    now = [0.0]
+    monkeypatch.setattr(terminal.time, 'monotonic', lambda: now[0])
+    return now
+
+
+def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert colour('bad', RED, Screen()) == '\x1b[31mbad\x1b[0m'
+    assert colour('bad', RED, io.StringIO()) == 'bad'
+    monkeypatch.setenv('NO_COLOR', '')
+    assert colour('bad', RED, Screen()) == 'bad'
+
+
+def test_dumb_terminal_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert is_terminal(Screen())
+    monkeypatch.setenv('TERM', 'dumb')
+    assert not is_terminal(Screen())
+
+
+def test_table() -> None:
+    assert table(('name', 'n'), [('a', '10'), ('long name', '5')], right=(1,)) == (
+        'name        n\n'
+        'a          10\n'
+        'long name   5')
+
+
+def test_progress_on_a_terminal_is_one_line(monkeypatch: pytest.MonkeyPatch,
+                                            clock: list[float]) -> None:
+    screen = Screen()
+    monkeypatch.setattr('sys.stderr', screen)
+    progress = Progress()
+    progress.show('1 of 9')
+    progress.clear()
+    assert screen.getvalue() == ''  # what takes no time needs none
+    clock[0] = 2.5
+    progress.show('2 of 9')
+    progress.show('3 of 9')
+    progress.clear()
+    progress.clear()
+    assert screen.getvalue() == '\r\x1b[K2 of 9\r\x1b[K3 of 9\r\x1b[K'
+
+
+def test_progress_elsewhere_comes_every_two_seconds(monkeypatch: pytest.MonkeyPatch,
+                                                    clock: list[float]) -> None:
+    file = io.StringIO()
+    monkeypatch.setattr('sys.stderr', file)
+    progress = Progress()
+    for tenth in range(50):
+        clock[0] = tenth / 10
+        progress.show(f'{tenth}')
+    progress.clear()
+    assert file.getvalue() == '20\n40\n'
+
+
+def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('sys.stdout', None)
+    monkeypatch.setattr('sys.stderr', None)
+    prepare_output()
+    for stream in (sys.stdout, sys.stderr):
+        print('text', file=stream, flush=True)
+        assert not is_terminal(stream)
+        stream.close()
+
+
+def test_output_that_knows_few_characters_shows_escapes(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr('sys.stdout', io.TextIOWrapper(raw, encoding='ascii'))
+    prepare_output()
+    print('h\xe9llo', flush=True)
+    assert raw.getvalue() == b'h\\xe9llo\n'

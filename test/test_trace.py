@@ -1,0 +1,122 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What passes a port is recorded, and nothing else changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.capture import Chunk, Direction, read_capture
+from abdf1_ros.driver.network import Network
+from abdf1_ros.trace import PortOpener, Trace, TracedPort
+import pytest
+from support.ptys import Pty
+
+
+class Loop:
+    """A port that gives back what it is given."""
+
+    def __init__(self) -> None:
+        self.data = b''
+        self.closed = False
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        data, self.data = self.data, b''
+        return data
+
+    def write(self, data: bytes) -> None:
+        self.data += data
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def chunks_of(path: Path, settings: dict[str, str] | None = None) -> list[Chunk]:
+    lines = path.read_text(encoding='ascii').splitlines()
+    return list(read_capture(str(path), lines, {} if settings is None else settings))
+
+
+def test_both_directions_with_their_times(tmp_path: Path) -> None:
+    now = iter((100.5, 101.25))
+    loop = Loop()
+    trace = Trace(str(tmp_path / 'x'), {}, pytest.fail)
+    port = TracedPort(loop, trace, 100.0, lambda: next(now))
+    port.write(b'\x10\x05')
+    assert port.read(None, 0) == b'\x10\x05'
+    assert port.read(None, 0) == b''
+    port.close()
+    assert loop.closed
+    assert chunks_of(tmp_path / 'x') == [
+        Chunk(0.5, Direction.OUT, b'\x10\x05'), Chunk(1.25, Direction.IN, b'\x10\x05')]
+
+
+def test_trace_that_fails_says_so_once_and_the_port_goes_on(tmp_path: Path) -> None:
+    errors: list[str] = []
+    folder = tmp_path / 'folder'
+    folder.mkdir()
+    trace = Trace(str(folder / 'x'), {}, errors.append, 200)
+    port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)
+    (folder / 'x').unlink()
+    folder.rmdir()  # so that it cannot begin anew when it is full
+    for _ in range(20):
+        port.write(b'\x10\x05')
+        assert port.read(None, 0) == b'\x10\x05'
+    (error,) = errors
+    assert 'No such file or directory' in error
+    assert error.endswith('; nothing more is recorded')
+
+
+def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
+    pty = Pty(tmp_path / 'line')
+    opener = PortOpener(Network(), str(pty.name))
+    port = opener.open()
+    assert not isinstance(port, TracedPort)
+    port.close()
+    opener.close()
+    pty.close()
+
+
+def test_opener_records_across_openings(tmp_path: Path) -> None:
+    pty = Pty(tmp_path / 'line')
+    opener = PortOpener(Network(baud=19200, mode='Peer'), str(pty.name))
+    opener.trace(str(tmp_path / 'x'), 1e6, pytest.fail)
+    for data in (b'\x01', b'\x02'):
+        port = opener.open()
+        port.write(data)
+        assert pty.read(1) == data
+        port.close()
+    opener.close()
+    settings: dict[str, str] = {}
+    chunks = chunks_of(tmp_path / 'x', settings)
+    assert [chunk.data for chunk in chunks] == [b'\x01', b'\x02']
+    assert (settings['baud'], settings['check'], settings['duplex'], settings['port']) == (
+        '19200', 'CRC', 'full', str(pty.name))
+    assert settings['begun'][:2] == '20'
+    pty.close()
+
+
+def test_opener_that_cannot_record_opens_all_the_same(tmp_path: Path) -> None:
+    pty = Pty(tmp_path / 'line')
+    errors: list[str] = []
+    opener = PortOpener(Network(), str(pty.name))
+    opener.trace(str(tmp_path), 1e6, errors.append)
+    assert errors == [f'{tmp_path} is there and is no capture; give another name; '
+                      'nothing is recorded']
+    port = opener.open()
+    port.write(b'\x01')
+    assert pty.read(1) == b'\x01'
+    port.close()
+    opener.close()
+    pty.close()

@@ -1,0 +1,74 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The generated tables leave nothing out."""
+
+from __future__ import annotations
+
+from abdf1_ros.driver.values import types_of
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import file_types_of, PlcType
+import pytest
+
+from tools import tables
+
+
+def rows(text: str) -> list[list[str]]:
+    """Return the cells of a table without its head."""
+    return [[cell.strip() for cell in line.strip('|').split(' | ')]
+            for line in text.splitlines()[2:]]
+
+
+@pytest.mark.parametrize('plc_type', PlcType)
+def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
+    shown = {Address.parse(examples[plc_type], plc_type).file_type
+             for _, examples in tables.PLACES if plc_type in examples}
+    assert shown == set(file_types_of(plc_type))
+
+
+@pytest.mark.parametrize(('label', 'examples'), tables.PLACES)
+def test_places_of_one_row_have_the_same_types(label: str,
+                                               examples: dict[PlcType, str]) -> None:
+    kinds = {types_of(Address.parse(text, plc_type)) for plc_type, text in examples.items()}
+    assert len(kinds) == 1, label
+
+
+def test_an_address_leads_to_its_message() -> None:
+    found = {row[0]: row for row in rows(tables.addresses())}
+    assert found['N integer'] == [
+        'N integer', '`N7:0`', '`N7:0`', '`N7:0`', '', 'int16',
+        'uint16, bcd16, int32, uint32, float32, string', 'Int16MultiArray']
+    assert found['a bit'][4:] == ['`110/17`', 'bool', '', 'UInt8MultiArray']
+
+
+def test_bars_in_cells_do_not_end_them() -> None:
+    assert tables.table(('a',), [('b | c',)]) == '| a |\n| --- |\n| b \\| c |'
+
+
+def test_parts_that_are_only_read_stand_in_parentheses() -> None:
+    timer = next(row for row in rows(tables.members()) if row[:2] == ['PLC-5', 'T'])
+    assert timer == ['PLC-5', 'T', '(CON) PRE ACC', 'EN TT DN']
+
+
+def test_packets_tell_limits_and_what_is_lacking() -> None:
+    found = {row[0]: row[1:] for row in rows(tables.packets())}
+    assert found['SLC, Processor 5/01'] == ['41', '41', 'F ST L']
+    assert found['PLC-5'] == ['110', '110', '']
+    assert {'F', 'ST', 'A'} <= set(found['SLC, Processor ML1000'][2].split())
+
+
+def test_numbers_of_messages_are_links() -> None:
+    crc = next(row for row in rows(tables.counters()) if row[1] == 'CNT_CRC_ERRORS')
+    assert crc == ['2547', 'CNT_CRC_ERRORS', 'frames received with a wrong CRC',
+                   'See [2506](messages.md#2506).']

@@ -1,0 +1,205 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Why each numbered message and counter comes, and what to do about it.
+
+The same for the ways in which a write ends. docs/reference/ is made from this;
+test/test_reference.py fails when one of them has no entry.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.messages import Message
+
+
+class Cause(NamedTuple):
+    """Where a numbered message comes from and what cures it."""
+
+    cause: str
+    cure: str
+
+
+MESSAGES: dict[Message, Cause] = {
+    Message.ERR_BAD_STATION: Cause(
+        'The cell Station of a map row is no whole number from 0 to 254; 255 goes for Write only.',
+        'Correct the cell. A PLC-5 shows station numbers in octal: 17 there is 15 here.'),
+    Message.ERR_BAD_PLC_TYPE: Cause(
+        'The cell PLC_Type of a map row is none of PLC2, PLC3, PLC5 and SLC.',
+        'Correct the cell; SLC for every SLC 500 and MicroLogix.'),
+    Message.ERR_ADDRESS_SYNTAX: Cause(
+        'The cell Address of a map row is no address of this family; the text behind it says '
+        'what is expected.',
+        'Compare with the table of addresses. PLC-5 inputs and outputs are octal, those of an SLC '
+        'name slot and word.'),
+    Message.ERR_ADDRESS_RANGE: Cause(
+        'The address of a map row, or the last of its Length elements, is beyond what the family '
+        'can have.',
+        'Correct Address or Length. Whether the file of this PLC is that long shows only when it '
+        'is read: then the PLC refuses with an STS.'),
+    Message.ERR_BAD_FUNCTION_CODE: Cause(
+        'A reply carries our transaction number, but answers another kind of command.',
+        'Look for a second master or a gateway that mixes up replies; record with `sniff`.'),
+    Message.ERR_BAD_CRC: Cause(
+        'A message arrived with a wrong CRC: noise, two stations with one address, or a PLC that '
+        'sends BCC.',
+        'If every message has it: Error_Code, Parity and Data_Bits of both sides. If some have: '
+        'shield, ground, terminators, length of the cable, a lower baud rate.'),
+    Message.ERR_BAD_BCC: Cause(
+        'A message arrived with a wrong BCC: as with CRC, or a PLC that sends CRC.',
+        'As for 2506. Prefer CRC on both sides: BCC does not find exchanged bytes.'),
+    Message.ERR_COMMAND_TIMEOUT: Cause(
+        'The PLC has acknowledged a command, but its reply did not come within Cmd_Timeout. It '
+        'is busy, its scan is long, or a gateway behind the station waits for somebody else.',
+        'Compare with `plc ping`; raise Cmd_Timeout. In Mode Slave: is the master polling us, and '
+        'does it pass messages on?'),
+    Message.ERR_INACTIVE_STATION: Cause(
+        'A station has not answered a command, or a poll, and all its repetitions.',
+        'Power, cable, station number, baud rate, check; is the channel set to the duplex of '
+        'Mode? `plc scan` shows who is there. The station comes back by itself.'),
+    Message.ERR_WRONG_MESSAGE: Cause(
+        'A reply answers nothing that is outstanding: it came after its command had been given '
+        'up.',
+        'Harmless once in a while. Often: Timeout or Cmd_Timeout is too short for this PLC.'),
+    Message.ERR_RCVD_NAK_SYMBOL: Cause(
+        'A station answered a command with DLE NAK, which slaves of Allen-Bradley never do.',
+        'Is it set to full duplex, or is it another make? The command is repeated.'),
+    Message.NTC_RCVD_MSG_TOO_LONG: Cause(
+        'More bytes than a message can have came without an end: noise, or a lost DLE ETX.',
+        'As for 2506; also check Data_Bits and Parity.'),
+    Message.NTC_RCVD_MSG_TOO_SHORT: Cause(
+        'A message with a good check has less than the six bytes of a header.',
+        'Record with `sniff`; something on the line speaks another protocol.'),
+    Message.NTC_INVALID_SYMBOL: Cause(
+        'Behind a DLE came a byte that makes no control symbol: noise or a wrong baud rate.',
+        'As for 2506. From the start and all the time: Baud, Parity, Data_Bits.'),
+    Message.NTC_ACK_EXPECTED: Cause(
+        'A command got no DLE ACK within Timeout; the text names the last symbol heard, 0x00 for '
+        'none.',
+        'Repeated by itself. Often: Timeout is too short, or the station too busy.'),
+    Message.NTC_EOT_STX_EXPECTED: Cause(
+        'A poll was answered neither by a message nor by DLE EOT.',
+        'Repeated by itself. A PLC with EOT suppression never says EOT: switch that off.'),
+    Message.NTC_RCVD_NAK_SYMBOL: Cause(
+        'DLE NAK was received. In full duplex: our message arrived damaged, or the PLC has no '
+        'room.',
+        'Repeated by itself. Always: Error_Code differs. Often: noise towards the PLC, or '
+        'max_outstanding is too high.'),
+    Message.NTC_NO_ETX_RCVD: Cause(
+        'A message broke off before its DLE ETX.',
+        'As for 2506; also an RS-485 transmitter that switches off too early.'),
+    Message.NTC_NAK_LIMIT_EXCEEDED: Cause(
+        'A command was repeated NAK_Retries times in vain; 2509 follows.',
+        'See 2509.'),
+    Message.NTC_ENQ_LIMIT_EXCEEDED: Cause(
+        'A poll (in full duplex: the question for the last answer) was repeated ENQ_Retries times '
+        'in vain; 2509 follows.',
+        'See 2509.'),
+    Message.NTC_NAK_RETRY: Cause(
+        'A command is sent again; the number in the text says why.',
+        'None, unless CNT_NAK_RETRIES keeps growing.'),
+    Message.NTC_ENQ_RETRY: Cause(
+        'A poll is sent again; the number in the text says why.',
+        'None, unless CNT_ENQ_RETRIES keeps growing.'),
+    Message.NTC_REPLY_MSG_RCVD: Cause(
+        'A reply has arrived: all is well. In the log with `--log-level debug` only.',
+        'None.'),
+    Message.NTC_DUPLICATE_MSG_RCVD: Cause(
+        'A message arrived a second time, because our ACK was lost. It is acknowledged and '
+        'dropped.',
+        'None; often: noise towards the PLC.'),
+    Message.CRT_BAD_STATION_ID: Cause(
+        'Station of the net file is no whole number from 0 to 254.',
+        'An address of our own that no PLC on the line has.'),
+    Message.CRT_BAD_DRIVER_MODE: Cause(
+        'Mode of the net file is none of Master, Slave and Peer.',
+        'Master for half duplex, Peer for full duplex.'),
+    Message.CRT_UNSUPPORTED_MODE: Cause(
+        'Mode is known, but this version does not have it. At present it has all of them.',
+        'Choose one that the text names.'),
+    Message.CRT_BAD_PLC_TYPE: Cause(
+        'PLC_Type of the net file is none of PLC2, PLC3, PLC5 and SLC.',
+        'What we are to PLCs that write to us; without Serve rows, leave the cell empty.'),
+    Message.CRT_BAD_ERROR_CODE: Cause(
+        'Error_Code of the net file is neither BCC nor CRC.',
+        "What the PLC's channel is set to; CRC where there is a choice."),
+    Message.CRT_BAD_NAK_RETRIES: Cause(
+        'NAK_Retries of the net file is no whole number from 0 to 10.',
+        'Leave the cell empty: 3.'),
+    Message.CRT_BAD_ENQ_RETRIES: Cause(
+        'ENQ_Retries of the net file is no whole number from 0 to 10.',
+        'Leave the cell empty: 3.'),
+    Message.CRT_BAD_CMD_TIMEOUT: Cause(
+        'Cmd_Timeout of the net file is no whole number from 500 to 5000.',
+        'Milliseconds, not seconds; leave the cell empty: 1000.'),
+}
+
+COUNTERS: dict[str, str] = {
+    'messages_sent': 'Grows with every transaction. Much faster than CNT_CMD_MSGS_SENT: '
+                     'repetitions.',
+    'messages_received': 'Stands still while commands go out: nobody answers.',
+    'commands_sent': 'Transactions begun.',
+    'commands_received': 'PLCs send by themselves: messages for `Serve` rows, or to be passed on.',
+    'replies_sent': 'What we have answered to them.',
+    'replies_received': 'Should keep up with CNT_CMD_MSGS_SENT.',
+    'polls_sent': 'Masters only. Many for one reply: the PLC needs long, which costs line time.',
+    'polls_received': 'Mode Slave only. Stands still: the master does not poll us.',
+    'naks_sent': 'Masters: one for each 2508 with `nak_on_command_timeout`. Peer: damaged '
+                 'messages.',
+    'naks_received': 'Peer: our messages arrive damaged, or the PLC has no room. Masters: 2511.',
+    'acks_sent': 'Messages we took.',
+    'acks_received': 'Messages the others took.',
+    'eots_sent': 'Mode Slave: polls when we had nothing to say.',
+    'eots_received': 'Polls that came before the reply was ready.',
+    'error_messages_sent': 'PLCs ask for words that no `Serve` row has.',
+    'error_messages_received': "PLCs refuse commands: the mappings' status names tag and STS.",
+    'nak_retries': 'A few a day are noise. A steady share of CNT_MSG_PACKETS_SENT is a bad '
+                   'line or a short Timeout.',
+    'nak_limit_exceeded': 'As often as a station went silent (2519).',
+    'enq_retries': 'As CNT_NAK_RETRIES, for polls; in full duplex for lost ACKs.',
+    'enq_limit_exceeded': 'As often as a station went silent at a poll (2520).',
+    'command_timeouts': 'See 2508.',
+    'bcc_errors': 'See 2507.',
+    'crc_errors': 'See 2506.',
+    'stale_messages': 'See 2510.',
+    'duplicate_messages': 'See 2524.',
+    'invalid_messages': 'See 2505, 2512, 2513 and 2518.',
+    'read_errors': 'The adapter was unplugged, or the device server hung up. The port is opened '
+                   'again by itself.',
+    'chars_sent': 'Stands still: the port is closed, or there is nothing to do.',
+    'chars_received': '0 while characters go out: cable, power, or the wrong port. Grows without '
+                      'messages: baud rate or parity.',
+}
+"""What a growing (or resting) counter tells, by the name of its field."""
+
+OUTCOMES: dict[Outcome, str] = {
+    Outcome.WRITTEN: 'The PLC has confirmed it. Bits of an SLC without masked write (5/01, 5/02, '
+                     'ML1000) are written `by reading the word and writing it back`, in three '
+                     'commands; what the program changes in that word in between is lost.',
+    Outcome.BROADCAST: 'Station 255.',
+    Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
+    Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
+                     'open: nothing was sent. The reason stands behind it.',
+    Outcome.NOT_SENT: 'Station inactive, or it waited longer than `write_timeout`.',
+    Outcome.FAILED: "The PLC's own error stands behind it, as STS and in words.",
+    Outcome.PARTLY: 'A write of several packets failed between them. It is read back, as the '
+                    'next one is.',
+    Outcome.UNKNOWN: 'Sent, but no reply came, or a node on the way has lost it. Behind it stands '
+                     'what the next read has found, within `write_timeout`: `read back: the PLC '
+                     'holds the value`, `... another value`, or why nothing was read.',
+}
+"""How a write ends: what it means."""

@@ -1,0 +1,202 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tables of the documentation that repeat what is in the code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+import re
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.driver.columns import MAP_COLUMNS
+from abdf1_ros.driver.network import FIELDS, NetField
+from abdf1_ros.driver.values import types_of
+from abdf1_ros.messages import Message, Severity
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcType
+from abdf1_ros.pccc.members import Members
+from abdf1_ros.pccc.processor import Processor
+
+from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
+from tools.rooms import ROOMS
+
+FAMILIES = {PlcType.PLC5: 'PLC-5', PlcType.SLC: 'SLC, MicroLogix', PlcType.PLC3: 'PLC-3',
+            PlcType.PLC2: 'PLC-2'}
+_5, _S, _3, _2 = FAMILIES
+
+# Places of one kind in every family that has them; of each the types are the same.
+PLACES: tuple[tuple[str, dict[PlcType, str]], ...] = (
+    ('O output', {_5: 'O:017', _S: 'O:2.0', _3: 'O:0017'}),
+    ('I input', {_5: 'I:003', _S: 'I:1.0', _3: 'I:0017'}),
+    ('S status', {_5: 'S:1', _S: 'S:1', _3: 'S:3'}),
+    ('B binary', {_5: 'B3:1', _S: 'B3:1', _3: 'B10:5', _2: '020'}),
+    ('N integer', {_5: 'N7:0', _S: 'N7:0', _3: 'N7:0'}),
+    ('F float', {_5: 'F8:0', _S: 'F8:0'}),
+    ('L long', {_S: 'L10:0'}),
+    ('A ASCII', {_5: 'A10:0', _S: 'A10:0', _3: 'A1:0'}),
+    ('D BCD', {_5: 'D11:0', _S: 'D11:0', _3: 'D1:0'}),
+    ('ST string', {_5: 'ST9:0', _S: 'ST9:0'}),
+    ('T timer', {_5: 'T4:0.ACC', _S: 'T4:0.ACC', _3: 'T:4.ACC'}),
+    ('C counter', {_5: 'C5:0.PRE', _S: 'C5:0.PRE', _3: 'C:9.PRE'}),
+    ('R control', {_5: 'R6:0.LEN', _S: 'R6:0.LEN'}),
+    ('PD of a PLC-5', {_5: 'PD10:0.SP'}),
+    ('PD of an SLC', {_S: 'PD9:0.SPS'}),
+    ('MG message', {_5: 'MG12:0.ERR', _S: 'MG12:0.ERR'}),
+    ('BT block transfer', {_5: 'BT13:0.RLEN'}),
+    ('SC SFC status', {_5: 'SC14:0.PRE'}),
+    ('a bit', {_5: 'B3:1/5', _S: 'B3:1/5', _3: 'B10:5/03', _2: '110/17'}),
+    ('a bit by number', {_5: 'B3/21', _S: 'B3/21'}),
+    ('a bit of I/O', {_5: 'I:017/12', _S: 'I:1.0/3', _3: 'I:0017/07'}),
+    ('a bit of a structure', {_5: 'T4:0/DN', _S: 'T4:0/DN', _3: 'T:4/DN'}),
+)
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [header, ['---'] * len(header), *rows]
+    return '\n'.join('| ' + ' | '.join(cell.replace('|', '\\|') for cell in line) + ' |'
+                     for line in lines)
+
+
+def _code(text: str) -> str:
+    return f'`{text}`' if text else ''
+
+
+def _linked(text: str) -> str:
+    """Turn the numbers of messages into links."""
+    return re.sub(r'\b(25[0-5][0-9])\b', r'[\1](messages.md#\1)', text)
+
+
+def net_fields() -> str:
+    """Return the columns of the net CSV."""
+    return table(
+        ('column', 'default', 'values', 'meaning', 'error'),
+        ((entry.column, str(entry.default), _values(entry), entry.description,
+          _linked(str(entry.message.number)) if entry.message else '')
+         for entry in FIELDS.values()))
+
+
+def _values(entry: NetField) -> str:
+    if entry.choices:
+        return ', '.join(map(str, entry.choices))
+    return '' if entry.low is None else f'{entry.low}-{entry.high}'
+
+
+def map_columns() -> str:
+    """Return the columns of the map CSV."""
+    return table(('column', 'empty cell', 'meaning'), (
+        (column.name, 'not allowed' if column.default is None else column.default,
+         column.description) for column in MAP_COLUMNS))
+
+
+def parameters() -> str:
+    """Return the node's own parameters; needs rclpy."""
+    from abdf1_ros.node_parameters import Parameters
+    rows = []
+    for entry in fields(Parameters):
+        low, high = entry.metadata['low'], entry.metadata['high']
+        limits = '' if low is None else f'{low:.15g} to {high:.15g}'
+        rows.append((_code(entry.name), _default(entry.default), limits,
+                     entry.metadata['description']))
+    return table(('parameter', 'default', 'range', 'meaning'), rows)
+
+
+def _default(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def addresses() -> str:
+    """Return address, file, types and message of every kind of place; needs rclpy."""
+    from abdf1_ros.node_messages import MESSAGES as TOPIC_TYPES
+    rows = []
+    for label, examples in PLACES:
+        parsed = [Address.parse(text, plc_type) for plc_type, text in examples.items()]
+        kinds = types_of(parsed[0])
+        assert all(types_of(address) == kinds for address in parsed), label
+        rows.append((
+            label, *(_code(examples.get(plc_type, '')) for plc_type in FAMILIES),
+            kinds[0].value, ', '.join(kind.value for kind in kinds[1:]),
+            TOPIC_TYPES[kinds[0]].__name__))
+    return table(('file', *FAMILIES.values(), 'type', 'Type may also be', 'message'), rows)
+
+
+def members() -> str:
+    """Return the named parts of the structures."""
+    rows = []
+    for plc_type, family in FAMILIES.items():
+        for kind in file_types_of(plc_type):
+            parts = layout_of(kind, plc_type).members
+            if parts:
+                rows.append((family, kind.value, _names(parts, False), _names(parts, True)))
+    return table(('family', 'file', 'values', 'bits'), rows)
+
+
+def _names(parts: Members, bits: bool) -> str:
+    return ' '.join(name if part.writable else f'({name})' for name, part in parts.items()
+                    if (part.bit is not None) is bits)
+
+
+def packets() -> str:
+    """Return how many words one packet carries, and what files a processor lacks."""
+    ways: list[tuple[str, Dialect, str]] = [
+        ('PLC-5', dialect_of(PlcType.PLC5), ''),
+        ('PLC-5, Access WordRange', dialect_of(PlcType.PLC5, Access.WORD_RANGE), ''),
+        *((f'SLC, Processor {processor.value}', dialect_of(PlcType.SLC, None, processor),
+           _lacking(processor)) for processor in Processor),
+        ('PLC-3', dialect_of(PlcType.PLC3), ''),
+        ('PLC-2', dialect_of(PlcType.PLC2), '')]
+    return table(('PLC', 'words read', 'words written', 'files it does not have'), (
+        (name, *(str(limit(FileType.BINARY)) for limit in (way.max_read, way.max_write)), lacking)
+        for name, way, lacking in ways))
+
+
+def _lacking(processor: Processor) -> str:
+    return ' '.join(kind.value for kind in file_types_of(PlcType.SLC)
+                    if not any(processor.has_file(file, kind) for file in range(256)))
+
+
+def messages(severity: Severity) -> str:
+    """Return the numbered messages of one severity, each with cause and cure."""
+    return table(('number', 'message', 'cause', 'what to do'), (
+        (f'<a id="{entry.number}"></a>{entry.number}',
+         f'{entry.name}: {_code(entry.template)}',
+         _linked(MESSAGES[entry].cause), _linked(MESSAGES[entry].cure))
+        for entry in Message if entry.severity is severity))
+
+
+def counters() -> str:
+    """Return the status counters."""
+    return table(('number', 'counter', 'counts', 'what it tells'), (
+        (str(entry.metadata['number']), entry.metadata['mnemonic'],
+         entry.metadata['description'], _linked(COUNTERS[entry.name]))
+        for entry in fields(Counters)))
+
+
+def outcomes() -> str:
+    """Return how a write may end."""
+    return table(('the message begins with', 'meaning'), (
+        (_code(outcome.value), text) for outcome, text in OUTCOMES.items()))
+
+
+def rooms() -> str:
+    """Return what is in each room and what it may import."""
+    return table(('room', 'what is in it', 'may import'), (
+        (', '.join(map(_code, room.name.split(', '))), room.contents,
+         'everything' if room.allowed is None else ', '.join(map(_code, room.allowed))
+         or 'nothing of the package') for room in ROOMS))
