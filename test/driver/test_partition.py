@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-import itertools
 import math
 
 from abdf1_ros.driver.partition import cheapest, Draft, draft, Span, Terms, without_contained
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.groupings import groupings
 from support.properties import PROPERTY
 
 COMMAND, WORD, LIMIT = 50.0, 2.0, 110
@@ -33,19 +33,6 @@ TERMS = Terms(COSTS)
 
 SPANS = st.builds(lambda first, words: Span(first, first + words),
                   st.integers(0, 150), st.sampled_from([1, 1, 1, 2, 5, 20]))
-
-
-def groupings(items: Sequence[Draft]) -> Iterable[list[list[Draft]]]:
-    """Yield every way to put items into groups."""
-    if not items:
-        yield []
-        return
-    head, *rest = items
-    for size in range(len(rest) + 1):
-        for others in itertools.combinations(rest, size):
-            left = [item for item in rest if item not in others]
-            for groups in groupings(left):
-                yield [[head, *others], *groups]
 
 
 def load(drafts: Iterable[Draft], terms: Terms = TERMS) -> float:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-import itertools
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -34,6 +33,7 @@ from abdf1_ros.pccc.server import Server
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.groupings import groupings
 from support.mappings import make_mapping
 from support.properties import PROPERTY
 
@@ -139,19 +139,6 @@ def test_nothing_is_bridged_across_files_stations_and_families(mappings: list[Ma
             (block.station, block.start.area)}
 
 
-def _partitions(items: list[Mapping]) -> Iterable[list[list[Mapping]]]:
-    """Yield every way to put items into groups."""
-    if not items:
-        yield []
-        return
-    head, *rest = items
-    for size in range(len(rest) + 1):
-        for others in itertools.combinations(rest, size):
-            left = [item for item in rest if item not in others]
-            for groups in _partitions(left):
-                yield [[head, *others], *groups]
-
-
 @PROPERTY
 @given(word_mappings(most=5))
 def test_no_other_plan_is_cheaper(mappings: list[Mapping]) -> None:
@@ -161,7 +148,7 @@ def test_no_other_plan_is_cheaper(mappings: list[Mapping]) -> None:
     long = [block for block in planned if len(block.requests) > 1]
     short = [mapping for mapping in mappings if mapping.codec.words <= limit]
     best = float('inf')
-    for groups in _partitions(short):
+    for groups in groupings(short):
         total = 0.0
         for group in groups:
             first = min(mapping.address.offset for mapping in group)
