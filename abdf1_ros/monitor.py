@@ -40,7 +40,7 @@ from types import FrameType
 from abdf1_ros.errors import FormatError
 from abdf1_ros.monitor_node import full_name, Watch
 from abdf1_ros.monitor_view import Line, render, Style
-from abdf1_ros.terminal import drop_output, prepare_output
+from abdf1_ros.terminal import drop_output, prepare_output, seconds_option
 from abdf1_ros.text import printable
 from rclpy.utilities import remove_ros_args
 
@@ -184,24 +184,14 @@ def _parse(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--node', default='/abdf1',
                         help='name of the bridge with its namespace (default: %(default)s)')
     parser.add_argument('--once', action='store_true', help='print one picture and end')
-    parser.add_argument('--seconds', type=_seconds, default=math.inf,
+    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end so many seconds after the node has been found')
-    parser.add_argument('--period', type=_seconds, default=1.0,
+    parser.add_argument('--period', type=seconds_option, default=1.0,
                         help='seconds from one printed picture to the next (default: '
                              '%(default)g)')
-    parser.add_argument('--wait', type=_seconds, default=10.0,
+    parser.add_argument('--wait', type=seconds_option, default=10.0,
                         help='seconds to look for the node at the start (default: %(default)g)')
     return parser.parse_args(args)
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
-    return value
 
 
 def _find(watch: Watch, seconds: float, has_ended: _Ending) -> bool:

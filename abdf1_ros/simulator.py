@@ -51,7 +51,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState
 from abdf1_ros.simulated_plc import Faults, load_plcs, numbers, SimulatedPlc
-from abdf1_ros.terminal import drop_output, prepare_output
+from abdf1_ros.terminal import drop_output, prepare_output, seconds_option
 
 EXIT_FAULT = 1
 EXIT_CONFIGURATION = 2
@@ -343,7 +343,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         default=Checksum.CRC.value, help='default: %(default)s')
     parser.add_argument('--at', metavar='"SECONDS COMMAND"', action='append', default=[],
                         help='a command to carry out after so many seconds; may be repeated')
-    parser.add_argument('--seconds', type=float, default=math.inf,
+    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end after so many seconds')
     return parser.parse_args(args)
 

@@ -47,7 +47,7 @@ from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, tex
 from abdf1_ros.sniffer.session import Session
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.tap import is_pty, Tap
-from abdf1_ros.terminal import drop_output, prepare_output
+from abdf1_ros.terminal import drop_output, prepare_output, seconds_option
 from abdf1_ros.text import printable
 from abdf1_ros.trace import begun_now, Trace
 
@@ -176,7 +176,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--summary', action='store_true', help='print the summary only')
     parser.add_argument('--save', metavar='FILE',
                         help='also write what a port or a tap hears into a capture')
-    parser.add_argument('--seconds', type=float, default=math.inf,
+    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end after so many seconds')
     options = parser.parse_args(args)
     if sum(map(bool, (options.files, options.port, options.tap))) != 1:

@@ -16,8 +16,10 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 import io
+import math
 import os
 import sys
 import time
@@ -100,3 +102,14 @@ class Progress:
         if self._is_shown:
             print('\r\x1b[K', end='', file=sys.stderr, flush=True)
             self._is_shown = False
+
+
+def seconds_option(text: str) -> float:
+    """Return what an option of seconds says: above 0; for argparse."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value

@@ -16,11 +16,20 @@
 
 from __future__ import annotations
 
+import argparse
 import io
 import sys
 
 from abdf1_ros import terminal
-from abdf1_ros.terminal import colour, is_terminal, prepare_output, Progress, RED, table
+from abdf1_ros.terminal import (
+    colour,
+    is_terminal,
+    prepare_output,
+    Progress,
+    RED,
+    seconds_option,
+    table,
+)
 import pytest
 
 
@@ -107,3 +116,10 @@ def test_output_that_knows_few_characters_shows_escapes(
     prepare_output()
     print('h\xe9llo', flush=True)
     assert raw.getvalue() == b'h\\xe9llo\n'
+
+
+def test_seconds_of_an_option_are_above_0() -> None:
+    assert seconds_option('0.5') == 0.5
+    for text in ('0', '-1', 'nan', 'inf', 'soon'):
+        with pytest.raises(argparse.ArgumentTypeError, match='a number of seconds above 0'):
+            seconds_option(text)

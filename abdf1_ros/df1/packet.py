@@ -24,6 +24,8 @@ from abdf1_ros.errors import FormatError
 _HEADER = struct.Struct('<BBBBH')
 HEADER_SIZE = _HEADER.size
 REPLY_BIT = 0x40
+# High priority: it says nothing about what is to be done (M 6-5).
+PRIORITY_BIT = 0x20
 BROADCAST = 255
 
 

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from abdf1_ros.df1.packet import Packet, REPLY_BIT
+from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import diagnostics, notation, plc2, plc5, slc, word_range
-from abdf1_ros.pccc.fields import PRIORITY_BIT, Reader
+from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.notation import count_of, hexadecimal, part_of, words_text
 from abdf1_ros.pccc.plc3 import ExtendedAddress
 from abdf1_ros.pccc.plc5 import SystemAddress

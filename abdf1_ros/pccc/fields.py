@@ -12,16 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Numbers and bits of PCCC, and a reader that knows when bytes run out."""
+"""Variable-length numbers of PCCC, and a reader that knows when bytes run out."""
 
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 
 _ESCAPE = 0xFF
-
-# Bit 5 of CMD marks high priority and says nothing about what is to be done (M 6-5).
-PRIORITY_BIT = 0x20
 
 
 def number(value: int) -> bytes:

@@ -23,13 +23,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.family import Commands, Family, Refusal
-from abdf1_ros.pccc.fields import PRIORITY_BIT, Reader
+from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.plc2_server import Plc2Commands

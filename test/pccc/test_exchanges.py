@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.access import Access, accesses_of
 from abdf1_ros.pccc.address import Address
@@ -32,7 +32,6 @@ from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.pccc.fields import PRIORITY_BIT
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
