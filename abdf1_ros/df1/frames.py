@@ -59,12 +59,13 @@ ACK = bytes((Code.DLE, Code.ACK))
 NAK = bytes((Code.DLE, Code.NAK))
 EOT = bytes((Code.DLE, Code.EOT))
 ENQ = bytes((Code.DLE, Code.ENQ))
-_SOH = bytes((Code.DLE, Code.SOH))
+SOH = bytes((Code.DLE, Code.SOH))
+_DATA_DLE = DLE + DLE
 
 
 def stuff(data: bytes) -> bytes:
     """Double every DLE of ``data`` (M 2-7)."""
-    return data.replace(DLE, DLE + DLE)
+    return data.replace(DLE, _DATA_DLE)
 
 
 def message_frame(data: bytes, checksum: Checksum) -> bytes:
@@ -76,7 +77,7 @@ def message_frame(data: bytes, checksum: Checksum) -> bytes:
 def master_frame(station: int, data: bytes, checksum: Checksum) -> bytes:
     """Return the frame of a master's message to ``station`` (0-255) around ``data`` (M 5-2)."""
     check = checksum.encode(checksum.of_message(data, station))
-    return _SOH + stuff(bytes((station,))) + STX + stuff(data) + ETX + check
+    return SOH + stuff(bytes((station,))) + STX + stuff(data) + ETX + check
 
 
 @cache
@@ -101,8 +102,7 @@ class Control:
     code: Code
 
 
-_CONTROLS: dict[int, Control] = {
-    code: Control(code) for code in (Code.ACK, Code.NAK, Code.EOT, Code.ENQ)}
+_CONTROLS = {pair: Control(Code(pair[1])) for pair in (ACK, NAK, EOT, ENQ)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,7 @@ class FrameDecoder:
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
         self._checksum = checksum
-        self._duplex = duplex
+        self._is_half_duplex = duplex is Duplex.HALF
         self._buffer = bytearray()
         self._data = bytearray()
         self._step: _Step = self._idle
@@ -200,29 +200,31 @@ class FrameDecoder:
         return None
 
     def _idle(self) -> Symbol | None:
-        start = self._buffer.find(Code.DLE)
-        skipped = len(self._buffer) if start < 0 else start
-        self.noise += skipped
-        del self._buffer[:skipped]
+        start = self._buffer.find(DLE)
+        if start:
+            skipped = len(self._buffer) if start < 0 else start
+            self.noise += skipped
+            del self._buffer[:skipped]
         if len(self._buffer) < 2:
             return None
-        code = self._buffer[1]
-        del self._buffer[:2]
-        return self._begin(code)
+        return self._begin(self._take_pair())
 
-    def _begin(self, code: int) -> Symbol | None:
-        half = self._duplex is Duplex.HALF
-        if code == Code.DLE:
-            self.noise += 1
-            return None  # a data byte of a message whose beginning we missed
-        if code == Code.STX:
+    def _take_pair(self) -> bytes:
+        pair = bytes(self._buffer[:2])
+        del self._buffer[:2]
+        return pair
+
+    def _begin(self, pair: bytes) -> Symbol | None:
+        if pair == STX:
             self._begin_data(None)
-        elif code == Code.SOH and half:
+        elif pair == SOH and self._is_half_duplex:
             self._step = self._soh_station
-        elif code == Code.ENQ and half:
+        elif pair == ENQ and self._is_half_duplex:
             self._step = self._poll_station
+        elif pair == _DATA_DLE:
+            self.noise += 1  # a data byte of a message whose beginning we missed
         else:
-            return _CONTROLS.get(code) or Unknown(code)
+            return _CONTROLS.get(pair) or Unknown(pair[1])
         return None
 
     def _begin_data(self, station: int | None) -> None:
@@ -279,25 +281,23 @@ class FrameDecoder:
         return None
 
     def _link_data(self) -> Symbol | None:
-        end = self._buffer.find(Code.DLE)
-        if end < 0:
-            return self._store(len(self._buffer))
-        if end > 0:
-            return self._store(end)
+        end = self._buffer.find(DLE)
+        if end:
+            return self._store(len(self._buffer) if end < 0 else end)
         if len(self._buffer) < 2:
             return None
-        code = self._buffer[1]
-        if code == Code.DLE:
+        pair = bytes(self._buffer[:2])
+        if pair == _DATA_DLE:
             del self._buffer[:1]
             return self._store(1)
-        if code == Code.ETX:
+        if pair == ETX:
             del self._buffer[:2]
             self._step = self._check
             return None
-        if self._duplex is Duplex.FULL and code in (Code.ACK, Code.NAK):
+        if pair in (ACK, NAK) and not self._is_half_duplex:
             del self._buffer[:2]
-            return Control(Code(code))  # an embedded response (M 4-3)
-        self._step = self._idle  # the code that broke in is read again as a symbol
+            return _CONTROLS[pair]  # an embedded response (M 4-3)
+        self._step = self._idle  # the pair that broke in is read again as a symbol
         return self._frame(Fault.NO_ETX)
 
     def _store(self, count: int) -> Symbol | None:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Duplex, FrameDecoder, Symbol
+from abdf1_ros.df1.frames import Duplex, EOT, FrameDecoder, SOH, STX, Symbol
 
 # One in 256 wrong frames has what looks like a good BCC, so one alone proves nothing.
 _BCC_FRAMES = 2
@@ -62,15 +62,15 @@ class ListeningDecoder(FrameDecoder):
         self._checksum = Checksum.BCC
         return super()._check()
 
-    def _begin(self, code: int) -> Symbol | None:
+    def _begin(self, pair: bytes) -> Symbol | None:
         kind = self._kind
         if not self._duplex_given:
-            if code in (Code.SOH, Code.EOT):
+            if pair in (SOH, EOT):
                 kind.duplex = Duplex.HALF
-            elif code == Code.STX and kind.duplex is None:
+            elif pair == STX and kind.duplex is None:
                 kind.duplex = Duplex.FULL
-        self._duplex = kind.duplex or Duplex.HALF
-        return super()._begin(code)
+        self._is_half_duplex = kind.duplex is not Duplex.FULL
+        return super()._begin(pair)
 
     def _poll_check(self) -> Symbol | None:
         poll = super()._poll_check()

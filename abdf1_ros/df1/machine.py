@@ -57,6 +57,9 @@ class Step(NamedTuple):
     delay: float = 0.0
 
 
+# What an operating system or a device server may hold bytes of a frame back (s).
+_HELD_BACK = 0.1
+
 KEEP = -1.0
 LISTEN_ON = Step(b'', KEEP)
 
@@ -94,6 +97,7 @@ class Machine:
         self.deadline: float | None = None
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
+        self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._procedure: Procedure | None = None
         self._out = bytearray()
@@ -145,16 +149,18 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        data = self._without_echo(data)
-        if self._forget_on_send and not self._listening:
+        if self._echoes:
+            data = self._without_echo(data)
+        is_listening = self._listening
+        if self._forget_on_send and not is_listening:
             return
         is_idle = self._resting or self.deadline is None
-        if self._listening and is_idle and now - self._last_heard > self._pause_limit:
+        if is_idle and is_listening and now - self._last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
         self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
-        if self._listening and not self._resting and self.deadline is not None:
+        if self.deadline is not None and not self._resting and self._listening:
             self._hear_out(now, self.deadline)
 
     def _hear_out(self, now: float, deadline: float) -> None:
@@ -203,14 +209,8 @@ class Machine:
         deaf = self._resting and self._forget_on_send
         return self._procedure is not None and not deaf and self._pending is None
 
-    @property
-    def _pause_limit(self) -> float:
-        # Longest pause inside a frame: 20 characters, and what an operating system or a
-        # device server may hold bytes back.
-        return 20 * self._timing.char_time + 0.1
-
     def _without_echo(self, data: bytes) -> bytes:
-        count = min(self._echo_due, len(data)) if self._echoes else 0
+        count = min(self._echo_due, len(data))
         self._echo_due -= count
         return data[count:]
 

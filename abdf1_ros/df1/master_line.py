@@ -30,7 +30,6 @@ from collections.abc import Callable, Container, Generator
 from dataclasses import dataclass
 from typing import NoReturn, TypeGuard
 
-from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
@@ -64,7 +63,9 @@ MOST_QUEUED = 8
 # Times as long as for one poll of the dead is left to the living.
 LIVING_SHARE = 7
 
-_ACKNOWLEDGED = Control(Code.ACK)
+# What answers a message and a poll, but for the frames that answer a poll too.
+_MESSAGE_ANSWERS = (Code.ACK, Code.NAK)
+_POLL_ANSWERS = (Code.EOT,)
 
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
@@ -104,6 +105,7 @@ class MasterLine:
                  report: Callable[[Event], None] = lambda event: None,
                  serve: Callable[[Packet], Packet] | None = None) -> None:
         self.machine = machine
+        self.counters = machine.counters
         self.settings = settings
         self.stations = stations
         self.polled: Container[int] = ()  # stations that somebody else polls all the time
@@ -113,11 +115,6 @@ class MasterLine:
         self._last_code = 0
         self._forwards: deque[Packet] = deque()
         self._next_revival = 0.0
-
-    @property
-    def counters(self) -> Counters:
-        """Return the counters of the line."""
-        return self.machine.counters
 
     def deliver(self, number: int, packet: Packet) -> Generator[Step, Symbol | None, None]:
         """Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12)."""
@@ -129,8 +126,8 @@ class MasterLine:
             return
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
-            answer = yield from self._ask(frame, number, (Code.ACK, Code.NAK))
-            if answer == _ACKNOWLEDGED:
+            answer = yield from self._ask(frame, number, _MESSAGE_ANSWERS)
+            if isinstance(answer, Control) and answer.code is Code.ACK:
                 self.stations.heard(number, self.machine.now)
                 return
             cause = self._undelivered(answer, number)
@@ -193,7 +190,7 @@ class MasterLine:
               pause: float = 0.0) -> Generator[Step, Symbol | None, Symbol | None]:
         """Poll once; return EOT, a frame good or bad, or None for silence."""
         self.counters.polls_sent += 1
-        answer = yield from self._ask(frames.poll_frame(number), number, (Code.EOT,), pause)
+        answer = yield from self._ask(frames.poll_frame(number), number, _POLL_ANSWERS, pause)
         if is_good(answer):
             self.stations.heard(number, self.machine.now)
         return answer

@@ -61,6 +61,7 @@ class ReadPoint:
         self.failures = 0
         self._codec = mapping.codec
         self._scaling = mapping.scaling
+        self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
         self._published: bytes | str | None = None
 
     def update(self, words: bytes, now: float) -> Values | None:
@@ -109,10 +110,9 @@ class ReadPoint:
         if self.last_good is None:
             return Freshness.WAITING
         age = now - self.last_good
-        if age > self.stale_time:
-            return Freshness.STALE
-        usual = max(1.5 * self.period, self.stale_time / 2)
-        return Freshness.LATE if age > usual else Freshness.FRESH
+        if age <= self._usual_age:
+            return Freshness.FRESH
+        return Freshness.STALE if age > self.stale_time else Freshness.LATE
 
 
 class Outcome(Enum):

@@ -106,7 +106,7 @@ class Scheduler:
         packets of two must not mix. Each that is returned ends with ``write_ended``.
         """
         self.expire(now)
-        write = self._first_free(busy)
+        write = self._first_free(busy) if self._writes else None
         is_reads_turn = self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and (
             is_read_waiting or self.is_read_due(now))
         if write is None or is_reads_turn:
@@ -236,6 +236,8 @@ class Scheduler:
         self._writes.append(write)
 
     def _take_probe(self, now: float) -> ReadJob | None:
+        if not self._parked:
+            return None
         for number in [number for number in self._parked if self._stations[number].active]:
             self.release(number, now)  # it has answered a write
         if not self._parked or now < self._next_probe:

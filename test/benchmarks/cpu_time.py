@@ -20,8 +20,11 @@ Method. The driver reads ten words of one SLC as often as it can, half duplex, t
 answers at once with frames that were made beforehand, so that its work does not count. After
 a warm-up --seconds are measured: transactions, and the processor time of this process
 (``time.process_time``, which does not see what else runs on the machine, unlike the rate).
-"driver" has a listener that only counts; "driver and publish" publishes every value with rclpy,
-as the node does, and is left out where there is no ROS. "troubles" counts errors and retries.
+"system calls" does nothing but what a transaction asks of the operating system (two writes, two
+polls, two reads), with frames made beforehand: the time that no driver in Python can go below, on
+this machine in this minute. "driver" has a listener that only counts; "driver and publish"
+publishes every value with rclpy, as the node does, and is left out where there is no ROS.
+"troubles" counts errors and retries.
 
 Run it as "python test/benchmarks/cpu_time.py"; without ROS it needs nothing but the package.
 """
@@ -31,8 +34,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
+import itertools
 import os
 from pathlib import Path
+import select
 import signal
 import sys
 import time
@@ -105,6 +110,31 @@ def _respond(descriptor: int) -> None:
         talk = [first, *talk] if len(talk) < TRANSACTIONS else talk
 
 
+def measure_system_calls(warm_up: float, seconds: float) -> tuple[float, float]:
+    """Return what ``measure`` does, of a master that knows beforehand what will be said."""
+    talk = itertools.cycle(list(map(_frames, range(1, TRANSACTIONS))) + [_frames(0)])
+    poll, done = frames.poll_frame(STATION), 0
+    with responder() as descriptor:
+        begun = start = time.monotonic()
+        used = time.process_time()
+        ready = select.poll()
+        ready.register(descriptor, select.POLLIN)
+        acknowledgement = b''
+        while (now := time.monotonic()) < begun + warm_up + seconds:
+            if now < begun + warm_up:
+                start, used, done = now, time.process_time(), 0
+            command, reply = next(talk)
+            for sent, expected in ((acknowledgement + command, frames.ACK), (poll, reply)):
+                os.write(descriptor, sent)
+                received = 0
+                while received < len(expected):
+                    ready.poll()
+                    received += len(os.read(descriptor, 4096))
+            acknowledgement = frames.ACK
+            done += 1
+        return done / (now - start), (time.process_time() - used) / done
+
+
 def _take(descriptor: int, count: int) -> None:
     while count > 0:
         count -= len(os.read(descriptor, count))
@@ -157,6 +187,8 @@ def main() -> None:
     print(f'reads of {WORDS} words, half duplex, {options.seconds:g} s each; '
           f'load of the machine {os.getloadavg()[0]:.1f}')
     print('                     transactions/s  processor time of each  troubles')
+    rate, used = measure_system_calls(options.warm_up, options.seconds)
+    print(f'{"system calls":19}  {rate:14.0f}  {1e6 * used:19.1f} us  {"":>8}', flush=True)
     kinds: list[tuple[str, type[Listener]]] = [
         ('driver', Listener), ('driver and publish', Publisher)]
     for name, kind in kinds:

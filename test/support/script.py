@@ -16,9 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
-from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MasterSettings
@@ -137,7 +136,8 @@ class MasterScript:
         """Set events, changes and counters back to nothing."""
         self.events.clear()
         self.changes.clear()
-        self.machine.counters = Counters()
+        for counter in fields(self.machine.counters):
+            setattr(self.machine.counters, counter.name, 0)
         self._sent = self._received = 0
 
     def numbers(self) -> list[tuple[int, ...]]:
