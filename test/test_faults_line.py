@@ -192,8 +192,9 @@ def test_station_is_slow(
         assert rig.write(3.0).startswith(text)
         rig.status('mappings', ERROR)
         rig.status('link', OK)  # it answers its polls
+        rig.speeds.next()  # the other goes on
         rig.simulator.say('normal 2')
-        rig.recovers(3.0)
+        rig.recovers(6.0)  # a try takes Cmd_Timeout and leaves seven of them to the other
         assert rig.has_read_only(SETPOINT, 3.0)
 
 

@@ -153,6 +153,7 @@ class HalfDuplexMaster:
     def _give_up(self, number: int) -> Talk:
         """Account for a reply that did not come in time (S0, counter 2545)."""
         self._line.counters.command_timeouts += 1
+        self._stations[number].overdue += 1
         self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
         if self._settings.nak_on_command_timeout:
             self._line.counters.naks_sent += 1

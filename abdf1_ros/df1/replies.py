@@ -23,6 +23,7 @@ def check_reply(reply: Packet, command: Packet, station: Station, counters: Coun
         report(Event(Message.ERR_BAD_FUNCTION_CODE, details, station.number))
         raise WrongCommandCode(*details)
     station.replies += 1
+    station.overdue = 0
     station.last_tns = reply.tns
     report(Event(Message.NTC_REPLY_MSG_RCVD, (station.number,), station.number))
 

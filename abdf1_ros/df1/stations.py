@@ -23,6 +23,9 @@ from abdf1_ros.df1.packet import Packet
 
 MAX_STATION = 254
 
+# So many commands in a row without a reply in time are no accident.
+_MOST_OVERDUE = 2
+
 
 @dataclass(slots=True)
 class Station:
@@ -31,7 +34,8 @@ class Station:
 
     ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
     first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
-    nodes that we pass on may have the same TNS.
+    nodes that we pass on may have the same TNS. ``overdue`` counts the commands in a row whose
+    reply did not come within Cmd_Timeout, where that keeps the line busy.
     """
 
     number: int
@@ -43,6 +47,12 @@ class Station:
     failures: int = 0
     remote_errors: int = 0
     silent_since: float | None = None
+    overdue: int = 0
+
+    @property
+    def replies_in_time(self) -> bool:
+        """Tell whether commands are worth their time, as far as one knows."""
+        return self.active and self.overdue < _MOST_OVERDUE
 
     def accepts(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""

@@ -246,6 +246,7 @@ class Driver:
     def _run(self) -> Procedure:
         """Work as long as there is a port."""
         self._scheduler.drop_writes('requested while the port was not open', self.machine.now)
+        self._scheduler.begin(self.machine.now)
         self.health.begin(self.machine.now)
         self.is_online = True
         reason = 'internal error, see the log'
@@ -340,7 +341,7 @@ class Driver:
         if station == BROADCAST:
             return
         self.stations[station].failures += 1
-        if not self.stations[station].active:
+        if not self.stations[station].replies_in_time:
             points = (point for point in self.points.values()
                       if point.mapping.station == station)
         for point in points:

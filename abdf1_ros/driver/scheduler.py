@@ -16,10 +16,11 @@
 The scheduler: which job has the line next.
 
 Writes go first, but after four in a row a read that is due has its turn; which read that is, and
-how they share a line that is too slow for them, is told in ``read_queue``. The reads of an
-inactive station are set aside; every now and then one of them goes out as a probe, at a pace
-that leaves seven eighths of the line to the living. A write to such a station is a probe as
-well; those that follow it too soon end unsent.
+how they share a line that is too slow for them, is told in ``read_queue``. The reads of a
+station that is inactive, or acknowledges commands but does not reply to them in time, are set
+aside; every now and then one of them goes out as a probe, at a pace that leaves seven eighths
+of the line to the others. A write to an inactive station is a probe as well; those that follow
+it too soon end unsent.
 """
 
 from __future__ import annotations
@@ -92,6 +93,12 @@ class Scheduler:
         """Put ``new`` jobs in the place of ``old`` ones, whose station has just answered."""
         self._reads.replace(old, new, now)
 
+    def begin(self, now: float) -> None:
+        """Make all reads due at once: there has been no line for a while."""
+        waiting = self._reads.jobs.difference(*self._parked.values())
+        for job in sorted(waiting, key=lambda job: job.due):
+            self._reads.put(job, now)
+
     def add_write(self, write: Write) -> None:
         """Queue a write; may be called from any thread."""
         self._inbox.append(write)
@@ -160,7 +167,7 @@ class Scheduler:
     def is_read_due(self, now: float) -> bool:
         """Tell whether a read of an active station is due; those of others are set aside."""
         while (job := self._reads.first(now)) is not None:
-            if self._stations[job.station].active:
+            if self._stations[job.station].replies_in_time:
                 return True
             self._reads.take(now)
             self._park(job)
@@ -177,8 +184,11 @@ class Scheduler:
         """Take a job back, whether it went well or not, unless it has been replaced."""
         if job not in self._reads.jobs:
             return
-        if not self._stations[job.station].active:
-            self._next_probe = now + (self._probe_interval if self._reads else job.block.period)
+        station = self._stations[job.station]
+        if not station.replies_in_time:
+            interval = _LIVING_SHARE * (now - job.started) if station.active \
+                else self._probe_interval
+            self._next_probe = now + (interval if self._reads else job.block.period)
             self._park(job)
             return
         self.release(job.station, now)
@@ -238,14 +248,16 @@ class Scheduler:
     def _take_probe(self, now: float) -> ReadJob | None:
         if not self._parked:
             return None
-        for number in [number for number in self._parked if self._stations[number].active]:
-            self.release(number, now)  # it has answered a write
+        for number in list(self._parked):
+            if self._stations[number].replies_in_time:  # to a write, or to somebody else
+                self.release(number, now)
         if not self._parked or now < self._next_probe:
             return None
         self._last_probe_was_echo = False
         station = next(iter(self._parked))
         jobs = self._parked.pop(station)
         job = jobs.popleft()
+        job.due = now
         if jobs:
             self._parked[station] = jobs  # to the end: the next probe is another station's
         return job
@@ -253,7 +265,7 @@ class Scheduler:
     def _take_read(self, now: float, busy: Container[int]) -> ReadJob | None:
         passed_over = []
         while (job := self._reads.take(now)) is not None:
-            if not self._stations[job.station].active:
+            if not self._stations[job.station].replies_in_time:
                 self._park(job)
             elif job.station in busy:
                 passed_over.append(job)

@@ -353,6 +353,16 @@ def test_command_timeout_by_eots(nak: bool) -> None:
     assert script.master.command_sent
 
 
+def test_late_replies_in_a_row_are_counted_until_one_comes_in_time() -> None:
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.25))
+    station = script.stations[SLAVE]
+    for late in (1, 2):
+        script.run(COMMAND, SENT, SAYS_ACK, POLLED, Answer(EOT, 0.25), NAKED)
+        assert station.overdue == late
+    script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
+    assert station.overdue == 0
+
+
 def test_command_timeout_counts_from_the_beginning_of_the_transaction() -> None:
     script = MasterScript(replace(SETTINGS, cmd_timeout=1.0))
     error = script.run(COMMAND, SENT, TIMEOUT, SENT, Answer(ACK, 0.375), POLLED,

@@ -112,3 +112,13 @@ def test_each_station_has_its_own_record() -> None:
     stations = ActiveStationList([7, 8])
     assert stations[7].accepts(REPLY)
     assert stations[8].accepts(REPLY)
+
+
+def test_one_late_reply_is_an_accident_and_two_are_not() -> None:
+    station = Station(7)
+    assert station.replies_in_time
+    station.overdue = 1
+    assert station.replies_in_time
+    station.overdue = 2
+    assert not station.replies_in_time
+    assert not Station(7, active=False).replies_in_time

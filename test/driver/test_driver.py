@@ -709,6 +709,24 @@ class BadStation:
             good[:at] + bytes([good[at] ^ 0x55]) + good[at + 1:]])
 
 
+def test_station_that_is_never_ready_leaves_the_line_to_the_others() -> None:
+    late = [make_mapping(f'N{file}:0', station=1) for file in (7, 9)]
+    living = make_mapping('N7:0', station=2)
+    bench = DriverBench([*late, living], network=Network(baud=115200, cmd_timeout=500))
+    stuck = bench.plc(1, 'PLC5', *PLC5_FILES)
+    bench.plc(2, 'PLC5', *PLC5_FILES)
+    bench.run(1.0)
+    stuck.faults.delay = 60.0
+    bench.run(4.0)
+    bench.listener.reads.clear()
+    bench.run(40.0)
+    assert len(bench.listener.times(living)) > 0.85 * 400  # of one each 100 ms
+    assert all(bench.driver.points[mapping].error is not None for mapping in late)
+    assert bench.driver.stations[1].active
+    stuck.faults.delay = 0.0
+    bench.run_until(lambda: {*late} <= {mapping for _, mapping, _ in bench.listener.reads}, 8.0)
+
+
 @pytest.mark.parametrize('seed', range(5))
 def test_garbage_is_never_published(seed: int) -> None:
     mappings = [make_mapping('N7:0', 'ReadWrite', length=3), make_mapping('F8:0'),

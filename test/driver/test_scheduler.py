@@ -326,6 +326,57 @@ def test_dead_stations_take_no_more_than_an_eighth_of_a_busy_line() -> None:
     assert max(probes) - min(probes) <= 1
 
 
+def test_stations_that_reply_late_take_no_more_than_an_eighth_of_a_busy_line() -> None:
+    late = [make_job(f'N{file}:0', station=station, period=0) for station in (1, 2)
+            for file in (7, 9, 10)]
+    living = make_job(station=99, period=0)
+    bench = Bench(*late, living)
+    now, lost = 0.0, 0.0
+    reads = Counter[int]()
+    while now < 400:
+        job = bench.scheduler.next_read(now)
+        assert job is not None
+        started = now
+        now += 0.02 if job is living else 1.0
+        bench.stations[job.station].overdue += job is not living
+        bench.finish(job, started, now)
+        reads[job.station] += 1
+    lost = reads[1] + reads[2]
+    assert 0.9 / 8 < lost / 400 < 1.1 / 8
+    assert abs(reads[1] - reads[2]) <= 1
+
+
+def test_station_that_replies_in_time_again_has_all_its_reads_at_once() -> None:
+    late, other, living = make_job(), make_job('N9:0'), make_job(station=2)
+    bench = Bench(late, other, living)
+    bench.stations[1].overdue = 2
+    assert [bench.read(0.0), bench.scheduler.next_read(0.0)] == [living, late]
+    bench.stations[1].overdue = 0
+    bench.finish(late, 0.0, 0.02)
+    assert bench.scheduler.next_read(0.02) is other
+
+
+def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> None:
+    fast, slow, dead = make_job('N7:0'), make_job('N9:0', period=60000), make_job(station=2)
+    bench = Bench(fast, slow, dead)
+    bench.stations.lost(2, 0.0)
+    assert {bench.read(0.0), bench.read(0.0), bench.read(0.01)} == {fast, slow, dead}
+    bench.scheduler.begin(5.0)
+    assert [bench.read(5.0), bench.read(5.01), bench.read(5.02)] == [dead, fast, slow]
+    assert bench.read(5.03) is None
+
+
+def test_station_that_is_back_is_not_read_twice_for_what_it_has_missed() -> None:
+    job = make_job()
+    bench = Bench(job)
+    bench.stations.lost(1, 0.0)
+    assert bench.scheduler.next_read(0.0) is None
+    assert bench.scheduler.next_read(8.0) is job
+    bench.stations.heard(1, 8.01)
+    bench.finish(job, 8.0, 8.02)
+    assert bench.scheduler.next_due() == 8.1
+
+
 def test_line_that_has_nobody_else_probes_every_period() -> None:
     reads = _simulate([make_job(station=1, period=1000)], [], 60.0)
     assert 38 <= reads[1] <= 41  # a period and a time-out each
