@@ -22,7 +22,7 @@ starts and destroyed after it has ended.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Sequence
 import random
 import signal
@@ -74,6 +74,10 @@ NODE_NAME = 'abdf1'
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
 
+# So many values of a reply are published while its ACK is on the line (two characters), the
+# others together with the next command: a hundred would keep the line waiting for 3 ms.
+_VALUES_AT_ONCE = 4
+
 # How often (s) levels are compared, so that a change of one is published at once.
 _LEVEL_CHECK_PERIOD = 0.1
 
@@ -105,6 +109,8 @@ class BridgeNode(Node):
         self._log = EventLog(self.get_logger(), time.monotonic)
         self._lines = LineLog(self.get_logger(), time.monotonic)
         self._read_publishers: dict[str, Any] = {}
+        self._values_at_once = _VALUES_AT_ONCE
+        self._values_later: deque[tuple[Any, Any]] = deque()
         self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
         self._active = self.create_publisher(
             UInt16MultiArray, '~/active_stations', latched_qos())
@@ -134,7 +140,7 @@ class BridgeNode(Node):
                 lambda text: self._lines.error('trace_file', f'trace_file: {text}'))
         self.link = LinkThread(
             self.driver.machine, self._opener.open, on_state=self._port_changed,
-            on_fault=self._fault)
+            on_fault=self._fault, while_sending=self._publish_later_values)
         self._diagnostics.attach(self.link)
         self._link_counters = LinkCounterService(self.driver, self.link)
         self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
@@ -204,9 +210,19 @@ class BridgeNode(Node):
         return write
 
     def read(self, mapping: Mapping, values: Values) -> None:
-        """Publish the values of a good read."""
+        """Publish the values of a good read, at once or as soon as the line is busy again."""
         publisher, encode = self._read_publishers[mapping.topic]
-        publisher.publish(encode(values))
+        if self._values_at_once:
+            self._values_at_once -= 1
+            publisher.publish(encode(values))
+        else:
+            self._values_later.append((publisher, encode(values)))
+
+    def _publish_later_values(self) -> None:
+        self._values_at_once = _VALUES_AT_ONCE
+        while self._values_later:
+            publisher, values = self._values_later.popleft()
+            publisher.publish(values)
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Log why a station that answers gives no value."""

@@ -227,7 +227,8 @@ class LinkThread(threading.Thread):
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``retry_period`` seconds apart.
+    attempts to open it are ``retry_period`` seconds apart. ``while_sending`` is called whenever
+    all there is to send has been handed to the port: nobody on the line waits for what it does.
     ``on_fault`` is called with an exception that is a bug; the machine starts afresh after it.
     Three within a minute end the thread, and ``has_failed`` tells so.
     """
@@ -235,6 +236,7 @@ class LinkThread(threading.Thread):
     def __init__(self, machine: Machine, open_port: Callable[[], Port], *,
                  on_state: Callable[[PortState], None] = lambda state: None,
                  on_fault: Callable[[Exception], None] = lambda error: None,
+                 while_sending: Callable[[], None] = lambda: None,
                  retry_period: float = _RETRY_PERIOD,
                  clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(name='df1 link')
@@ -244,6 +246,7 @@ class LinkThread(threading.Thread):
         self._open_port = open_port
         self._on_state = on_state
         self._on_fault = on_fault
+        self._while_sending = while_sending
         self._retry_period = retry_period
         self._clock = clock
         self._stopping = False
@@ -307,14 +310,17 @@ class LinkThread(threading.Thread):
         finally:
             self._machine.stop(PortLost(end))
             port.close()
+            self._while_sending()  # what was put off until the next frame, which never came
 
     def _serve(self, port: Port) -> None:
         machine, clock = self._machine, self._clock
+        machine.send_at_once = port.write
         machine.start(clock())
         while not self._stopping:
             data = machine.data_to_send()
             if data:
                 port.write(data)
+            self._while_sending()
             deadline = machine.deadline
             timeout = None if deadline is None else max(0.0, deadline - clock())
             data = port.read(timeout, self._wake_reader)

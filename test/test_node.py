@@ -26,6 +26,7 @@ from typing import Any
 
 from abdf1_ros.node import BridgeNode, main
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.port import PortState
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -337,6 +338,22 @@ def test_tag_cannot_forge_lines_or_statuses(
     lines = [line for line in ''.join(capfd.readouterr()).splitlines() if 'all is lost' in line]
     assert [line.split(' ')[0] for line in lines] == ['[ERROR]', '[WARN]']
     assert all(shown in line for line in lines)
+
+
+# Reads
+
+
+def test_every_value_of_a_long_block_is_published(
+        make_bench: Benches, observer: Observer, plcs: Plcs) -> None:
+    words = [f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)]
+    bench = make_bench(*words)
+    inboxes = [observer.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
+    assert len(bench.node.driver.blocks) == 1
+    plcs[1].table.write(Address.parse('N7:0', PlcType.PLC5), bytes(range(18)))
+    for number, inbox in enumerate(inboxes):
+        inbox.values([0x202 * number + 0x100])
+    bench.node.link.stop()
+    assert not bench.node._values_later
 
 
 # Ends

@@ -256,6 +256,39 @@ def test_port_is_given_back_after_stop(pty: Pty, link: Link) -> None:
     open_port(Network(com_port=str(pty.name))).close()
 
 
+class Diary:
+    """A port that notes what becomes of it, and is lost at the second wait."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Bring an ACK, then nothing any more."""
+        self.notes.append('wait')
+        if self.notes.count('wait') == 2:
+            raise OSError('the cable is gone')
+        return ACK
+
+    def write(self, data: bytes) -> None:
+        """Note the bytes."""
+        self.notes.append(data.decode('ascii'))
+
+    def close(self) -> None:
+        """Note the end."""
+        self.notes.append('close')
+
+
+def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> None:
+    script = Script(Step(b'question', PATIENCE), Step(b'thanks', 0), Step(b'next', PATIENCE))
+    diary = Diary()
+    thread = Impatient(script.machine, lambda: diary, 1,
+                       while_sending=lambda: diary.notes.append('work'))
+    thread.start()
+    thread.join()
+    assert diary.notes == [
+        'ready', 'question', 'work', 'wait', 'thanks', 'next', 'work', 'wait', 'close', 'work']
+
+
 class Broken:
     """A machine's procedure that fails as soon as it runs."""
 

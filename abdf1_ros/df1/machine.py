@@ -86,6 +86,10 @@ class Machine:
     ``procedure`` makes the generator, afresh at every ``start``. With ``forget_on_send`` what
     was heard before a transmission is dropped: for the master of a half-duplex line it cannot
     be the answer. ``counters`` gets the characters in both directions.
+
+    A frame after which nothing is waited for, such as the ACK of a reply, is handed to
+    ``send_at_once`` where that is set, so that it is on the line while the reply is made use of.
+    All others come from ``data_to_send``.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -95,6 +99,7 @@ class Machine:
         self.counters = counters or Counters()
         self.now = 0.0
         self.deadline: float | None = None
+        self.send_at_once: Callable[[bytes], None] | None = None
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
@@ -258,7 +263,11 @@ class Machine:
             if self._forget_on_send:
                 self.decoder.reset()
         self._set_deadline(step.timeout, free)
-        return step.timeout == 0
+        if step.timeout != 0:
+            return False
+        if self.send_at_once is not None and self._out:
+            self.send_at_once(self.data_to_send())
+        return True
 
     def _transmit(self, step: Step) -> None:
         self._pending, self.deadline = None, self._kept_deadline

@@ -37,7 +37,6 @@ from contextlib import contextmanager
 import itertools
 import os
 from pathlib import Path
-import select
 import signal
 import sys
 import time
@@ -54,7 +53,7 @@ from abdf1_ros.driver.network import Network  # noqa: E402
 from abdf1_ros.driver.values import Values  # noqa: E402
 from abdf1_ros.pccc.slc_dialect import SlcDialect  # noqa: E402
 from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
-from paced_line import block_of, Listener, WORDS  # noqa: E402
+from paced_line import BareLine, block_of, Listener, WORDS  # noqa: E402
 
 STATION = 1
 MAPPING = block_of(STATION)
@@ -112,27 +111,29 @@ def _respond(descriptor: int) -> None:
 
 def measure_system_calls(warm_up: float, seconds: float) -> tuple[float, float]:
     """Return what ``measure`` does, of a master that knows beforehand what will be said."""
-    talk = itertools.cycle(list(map(_frames, range(1, TRANSACTIONS))) + [_frames(0)])
-    poll, done = frames.poll_frame(STATION), 0
+    poll = frames.poll_frame(STATION)
+    known = list(map(_frames, [*range(1, TRANSACTIONS), 0]))
+    talk = itertools.cycle([
+        [(poll, len(reply)), (frames.ACK + following, len(frames.ACK))]
+        for (_, reply), (following, _) in zip(known, known[1:] + known[:1], strict=True)])
     with responder() as descriptor:
-        begun = start = time.monotonic()
+        line = BareLine(descriptor)
+        line.ask(known[0][0], len(frames.ACK))
+        _take_turns(line, talk, warm_up)
         used = time.process_time()
-        ready = select.poll()
-        ready.register(descriptor, select.POLLIN)
-        acknowledgement = b''
-        while (now := time.monotonic()) < begun + warm_up + seconds:
-            if now < begun + warm_up:
-                start, used, done = now, time.process_time(), 0
-            command, reply = next(talk)
-            for sent, expected in ((acknowledgement + command, frames.ACK), (poll, reply)):
-                os.write(descriptor, sent)
-                received = 0
-                while received < len(expected):
-                    ready.poll()
-                    received += len(os.read(descriptor, 4096))
-            acknowledgement = frames.ACK
-            done += 1
-        return done / (now - start), (time.process_time() - used) / done
+        done, passed = _take_turns(line, talk, seconds)
+        return done / passed, (time.process_time() - used) / done
+
+
+def _take_turns(line: BareLine, talk: Iterator[list[tuple[bytes, int]]],
+                seconds: float) -> tuple[int, float]:
+    """Carry out transactions for a time; return how many, and the time."""
+    begun, done = time.monotonic(), 0
+    while time.monotonic() < begun + seconds:
+        for sent, expected in next(talk):
+            line.ask(sent, expected)
+        done += 1
+    return done, time.monotonic() - begun
 
 
 def _take(descriptor: int, count: int) -> None:

@@ -178,6 +178,26 @@ def paced_line(near: Machine, far: Machine, baud: int,
             wire.join()
 
 
+class BareLine:
+    """
+    The line as one must use it with any driver: write, wait, read.
+
+    What it takes is what the operating system and Python take, and no driver can do without.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._ready = select.poll()
+        self._ready.register(descriptor, select.POLLIN)
+
+    def ask(self, data: bytes, count: int) -> None:
+        """Send ``data``, wait for so many bytes."""
+        os.write(self._descriptor, data)
+        while count > 0:
+            self._ready.poll()
+            count -= len(os.read(self._descriptor, 4096))
+
+
 class _AnsweringLine:
     """
     A half-duplex line, or two wires, with ``far`` at its other end, on ``descriptor``.

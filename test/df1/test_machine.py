@@ -126,6 +126,26 @@ def test_timeout_zero_does_not_wait() -> None:
     assert bench.machine.deadline == 1.0
 
 
+def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on() -> None:
+    bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0))
+    sent: list[tuple[bytes, int]] = []
+    bench.machine.send_at_once = lambda data: sent.append((data, len(bench.got)))
+    bench.machine.start(0.0)
+    assert sent == [(ACK, 0), (EOT, 1)]
+    assert bench.machine.data_to_send() == FRAME
+
+
+def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:
+    bench = Bench(Step(ACK, 0), Step(b'', 0), timing=LineTiming(tx_delay=0.5))
+    sent: list[bytes] = []
+    bench.machine.send_at_once = sent.append
+    bench.machine.start(0.0)
+    assert sent == []
+    bench.machine.handle_timeout(0.5)
+    assert sent == [ACK]
+    assert bench.got == [None, None]
+
+
 def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
     bench = Bench(Step(ACK, 0))
     bench.machine.start(0.0)
