@@ -96,7 +96,7 @@ class Scheduler:
     def begin(self, now: float) -> None:
         """Make all reads due at once: there has been no line for a while."""
         waiting = self._reads.jobs.difference(*self._parked.values())
-        for job in sorted(waiting, key=lambda job: job.due):
+        for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
             self._reads.put(job, now)
 
     def add_write(self, write: Write) -> None:

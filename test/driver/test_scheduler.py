@@ -366,6 +366,13 @@ def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> Non
     assert bench.read(5.03) is None
 
 
+def test_order_of_the_plan_is_kept_when_the_line_comes_up() -> None:
+    jobs = [make_job(f'N{file}:0') for file in range(7, 27)]
+    bench = Bench(*jobs)
+    bench.scheduler.begin(5.0)
+    assert [bench.scheduler.next_read(5.0) for _ in jobs] == jobs
+
+
 def test_station_that_is_back_is_not_read_twice_for_what_it_has_missed() -> None:
     job = make_job()
     bench = Bench(job)
