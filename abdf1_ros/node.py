@@ -120,6 +120,7 @@ class BridgeNode(Node):
         self._create_writes()
         self._diagnostics = Diagnostics(self.get_name(), self.driver, configuration.port)
         self._diagnostics_period = configuration.parameters.diagnostics_period
+        self._write_timeout = configuration.parameters.write_timeout
         self._next_diagnostics = 0.0
         self._levels: list[bytes] = []
         self.create_service(Trigger, '~/reset_counters', self._reset_counters)
@@ -203,11 +204,18 @@ class BridgeNode(Node):
             requested = time.monotonic() - waited
             for mapping in mappings:
                 try:
+                    self._check_age(waited)
                     self.driver.write(mapping, values_of(message), requested)
                 except FormatError as error:
                     self.driver.refuse(mapping, str(error), message.data)
             self.link.wake()
         return write
+
+    def _check_age(self, age: float) -> None:
+        if age > self._write_timeout:
+            raise FormatError(
+                f'it came {age:.1f} s after it was published, write_timeout is '
+                f'{self._write_timeout:g} s; or the clocks of the two hosts differ')
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""
