@@ -213,8 +213,8 @@ class Demo:
         self._watcher.missed = 0
         self._command(f'silent {self._scene.failing_station}')
         self._wait('the loss to be noticed', lambda: self._watcher.missed > 0)
-        self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of {deadline:.1f} s '
-                  'is told: no more values')
+        self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of '
+                  f'{deadline:.1f} s is told: no more values')
         self._wait('the station to be inactive', lambda: self._level(station) != _OK)
         self._print_statuses('link', station, 'mappings')
         if self._scene.surviving:
