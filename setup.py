@@ -49,10 +49,10 @@ setup(
     entry_points={
         'console_scripts': [
             f'node = {PACKAGE}.executables:node',
-            f'simulator = {PACKAGE}.simulator:main',
-            f'sniff = {PACKAGE}.sniff:main',
-            f'check = {PACKAGE}.check:main',
-            f'plc = {PACKAGE}.plc:main',
+            f'simulator = {PACKAGE}.executables:simulator',
+            f'sniff = {PACKAGE}.executables:sniff',
+            f'check = {PACKAGE}.executables:check',
+            f'plc = {PACKAGE}.executables:plc',
             f'monitor = {PACKAGE}.executables:monitor',
             f'demo = {PACKAGE}.executables:demo',
         ],

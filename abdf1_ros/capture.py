@@ -45,6 +45,10 @@ from abdf1_ros.text import printable
 VERSION = 1
 _MAGIC = '# abdf1_ros capture'
 _FIRST_LINE = f'{_MAGIC} {VERSION}'
+# Seconds; the time of day since 1970 is less, too.
+_LATEST = 1e10
+# Characters of a line that a Problem shows.
+_SHOWN = 60
 
 
 class Direction(Enum):
@@ -86,8 +90,10 @@ class CaptureWriter:
                  settings: Mapping[str, str] | None = None) -> None:
         self.path = path
         self._limit = limit / 2
-        self._head = '\n'.join([_FIRST_LINE, *(
+        head = '\n'.join([_FIRST_LINE, *(
             f'# {name}: {printable(value)}' for name, value in (settings or {}).items())])
+        # Escaped here, so that what is counted is what is written.
+        self._head = head.encode('ascii', 'backslashreplace').decode('ascii')
         self._written = 0
         if path.exists() and not _is_capture(path):
             raise OSError(f'{path} is there and is no capture; give another name')
@@ -108,8 +114,7 @@ class CaptureWriter:
     def _begin(self) -> TextIO:
         if self.path.exists():
             self.path.replace(f'{self.path}.1')
-        self._file = self.path.open(
-            'w', encoding='ascii', errors='backslashreplace', buffering=1)
+        self._file = self.path.open('w', encoding='ascii', buffering=1)
         self._written = 0
         self._put(self._head)
         return self._file
@@ -140,7 +145,7 @@ def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> I
     for number, text in enumerate(lines, 1):
         line = text.strip()
         if number == 1 and line != _FIRST_LINE:
-            raise Problem(f'{name}:1', f'"{line}" should be "{_FIRST_LINE}"')
+            raise Problem(f'{name}:1', f'"{line[:_SHOWN]}" should be "{_FIRST_LINE}"')
         if line.startswith('#'):
             key, colon, value = line[1:].partition(':')
             if colon:
@@ -155,8 +160,8 @@ def _chunk(line: str, where: str) -> Chunk:
     try:
         chunk = Chunk(float(time), Direction(direction), bytes.fromhex(data))
     except ValueError:
-        raise Problem(where, f'"{line[:60]}" should be seconds, ">", "<" or "?", and bytes, as '
-                      'in 0.004210 < 10 04') from None
-    if chunk.time is None or not math.isfinite(chunk.time):
-        raise Problem(where, f'"{time}" is no number of seconds')
+        raise Problem(where, f'"{line[:_SHOWN]}" should be seconds, ">", "<" or "?", and bytes, '
+                      'as in 0.004210 < 10 04') from None
+    if chunk.time is None or not abs(chunk.time) < _LATEST:  # also NaN
+        raise Problem(where, f'"{time[:_SHOWN]}" is no number of seconds')
     return chunk

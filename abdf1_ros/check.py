@@ -38,6 +38,7 @@ from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.report import last_address, make_report, Remark, Report
 from abdf1_ros.driver.served import served_problems
 from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.numerals import decimal_number
 from abdf1_ros.terminal import colour, drop_output, GREEN, prepare_output, RED, table, YELLOW
 from abdf1_ros.text import printable
 
@@ -126,11 +127,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _duration(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 <= value <= _LONGEST:
+    value = decimal_number(text)
+    if value is None or not 0 <= value <= _LONGEST:
         raise argparse.ArgumentTypeError(f'"{text}" should be ms from 0 to {_LONGEST}')
     return value
 

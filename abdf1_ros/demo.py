@@ -36,7 +36,9 @@ from typing import Any
 from abdf1_ros.driver.map_file import load_mappings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.node_messages import MESSAGES
+from abdf1_ros.numerals import decimal_number
 from abdf1_ros.paths import config_file
+from abdf1_ros.terminal import interruptible
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -128,14 +130,17 @@ class Demo:
         self._scene = scene
         self._mappings = {mapping.tag: mapping for mapping in mappings}
         self._begin = time.monotonic()
-        self._simulator = _start('abdf1_ros.simulator', '--pty', str(link), *scene.simulator)
-        self._bridge = _start('abdf1_ros.node', '--ros-args', '-p', f'port:={link}',
-                              '-p', f'net_file:={net_file}', '-p', f'map_file:={map_file}')
+        self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
+                             '-p', f'map_file:={map_file}')
+        self._simulator_args = ('--pty', str(link), *scene.simulator)
+        self._children: list[subprocess.Popen[bytes]] = []
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._watcher = Watcher(mappings)
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
+        self._simulator = self._start('simulator', *self._simulator_args)
+        self._bridge = self._start('node', *self._bridge_args)
         self._title(self._scene.title)
         domain = os.environ['ROS_DOMAIN_ID']
         self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} '
@@ -153,12 +158,20 @@ class Demo:
 
     def close(self) -> None:
         """End both processes, the bridge first."""
-        for process in (self._bridge, self._simulator):
+        for process in reversed(self._children):
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
             process.wait(_PATIENCE)
         self._watcher.destroy_node()
         rclpy.try_shutdown()
+
+    def _start(self, name: str, *args: str) -> subprocess.Popen[bytes]:
+        # By its executable, which a signal during the imports ends quietly. A session of its own:
+        # Ctrl-C is for us, who then end both in order.
+        code = f'import sys; from abdf1_ros.executables import {name}; sys.exit({name}())'
+        self._children.append(subprocess.Popen(
+            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, start_new_session=True))
+        return self._children[-1]
 
     def _show_reads(self) -> None:
         polled = {tag for tag, mapping in self._mappings.items() if mapping.polls}
@@ -284,35 +297,41 @@ def _shown(values: Any) -> str:
     return '[' + ', '.join(f'{value:g}' for value in values) + ']'
 
 
-def _start(module: str, *args: str) -> subprocess.Popen[bytes]:
-    # A session of its own: Ctrl-C is for us, who then end both in order.
-    return subprocess.Popen([sys.executable, '-m', module, *args], stdin=subprocess.PIPE,
-                            start_new_session=True)
+def _seconds(text: str) -> float:
+    value = decimal_number(text)
+    if value is None or value < 0:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds from 0')
+    return value
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo; return 0, or 1 when something did not happen."""
     parser = argparse.ArgumentParser(prog='demo', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--seconds', type=float, default=20.0,
+    parser.add_argument('--seconds', type=_seconds, default=20.0,
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
     parser.add_argument('--peer', action='store_true',
                         help='show a full-duplex line, on which the PLC writes by itself')
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
-        demo = Demo(FULL_DUPLEX if options.peer else HALF_DUPLEX, Path(folder) / 'line')
+    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
         try:
-            demo.run(options.seconds)
-        except Interrupted as reason:
-            print(f'demo: {reason}', file=sys.stderr)
-            return 1
+            demo = Demo(FULL_DUPLEX if options.peer else HALF_DUPLEX, Path(folder) / 'line')
+            return _tell(demo, options.seconds)
         except KeyboardInterrupt:
             print()
-        finally:
-            demo.close()
+    return 0
+
+
+def _tell(demo: Demo, seconds: float) -> int:
+    try:
+        demo.run(seconds)
+    except Interrupted as reason:
+        print(f'demo: {reason}', file=sys.stderr)
+        return 1
+    finally:
+        demo.close()
     return 0
 
 

@@ -31,9 +31,11 @@ from abdf1_ros.errors import Problem
 _BLOCK = 4096
 # The bytes, and behind two spaces what they are as characters.
 _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
-_HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+?)(?: *\|.*)?',
+_HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?',
                       re.IGNORECASE)
 _REPEATED = '*'
+# Bytes that a dump may leave out: hours of one and the same byte on the fastest line.
+_MOST_LEFT_OUT = 100_000_000
 
 
 class Recording:
@@ -106,7 +108,7 @@ def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
         data = b'' if match is None and offset is not None else _bytes(
             match['bytes'] if match else line, f'{name}:{number}')
         if is_repeated and offset is not None:
-            yield from _repetition(last, offset - end)
+            yield from _repetition(last, offset - end, f'{name}:{number}')
         is_repeated = False
         if match:
             end, last = (offset or 0) + len(data), data
@@ -122,9 +124,12 @@ def _bare_offset(line: str, end: int, is_repeated: bool) -> int | None:
     return offset if is_repeated or offset == end else None
 
 
-def _repetition(data: bytes, count: int) -> Iterator[Chunk]:
+def _repetition(data: bytes, count: int, where: str) -> Iterator[Chunk]:
     """Yield the lines that a dump has left out because they are like the one before."""
-    for _ in range(max(0, count) // len(data)):
+    if not 0 <= count <= _MOST_LEFT_OUT:
+        raise Problem(where, f'the offset does not fit: "{_REPEATED}" stands for lines like the '
+                             f'one above, at most {_MOST_LEFT_OUT // 1_000_000} MB of them')
+    for _ in range(count // len(data)):
         yield Chunk(None, Direction.UNKNOWN, data)
 
 

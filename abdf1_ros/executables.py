@@ -15,8 +15,8 @@
 """
 The executables that take a while to import what they need.
 
-Until their ``main`` handles signals, Ctrl-C and SIGTERM end them as they do later: at once,
-with status 0 and without a traceback. There is nothing yet that wants to be closed.
+Until their ``main`` handles signals, Ctrl-C and SIGTERM end them as they do later: at once, with
+the same status and without a traceback. There is nothing yet that wants to be closed.
 """
 
 from __future__ import annotations
@@ -27,36 +27,72 @@ import os
 import signal
 from types import FrameType
 
+_INTERRUPTED = 130  # of the commands whose status tells whether they have done what they should
+
 
 def node() -> int:
     """Run the node."""
     with _ending_quietly():
         from abdf1_ros.node import main
-    return main()
+    return _ended(main())
 
 
 def monitor() -> int:
     """Run the monitor."""
     with _ending_quietly():
         from abdf1_ros.monitor import main
-    return main()
+    return _ended(main())
 
 
 def demo() -> int:
     """Run the demonstration."""
     with _ending_quietly():
         from abdf1_ros.demo import main
-    return main()
+    return _ended(main())
+
+
+def simulator() -> int:
+    """Run the simulator."""
+    with _ending_quietly():
+        from abdf1_ros.simulator import main
+    return _ended(main())
+
+
+def sniff() -> int:
+    """Run the sniffer."""
+    with _ending_quietly():
+        from abdf1_ros.sniff import main
+    return _ended(main())
+
+
+def check() -> int:
+    """Check files."""
+    with _ending_quietly(_INTERRUPTED):
+        from abdf1_ros.check import main
+    return _ended(main())
+
+
+def plc() -> int:
+    """Ask a PLC."""
+    with _ending_quietly(_INTERRUPTED):
+        from abdf1_ros.plc import main
+    return _ended(main())
 
 
 @contextmanager
-def _ending_quietly() -> Iterator[None]:
-    usual = {number: signal.signal(number, _leave)
+def _ending_quietly(status: int = 0) -> Iterator[None]:
+    def leave(number: int, frame: FrameType | None) -> None:
+        os._exit(status)
+
+    usual = {number: signal.signal(number, leave)
              for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in usual.items():
         signal.signal(number, handler)
 
 
-def _leave(number: int, frame: FrameType | None) -> None:
-    os._exit(0)
+def _ended(status: int) -> int:
+    """Return the status, which a second Ctrl-C while Python ends is not to change."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    return status

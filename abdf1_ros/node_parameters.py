@@ -22,7 +22,7 @@ from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings
-from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.driver.columns import MAP_COLUMNS
 from abdf1_ros.driver.map_file import load_mappings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
@@ -254,8 +254,8 @@ def _text(value: Any) -> str:
 
 
 def _declare_map(node: Node, mappings: list[Mapping]) -> None:
-    descriptor = ParameterDescriptor(read_only=True)
+    # rclpy writes the parameter's name into the descriptor, so each has one of its own.
     node.declare_parameters('map', [
-        (f'{mapping.name.replace("/", ".")}.{column.lower()}', mapping.cell(column),
-         descriptor)
-        for mapping in mappings for column in COLUMNS], ignore_override=True)
+        (f'{mapping.name.replace("/", ".")}.{column.name.lower()}', mapping.cell(column.name),
+         ParameterDescriptor(description=column.description, read_only=True))
+        for mapping in mappings for column in MAP_COLUMNS], ignore_override=True)

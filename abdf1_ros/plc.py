@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-import signal
 import sys
 
 from abdf1_ros.commissioning import data, detect, presence
@@ -36,7 +35,15 @@ from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import Abdf1Error, ConfigurationError, PortLost
-from abdf1_ros.terminal import colour, drop_output, GREEN, prepare_output, Progress, RED
+from abdf1_ros.terminal import (
+    colour,
+    drop_output,
+    GREEN,
+    interruptible,
+    prepare_output,
+    Progress,
+    RED,
+)
 from abdf1_ros.text import printable
 
 EXIT_FAILED = 1
@@ -51,8 +58,11 @@ def main(args: Sequence[str] | None = None) -> int:
     """Carry out one command; the exit statuses are those of --help."""
     prepare_output()
     options = make_parser(__doc__).parse_args(args)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with interruptible():
+        return _run(options)
+
+
+def _run(options: argparse.Namespace) -> int:
     try:
         status = _COMMANDS[options.command](options)
         sys.stdout.flush()
@@ -63,9 +73,11 @@ def main(args: Sequence[str] | None = None) -> int:
         return EXIT_USAGE
     except BrokenPipeError:
         drop_output()
-        return 0
-    except OSError as error:
-        _complain(error.strerror or str(error))
+        return EXIT_USAGE if options.command == 'write' else 0  # nothing has been written then
+    except OSError as error:  # the port's has no number, that of a full disk has
+        if error.errno is not None:
+            drop_output()
+        _complain(f'cannot print: {error.strerror}' if error.strerror else str(error))
         return EXIT_USAGE
     except PortLost as error:
         _complain(str(error))
@@ -167,11 +179,17 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
     if ending.outcome is not Outcome.WRITTEN:
         _complain(f'{mapping.address} of station {mapping.station}: {text}')
         return EXIT_UNKNOWN if ending.outcome in _UNCERTAIN else EXIT_FAILED
-    print(f'{colour(text, GREEN, sys.stdout)}; now:')
     try:
+        print(f'{colour(text, GREEN, sys.stdout)}; now:', flush=True)
         _print_values(mapping, data.read(session, mapping))
-    except Abdf1Error as error:  # it is written all the same
+        sys.stdout.flush()
+    except KeyboardInterrupt:  # it is written all the same
+        pass
+    except Abdf1Error as error:
         _complain(f'cannot be read back: {error}')
+    except OSError as error:
+        drop_output()
+        _complain(f'{text}, but that cannot be printed: {error.strerror}')
     return 0
 
 

@@ -26,6 +26,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+import errno
 import math
 import os
 import select
@@ -175,6 +176,11 @@ def open_port(network: Network, name: str | None = None, options: PortOptions = 
             name or network.port, baudrate=network.baud, bytesize=network.data_bits,
             parity=_PARITIES[network.parity], stopbits=network.stop_bits,
             rtscts=network.handshake == 'Yes', timeout=0, exclusive=True)
+    except serial.SerialException as error:
+        reason = error.__context__
+        if isinstance(reason, termios.error) and reason.args[0] == errno.ENOTTY:
+            raise OSError(errno.ENOTTY, 'this is no serial port') from error
+        raise
     except (ValueError, termios.error) as error:  # the second: not every device has parity
         raise OSError(*error.args) from error
     if isinstance(port, serial.Serial):

@@ -30,9 +30,10 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
+from abdf1_ros.driver.csv_table import read_rows, Row
 from abdf1_ros.driver.values import Codec, types_of, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
+from abdf1_ros.numerals import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.dialects import dialect_of
@@ -252,6 +253,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     try:
         address = Address.parse(row.get('Address'), plc_type)
         codec = _natural_codec(address, length)
+        _check_extent(row, address, codec)
         plc.table.create(address, codec.words)
     except (FormatError, NoSuchFile) as error:
         raise Problem(row.where('Address'), str(error)) from None
@@ -262,6 +264,12 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
             raise Problem(row.where('Motion'), 'a string does not move')
         period = _number(row, 'Period', 1, 3_600_000)
         plc.move(_Mover(address, codec, motion, period / 1000))
+
+
+def _check_extent(row: Row, address: Address, codec: Codec) -> None:
+    if address.offset + codec.words > address.area_size:
+        last = address.at_offset(address.area_size - 1)
+        raise Problem(row.where('Length'), f'the last word there can be is {last}')
 
 
 def _natural_codec(address: Address, length: int) -> Codec:
@@ -298,7 +306,14 @@ def _values(row: Row, codec: Codec) -> list[float] | str:
 
 def numbers(texts: Sequence[str]) -> list[float]:
     """Return whole and decimal numbers as such; ValueError for anything else."""
-    return [int(text) if whole_number(text) is not None else float(text) for text in texts]
+    values = []
+    for text in texts:
+        whole = whole_number(text)
+        value = decimal_number(text) if whole is None else whole
+        if value is None:
+            raise ValueError(f'"{text}" should be a number')
+        values.append(value)
+    return values
 
 
 def _store(table: DataTable, address: Address, codec: Codec,

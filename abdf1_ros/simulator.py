@@ -25,9 +25,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+import fcntl
 import math
+from operator import itemgetter
 import os
 from pathlib import Path
+import re
 import select
 import signal
 import socket
@@ -43,23 +46,34 @@ from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.csv_table import whole_number
 from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.numerals import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState
 from abdf1_ros.simulated_plc import Faults, load_plcs, numbers, SimulatedPlc
-from abdf1_ros.terminal import drop_output, prepare_output, seconds_option
+from abdf1_ros.terminal import (
+    drop_output,
+    interruptible,
+    prepare_output,
+    reason_of,
+    seconds_option,
+    whole_option,
+)
 
 EXIT_FAULT = 1
 EXIT_CONFIGURATION = 2
 
 WAITING = 'waiting for a client'
 
+_LONGEST = 3_600_000  # ms
+
 # Where a simulated PLC sends its messages: the default Station of a net CSV.
 BRIDGE_STATION = Network().station
+
+_PTYS = '/dev/pts/'
 
 _COMMANDS = """\
 commands, on standard input or with --at:
@@ -75,6 +89,8 @@ commands, on standard input or with --at:
   counters STATION            say what its port has counted
   msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
   quit                        end the simulator
+
+exit status: 0 when it is ended, 1 when the port cannot be opened, 2 for bad options or data files
 
 examples:
   simulator --pty /tmp/plc
@@ -111,18 +127,38 @@ def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) ->
         elif verb == 'full' and not arguments:
             faults.full = True
         elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
-            faults.slow = int(arguments[0])
+            faults.slow = _polls(arguments[0])
         elif verb == 'delay' and len(arguments) == 1 and not is_full_duplex:
-            faults.delay = float(arguments[0]) / 1000
+            faults.delay = _decimal(arguments[0], 'ms', _LONGEST) / 1000
         elif verb == 'noise' and len(arguments) == 1:
-            faults.noise = float(arguments[0])
+            faults.noise = _decimal(arguments[0], 'a share', 1)
         elif verb == 'error' and len(arguments) in (1, 2):
-            faults.status = tuple(bytes.fromhex(''.join(arguments)))
+            faults.status = tuple(map(_byte, arguments))
         elif verb != 'normal' or arguments:
             raise CommandError(f'"{line.strip()}" is no command\n{_COMMANDS}')
-    except ValueError:
-        raise CommandError(f'"{line.strip()}" has a number that is none') from None
+    except ValueError as error:
+        raise CommandError(f'{line.strip()}: {error}') from None
     return faults
+
+
+def _polls(text: str) -> int:
+    value = whole_number(text)
+    if value is None or value < 0:
+        raise ValueError(f'"{text}" should be a whole number from 0')
+    return value
+
+
+def _decimal(text: str, what: str, high: float) -> float:
+    value = decimal_number(text)
+    if value is None or not 0 <= value <= high:
+        raise ValueError(f'"{text}" should be {what} from 0 to {high:.0f}')
+    return value
+
+
+def _byte(text: str) -> int:
+    if not re.fullmatch('[0-9A-Fa-f]{2}', text):
+        raise ValueError(f'"{text}" should be a byte in hexadecimal, as in 0B')
+    return int(text, 16)
 
 
 def _set_mode(plc: SimulatedPlc, text: str) -> str:
@@ -186,18 +222,30 @@ class _FaultyPort:
 
 
 class PtyLine:
-    """A pseudo-terminal; ``link`` is a name for its other end."""
+    """
+    A pseudo-terminal; ``link`` is a name for its other end.
+
+    A link that an earlier run has left is replaced; OSError where anything else has the name.
+    """
 
     def __init__(self, link: str | None) -> None:
+        self._link = Path(link) if link else None
+        if self._link:
+            # Before we have a terminal: it may get the number that an old link leads to.
+            _remove_left_over(self._link)
         self._ours, self._theirs = os.openpty()
         # Open at both ends all the time, or a read fails whenever nobody is connected.
         tty.setraw(self._theirs)
-        self.name = link or os.ttyname(self._theirs)
-        self._link = Path(link) if link else None
+        self._target = os.ttyname(self._theirs)
+        self.name = link or self._target
         if self._link:
-            if self._link.is_symlink():  # of an earlier run; anything else is not ours
-                self._link.unlink()
-            self._link.symlink_to(os.ttyname(self._theirs))
+            # So others see that the link is in use. A client's lock is a flock, another kind.
+            fcntl.lockf(self._theirs, fcntl.LOCK_EX)
+            try:
+                _make_link(self._link, self._target)
+            except OSError:
+                self.close()
+                raise
 
     def open(self) -> Port:
         """Return our end."""
@@ -206,10 +254,53 @@ class PtyLine:
 
     def close(self) -> None:
         """Take the line and its name away."""
-        if self._link:
-            self._link.unlink(missing_ok=True)
+        if self._link and _target_of(self._link) == self._target:
+            self._link.unlink()
         os.close(self._ours)
         os.close(self._theirs)
+
+
+def _remove_left_over(link: Path) -> None:
+    """Remove what an earlier run has left; OSError where that still runs."""
+    target = _target_of(link)
+    if target.startswith(_PTYS):
+        if _is_in_use(target):
+            raise OSError(f'{link} is in use by another simulator or sniff')
+        link.unlink()
+
+
+def _make_link(link: Path, target: str) -> None:
+    """Let ``link`` lead to a pseudo-terminal; OSError says why it cannot."""
+    try:
+        link.symlink_to(target)
+    except FileExistsError:
+        raise OSError(f'{link} is there already, and no link that a simulator has left; '
+                      'give another name') from None
+    except OSError as error:
+        raise OSError(f'{link} cannot be made: {error.strerror}') from None
+
+
+def _target_of(link: Path) -> str:
+    """Return where a symbolic link leads, empty where there is none."""
+    try:
+        return os.readlink(link)
+    except OSError:
+        return ''
+
+
+def _is_in_use(target: str) -> bool:
+    """Tell whether another process has made and still has a pseudo-terminal."""
+    try:
+        descriptor = os.open(target, os.O_RDWR | os.O_NOCTTY)
+    except OSError:
+        return False
+    try:
+        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
 
 
 class TcpLine:
@@ -220,7 +311,10 @@ class TcpLine:
         number = whole_number(port)
         if number is None or not 0 <= number <= 65535:
             raise ValueError(f'--tcp "{address}" should be HOST:PORT')
-        self._listener = socket.create_server((host or '127.0.0.1', number))
+        try:
+            self._listener = socket.create_server((host or '127.0.0.1', number))
+        except OSError as error:
+            raise OSError(reason_of(f'--tcp "{address}"', error)) from None
         self._listener.settimeout(0.2)
         self.name = 'socket://{}:{}'.format(*self._listener.getsockname()[:2])
 
@@ -244,40 +338,90 @@ class SerialLine:
     def __init__(self, name: str, network: Network) -> None:
         self.name = name
         self._network = network
+        self._first: Port | None = None
+
+    def open_now(self) -> None:
+        """Open the port, for the next ``open`` to return; OSError where it is not there."""
+        self._first = open_port(self._network, self.name)
 
     def open(self) -> Port:
         """Open the port."""
-        return open_port(self._network, self.name)
+        port, self._first = self._first, None
+        return port or open_port(self._network, self.name)
 
     def close(self) -> None:
-        """Do nothing: the link thread closes what it has opened."""
+        """Close what ``open`` has not handed out; the link thread closes the rest."""
+        if self._first is not None:
+            self._first.close()
+
+
+Line = PtyLine | TcpLine | SerialLine
+Script = list[tuple[float, str]]
+"""Seconds and command."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """
     Run until SIGINT, SIGTERM, "quit" or the end of --seconds.
 
-    Returns 0, 2 for faulty files or options, 1 after internal errors.
+    Returns 0, 2 for faulty files or options, 1 where the port cannot be opened and after internal
+    errors.
     """
     prepare_output()
     options = _parse(args)
+    with interruptible():
+        try:
+            return _run(options)
+        except KeyboardInterrupt:  # so early that there was nothing to end yet
+            return 0
+
+
+def _run(options: argparse.Namespace) -> int:
     try:
-        script = sorted(map(_scheduled, options.at))
+        script = sorted(map(_scheduled, options.at), key=itemgetter(0))
+        if script:
+            _try_out(script, options)
         plcs = _load(options)
-        line = _open_line(options)
+        line = _make_line(options)
     except (CommandError, ConfigurationError, OSError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return EXIT_CONFIGURATION
-    link = _make_link(plcs, line, options)
+    try:
+        return _play(plcs, line, script, options)
+    finally:
+        line.close()
+
+
+def _play(plcs: Sequence[SimulatedPlc], line: Line, script: Script,
+          options: argparse.Namespace) -> int:
+    """Let the PLCs answer on a line until it is time to end; return the exit status."""
+    try:
+        # A port that is lost is waited for; one that was never there is a mistake.
+        if isinstance(line, SerialLine):
+            line.open_now()
+    except OSError as error:
+        print(f'simulator: {reason_of(line.name, error)}', file=sys.stderr)
+        return EXIT_FAULT
+    link = _make_thread(plcs, line, options)
     names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
     _say(f'stations {names} on {line.name}, {options.check}')
-    link.start()
     try:
+        link.start()
         _converse(plcs, script, link, options)
     finally:  # the thread would keep the process alive
         link.stop()
-        line.close()
     return EXIT_FAULT if link.has_failed else 0
+
+
+def _try_out(script: Script, options: argparse.Namespace) -> None:
+    """Raise CommandError for a command of --at that would fail later; nothing is sent yet."""
+    plcs = _load(options)
+    for _, line in script:
+        try:
+            if line.strip() != 'quit':
+                execute(line, plcs, options.full_duplex is not None)
+        except CommandError as error:
+            raise CommandError(f'--at: {error}') from None
 
 
 def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
@@ -293,8 +437,8 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
     raise CommandError(f'--full-duplex: name a station ({known})')
 
 
-def _make_link(plcs: Sequence[SimulatedPlc], line: PtyLine | TcpLine | SerialLine,
-               options: argparse.Namespace) -> LinkThread:
+def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
+                 options: argparse.Namespace) -> LinkThread:
     """Return the thread that plays ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
     machine = Machine(multidrop(plcs), checksum=checksum)
@@ -331,13 +475,14 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
     line = parser.add_mutually_exclusive_group()
-    line.add_argument('--pty', metavar='NAME', help='a pseudo-terminal of this name (default: '
-                                                    'one with the name that is printed)')
-    line.add_argument('--port', help='a serial port or a URL of pyserial')
+    line.add_argument('--pty', metavar='NAME', type=_name,
+                      help='a pseudo-terminal of this name (default: one with the name that is '
+                           'printed)')
+    line.add_argument('--port', type=_name, help='a serial port or a URL of pyserial')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
     parser.add_argument('--full-duplex', metavar='STATION',
                         help='this PLC alone, on a full-duplex line')
-    parser.add_argument('--baud', type=int, choices=BAUD_RATES, default=9600,
+    parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
                         help='of the serial port (default: %(default)s)')
     parser.add_argument('--check', choices=[check.value for check in Checksum],
                         default=Checksum.CRC.value, help='default: %(default)s')
@@ -348,18 +493,25 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(args)
 
 
+def _name(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError('the name is missing')
+    return text
+
+
 def _scheduled(text: str) -> tuple[float, str]:
     seconds, _, command = text.partition(' ')
-    try:
-        return float(seconds), command
-    except ValueError:
-        raise ValueError(f'--at "{text}" should be seconds and a command') from None
+    value = decimal_number(seconds)
+    if value is None or value < 0 or not command.strip():
+        raise ValueError(f'--at "{text}" should be seconds from 0 and a command, as in '
+                         '"5 silent 1"')
+    return value, command
 
 
-def _open_line(options: argparse.Namespace) -> PtyLine | TcpLine | SerialLine:
-    if options.tcp:
+def _make_line(options: argparse.Namespace) -> Line:
+    if options.tcp is not None:
         return TcpLine(options.tcp)
-    if options.port:
+    if options.port is not None:
         return SerialLine(options.port, Network(baud=options.baud))
     return PtyLine(options.pty)
 
@@ -376,7 +528,7 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
                    counters=plc.counters)
 
 
-def _converse(plcs: Sequence[SimulatedPlc], script: list[tuple[float, str]], link: LinkThread,
+def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
               options: argparse.Namespace) -> None:
     """Carry out commands as they come, until it is time to end."""
     def carry_out(line: str) -> None:

@@ -27,13 +27,12 @@ whether its check is good. The summary comes at the end, also after Ctrl-C.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import math
 import os
 from pathlib import Path
 import signal
 import sys
-import threading
 import time
 
 from abdf1_ros.capture import Chunk
@@ -42,16 +41,24 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.dumps import Recording
 from abdf1_ros.errors import Problem
+from abdf1_ros.numerals import whole_number
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.session import Session
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.tap import is_pty, Tap
-from abdf1_ros.terminal import drop_output, prepare_output, seconds_option
+from abdf1_ros.terminal import (
+    drop_output,
+    interruptible,
+    prepare_output,
+    reason_of,
+    seconds_option,
+    whole_option,
+)
 from abdf1_ros.text import printable
 from abdf1_ros.trace import begun_now, Trace
 
-EXIT_LOST = 1
+EXIT_LOST = 1  # a port that was there, or a file that cannot be read
 EXIT_USAGE = 2
 
 _AUTO = 'auto'
@@ -61,7 +68,8 @@ _DEFAULT_BAUD = Network().baud
 _PROGRESS_PERIOD = 2.0
 
 _EPILOG = """\
-exit status: 0 at the end, 1 when a port is lost, 2 for bad options, files or ports
+exit status: 0 at the end, 1 when a port is lost or a file cannot be read, 2 for bad options,
+contents of files, or ports
 
 examples:
   sniff --port /dev/ttyUSB0 --baud 19200
@@ -93,8 +101,9 @@ class _Output:
                 settings.get(name, '').lower() if chosen == _AUTO else chosen
                 for name, chosen in (('check', options.check), ('duplex', options.duplex)))
             self._session = Session(_CHECKS.get(check), _DUPLEX.get(duplex))
-            if self._summary.baud is None and baud.isdecimal():
-                self._summary.baud = int(baud)
+            speed = whole_number(baud)
+            if self._summary.baud is None and speed and speed > 0:
+                self._summary.baud = speed
         return self._session
 
     def take(self, chunk: Chunk, settings: dict[str, str]) -> None:
@@ -104,6 +113,11 @@ class _Output:
         for entry in session.feed(chunk):
             self._print(entry)
 
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether there was nothing to decode."""
+        return not self._summary.bytes.total()
+
     def show_progress(self, done: str) -> None:
         """Tell every two seconds how far it is, where a terminal shows nothing else."""
         if self._shows_progress and time.monotonic() >= self._next_progress:
@@ -112,9 +126,13 @@ class _Output:
 
     def end(self) -> None:
         """Print what is left, then the summary."""
-        session = self.begin({})
-        for entry in session.finish():
+        for entry in self.begin({}).finish():
             self._print(entry)
+        self.sum_up()
+
+    def sum_up(self) -> None:
+        """Print the summary."""
+        session = self.begin({})
         if self._options.json:
             print(summary_json(self._summary, session.kind))
         else:
@@ -133,10 +151,15 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Decode until the end of the file, SIGINT, SIGTERM or --seconds.
 
-    Returns 0, 1 when a port is lost, 2 for bad options, files or ports.
+    The exit statuses are those of --help.
     """
     prepare_output()
     options = _parse(args)
+    with interruptible():
+        return _decode(options)
+
+
+def _decode(options: argparse.Namespace) -> int:
     output = _Output(options)
     try:
         if options.files:
@@ -149,6 +172,8 @@ def main(args: Sequence[str] | None = None) -> int:
         drop_output()
         print(f'sniff: cannot print: {error.strerror or error}', file=sys.stderr)
         return EXIT_USAGE
+    except KeyboardInterrupt:  # before there was anything to sum up
+        return 0
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
@@ -162,7 +187,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='listen on a serial port, a URL of pyserial, pty, or pty:NAME')
     parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'),
                         help='listen between two ports; ">" is from A to B')
-    parser.add_argument('--baud', type=int, choices=BAUD_RATES,
+    parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
                         help=f'of the ports (default: {_DEFAULT_BAUD}); for a file, to know '
                              'the load of the line')
     parser.add_argument('--parity', choices=('None', 'Even', 'Odd'), default='None',
@@ -181,6 +206,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(args)
     if sum(map(bool, (options.files, options.port, options.tap))) != 1:
         parser.error('give files, or --port, or --tap')
+    if options.tap and options.tap[0] == options.tap[1] != 'pty':
+        parser.error('--tap stands between two ports; these are one and the same')
     if options.files and options.save:
         parser.error('--save is for --port and --tap')
     if options.binary and not options.files:
@@ -188,25 +215,47 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
+class _Unreadable(Exception):
+    """A file that the system does not give us; the text says which and why."""
+
+
 def _decode_files(options: argparse.Namespace, output: _Output) -> int:
-    stopping = threading.Event()
-    _end_with(stopping.set)
     status = 0
     end = time.monotonic() + options.seconds
     try:
         for name in options.files:
-            recording = Recording(Path(name), options.binary)
-            for chunk in recording.chunks():
-                if stopping.is_set() or time.monotonic() >= end:
-                    break
+            has_bytes = False
+            for recording, chunk in _recorded(name, options.binary):
+                if time.monotonic() >= end:
+                    output.end()
+                    return status
+                has_bytes = True
                 output.take(chunk, recording.settings)
                 output.show_progress(f'{name}: {recording.percent} %')
-    except (Problem, OSError) as error:
-        _raise_broken_pipe(error)
+            if not has_bytes:
+                _say(f'{name}: there are no bytes in it')
+    except KeyboardInterrupt:  # also out of reading a pipe into which nobody writes
+        output.sum_up()
+        return status
+    except Problem as problem:
         status = EXIT_USAGE
+        _say(str(problem))
+    except _Unreadable as error:
+        status = EXIT_LOST
         _say(str(error))
-    output.end()
+    if not status or not output.is_empty:
+        output.end()
     return status
+
+
+def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:
+    """Yield the chunks of a file."""
+    try:
+        recording = Recording(Path(name), is_binary)
+        for chunk in recording.chunks():
+            yield recording, chunk
+    except OSError as error:
+        raise _Unreadable(f'{name}: cannot be read: {error.strerror or error}') from None
 
 
 def _listen(options: argparse.Namespace, output: _Output) -> int:
@@ -226,7 +275,7 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
             return _print_heard(tap, trace, output, settings, options.seconds)
     except OSError as error:
         _raise_broken_pipe(error)
-        _say(str(error))
+        _say(reason_of(error.filename, error) if error.filename else str(error))
         return EXIT_USAGE
 
 

@@ -17,15 +17,21 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 import io
-import math
 import os
+import signal
 import sys
 import time
+from types import FrameType
 from typing import TextIO
 
+from abdf1_ros.numerals import decimal_number, whole_number
+
 RED, YELLOW, GREEN = 31, 33, 32
+
+_ENDING = (signal.SIGINT, signal.SIGTERM)
 
 _PROGRESS_DELAY = 2.0  # what is done sooner needs none
 
@@ -56,9 +62,41 @@ def prepare_output() -> None:
             stream.reconfigure(errors='backslashreplace')
 
 
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """
+    Let the first SIGINT or SIGTERM in the block raise KeyboardInterrupt.
+
+    Further ones do nothing, after the block too: whoever is impatient, or signals a whole group of
+    processes, spoils neither what is being ended nor the exit status.
+    """
+    for number in _ENDING:
+        signal.signal(number, _interrupt)
+    try:
+        yield
+    finally:
+        _ignore_further()
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    _ignore_further()
+    raise KeyboardInterrupt
+
+
+def _ignore_further() -> None:
+    for number in _ENDING:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def drop_output() -> None:
     """Send what is still to be printed nowhere: whoever reads us has seen enough."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def reason_of(name: str, error: OSError) -> str:
+    """Return why ``name`` cannot be used; it stands in the text once."""
+    text = error.strerror or str(error)
+    return text if name in text else f'{name}: {text}'
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
@@ -106,10 +144,15 @@ class Progress:
 
 def seconds_option(text: str) -> float:
     """Return what an option of seconds says: above 0; for argparse."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
+    value = decimal_number(text)
+    if value is None or value <= 0:
         raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
+    return value
+
+
+def whole_option(text: str) -> int:
+    """Return the whole number that an option says; for argparse."""
+    value = whole_number(text)
+    if value is None:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a whole number')
     return value

@@ -86,6 +86,15 @@ def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
     assert sorted(file.name for file in tmp_path.iterdir()) == ['x', 'x.1']
 
 
+def test_the_limit_counts_escapes(tmp_path: Path) -> None:
+    path, old = tmp_path / 'x', tmp_path / 'x.1'
+    writer = CaptureWriter(path, 1000, {'port': '/dev/s\xe9rie' + 40 * '\xe9'})
+    for count in range(50):
+        writer.write(Chunk(count / 10, Direction.IN, b'\x10\x04'))
+    writer.close()
+    assert max(path.stat().st_size, old.stat().st_size) <= 500
+
+
 def test_older_capture_is_put_aside(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     for chunk in CHUNKS:
@@ -132,7 +141,7 @@ def test_bad_line_is_named(line: str) -> None:
     assert str(caught.value).startswith('a.cap:3: ')
 
 
-@pytest.mark.parametrize('time', ['nan', 'inf', '-inf'])
+@pytest.mark.parametrize('time', ['nan', 'inf', '-inf', '1e10', '-1e10', '9' * 100])
 def test_time_is_a_number(time: str) -> None:
     with pytest.raises(Problem, match='a.cap:2: .* is no number of seconds'):
         list(read_capture('a.cap', ['# abdf1_ros capture 1', f'{time} > 10 04'], {}))
@@ -143,3 +152,11 @@ def test_other_version_is_refused() -> None:
     assert not is_capture_line('# baud: 9600')
     with pytest.raises(Problem, match='a.cap:1: ".* capture 2" should be ".* capture 1"'):
         list(read_capture('a.cap', ['# abdf1_ros capture 2'], {}))
+
+
+def test_only_the_beginning_of_a_long_line_is_shown() -> None:
+    for lines in (['# abdf1_ros capture' + 'x' * 500], [TEXT.splitlines()[0], 'x' * 500],
+                  [TEXT.splitlines()[0], f'{"9" * 500} > 10']):
+        with pytest.raises(Problem) as caught:
+            list(read_capture('a.cap', lines, {}))
+        assert len(str(caught.value)) < 200

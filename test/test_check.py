@@ -170,7 +170,7 @@ def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
 
 
 @pytest.mark.parametrize('option', ['--default-period', '--response-time'])
-@pytest.mark.parametrize('text', ['x', '-1', 'nan', '1e12'])
+@pytest.mark.parametrize('text', ['x', '-1', 'nan', '1e12', '1_0', '\u0661'])
 def test_bad_time(option: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['net.csv', 'map.csv', f'{option}={text}'])

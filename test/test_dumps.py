@@ -83,6 +83,15 @@ def test_lines_left_out_by_hexdump() -> None:
     assert joined(hexdump(data)) == data
 
 
+@pytest.mark.parametrize('offset', ['ffffffff', '0000000f', 'f' * 5000])
+def test_offset_that_cannot_follow_what_was_left_out(offset: str) -> None:
+    for line in (offset, f'{offset}  10 05'):
+        chunks = read_hex('x', [f'00000000  {"10 05 " * 8}', '*', line])
+        next(chunks)
+        with pytest.raises(Problem, match='x:3: the offset does not fit: "[*]" stands for lines'):
+            next(chunks)
+
+
 @pytest.mark.parametrize('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
 def test_bad_line_is_named(line: str) -> None:
     with pytest.raises(Problem, match='is no hexadecimal dump; write bytes as in') as caught:

@@ -21,7 +21,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.driver.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.node_parameters import Configuration, configure, Parameters
@@ -112,7 +112,10 @@ def test_every_parameter_is_declared_read_only_with_a_description(
     for name in names:
         descriptor = node.describe_parameter(name)
         assert descriptor.read_only, name
-        assert descriptor.description or name.startswith('map.'), name
+        assert descriptor.description, name
+        assert descriptor.name == name
+    assert node.describe_parameter('map.line.door.plc_type').description == \
+        next(column.description for column in MAP_COLUMNS if column.name == 'PLC_Type')
 
 
 def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) -> None:

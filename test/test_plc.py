@@ -31,7 +31,7 @@ from support.ptys import Pty
 from support.ros import Process, write_csv
 from support.simulator_process import Files, make_files
 
-FAST = ('--timeout', '100')
+FAST = ('--timeout', '250')
 
 Plc = Callable[..., Said]
 
@@ -124,6 +124,34 @@ def test_write_without_yes_writes_nothing(plc: Plc) -> None:
     assert plc('read', 'N7:20', '--length', '2', '--station', '2').lines == before
 
 
+def _into(path: str, line: str, *args: str) -> tuple[int, str]:
+    """Run it with an output that takes nothing; return exit status and standard error."""
+    with open(path, 'w') as output:
+        said = subprocess.run(
+            [sys.executable, '-m', 'abdf1_ros.plc', *args, '--port', line], stdout=output,
+            stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, timeout=30, check=False)
+    return said.returncode, said.stderr
+
+
+def test_output_that_is_full_hides_no_write(plc: Plc, line: str) -> None:
+    write = 'write', 'N7:27', '71', '--station', '2'
+    assert _into('/dev/full', line, *write, '--yes') == (
+        0, 'plc: written, but that cannot be printed: No space left on device\n')
+    assert plc('read', 'N7:27', '--station', '2').lines == ['N7:27 71']
+    assert _into('/dev/full', line, 'read', 'N7:27', '--station', '2') == (
+        2, 'plc: cannot print: No space left on device\n')
+
+
+def test_write_of_which_nobody_reads_what_would_happen(line: str) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    said = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros.plc', 'write', 'N7:27', '72', '--station', '2', '--port',
+         line], stdout=writer, stdin=subprocess.DEVNULL, timeout=30, check=False)
+    os.close(writer)
+    assert said.returncode == 2
+
+
 @pytest.mark.parametrize('answer, status, value', [('y', 0, '61'), ('n', 2, '60'), ('', 2, '60')])
 def test_write_asks_who_sits_at_a_terminal(line: str, plc: Plc, answer: str, status: int,
                                            value: str) -> None:
@@ -142,12 +170,12 @@ def test_write_asks_who_sits_at_a_terminal(line: str, plc: Plc, answer: str, sta
 
 
 @pytest.mark.parametrize('args, text', [
-    (('N7:0', '40000'), 'value 40000 at index 0 is no int16'),
+    (('N7:0', '40000'), '"40000" is no int16'), (('N7:0', '1_000'), '"1_000" is no int16'),
     (('N7:0', 'ten'), '"ten" is no int16'), (('N7:0', '1.5'), '"1.5" is no int16'),
-    (('B3:0/0', '2'), 'value 2 at index 0 is no bool'),
-    (('ST9:0', 'Tank', '5'), 'a string mapping has Length 1'),
-    (('T4:0', '5'), 'belongs to the processor'), (('N7', '5'), '2503 ERR_ADDRESS_SYNTAX'),
-    (('N7:9999', '5'), '2504 ERR_ADDRESS_RANGE')])
+    (('B3:0/0', '2'), '"2" is no bool'),
+    (('ST9:0', 'Tank', '5'), 'ST9:0 takes one text; quote it if it has spaces'),
+    (('T4:0', '5'), 'belongs to the processor'), (('N7', '5'), 'ADDRESS "N7": an element is'),
+    (('N7:9999', '5'), 'ADDRESS "N7:9999": elements of N run from 0 to 255')])
 def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: str) -> None:
     said = plc('write', *args, '--yes', '--station', '2')
     assert said.status == 2
@@ -168,12 +196,13 @@ def test_write_without_a_reply_is_unknown(plc: Plc, simulator: Process) -> None:
     assert 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT' in said.err
 
 
-def test_write_broken_off_is_unknown(tmp_path: Path) -> None:
+@pytest.mark.parametrize('count', [1, 3])
+def test_write_broken_off_is_unknown(tmp_path: Path, count: int) -> None:
     line = Pty(tmp_path / 'line')
     with Process('plc', 'write', 'N7:0', '1', '--yes', '--plc-type', 'SLC', '--port',
                  str(line.name), '--timeout', '9000') as process:
         line.read(10)  # the command is on its way
-        process.send(signal.SIGINT)
+        process.send(*[signal.SIGINT] * count)
         assert process.result() == 3
     line.close()
     assert 'unknown whether written: port lost: ' in process.text
@@ -328,7 +357,8 @@ def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> 
 @pytest.mark.parametrize('args, text', [
     (('read', 'N7:0'), 'name the port, such as --port /dev/ttyUSB0'),
     (('read', 'N7:0', '--port', '/nowhere/tty'), '/nowhere/tty'),
-    (('read', 'N7:0', '--port', '/dev/null'), 'plc: '),
+    (('read', 'N7:0', '--port', '/dev/null'), 'plc: /dev/null: '),
+    (('read', 'N7:0', '--port', 'x', '--peer', '--duplex', 'half'), 'not allowed with'),
     (('read', 'N7:0', '--port', 'x', '--baud', '1'), '--baud: Baud = "1" should be one of 1200'),
     (('read', 'N7:0', '--port', 'x'), '--port: Com_Port = "x" should be'),
     (('read', 'N7:0', '--net', '/nowhere/net.csv'), '/nowhere/net.csv: cannot be read'),

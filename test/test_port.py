@@ -383,7 +383,7 @@ def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) 
 
 
 @pytest.mark.parametrize('name, text', [
-    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'Could not configure port'),
+    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is no serial port'),
     ('socket://127.0.0.1:1', 'refused'), ('foo://x', 'protocol'), ('/tmp', 'directory')])
 def test_port_that_cannot_be_opened(name: str, text: str) -> None:
     with pytest.raises(OSError, match=text):

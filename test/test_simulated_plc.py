@@ -166,6 +166,8 @@ def test_message_of_a_plc2_and_a_plc3(plc: str, text: str, cmd: int, clock: Cloc
     ('1,PLC5,N7,,,,', '2:3 (Address): an element is missing, as in N7:0'),
     ('1,PLC5,N7:1000,,,,', '2:3 (Address): elements of N run from 0 to 999'),
     ('1,PLC5,N7:0,0,,,', '2:4 (Length): Length = "0" should be a whole number from 1 to 1000'),
+    ('1,PLC5,N7:998,3,,,', '2:4 (Length): the last word there can be is N7:999'),
+    ('1,SLC,T4:255,4,,,', '2:4 (Length): the last word there can be is T4:255.ACC'),
     ('1,PLC5,N7:0,1,1 2,,', '2:5 (Values): 2 values, the mapping has 1'),
     ('1,PLC5,N7:0,1,40000,,', '2:5 (Values): value 40000 at index 0 is no int16'),
     ('1,PLC5,N7:0,1,1.5,,', '2:5 (Values): value 1.5 at index 0 is no int16'),
@@ -182,10 +184,11 @@ def test_fault_of_the_data_file(path: Path, row: str, text: str) -> None:
     assert faults(path, row) == [text]
 
 
-def test_value_that_is_no_number(path: Path) -> None:
-    text, = faults(path, '1,PLC5,N7:0,1,abc,,')
-    assert text.startswith('2:5 (Values): ')
-    assert "'abc'" in text
+@pytest.mark.parametrize('value', ['abc', '1_000', '1_0.5', '\u0661', '\uff11', 'nan', '1e999'])
+def test_value_that_is_no_number(path: Path, value: str) -> None:
+    for address in ('N7:0', 'F8:0'):
+        assert faults(path, f'1,PLC5,{address},1,{value},,') == [
+            f'2:5 (Values): "{value}" should be a number']
 
 
 def test_every_fault_of_the_data_file_is_reported(path: Path) -> None:

@@ -36,6 +36,7 @@ from abdf1_ros.pccc.identity import decode_identity
 from abdf1_ros.simulated_plc import Faults, SimulatedPlc
 from abdf1_ros.simulator import CommandError, execute, main, PtyLine
 import pytest
+from support.commands import call
 from support.driver_bench import simulated_plc
 from support.ptys import PATIENCE, read_exactly
 
@@ -90,12 +91,15 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
     ('silent 1 2', '"silent 1 2" is no command'), ('full 1 2', '"full 1 2" is no command'),
     ('counters 1 2', '"counters 1 2" is no command'),
     ('slow 1', '"slow 1" is no command'),
-    ('slow 1 few', '"slow 1 few" has a number that is none'),
+    *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
+      for text in ('few', '-3', '1.5', '1_0', '\u0661')),
     ('delay 1', '"delay 1" is no command'),
-    ('delay 1 long', '"delay 1 long" has a number that is none'),
-    ('noise 1 much', '"noise 1 much" has a number that is none'),
-    ('error 1 zz', '"error 1 zz" has a number that is none'),
-    ('error 1 5', '"error 1 5" has a number that is none'),
+    *((f'delay 1 {text}', f'delay 1 {text}: "{text}" should be ms from 0 to 3600000')
+      for text in ('long', '-5', 'nan', '1e9', '1_0')),
+    *((f'noise 1 {text}', f'noise 1 {text}: "{text}" should be a share from 0 to 1')
+      for text in ('much', '-0.1', '1.1', 'nan')),
+    *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal, as in 0B')
+      for text in ('zz', '5', '500000', '\u0661\u0661')),
     ('error 1', '"error 1" is no command'), ('normal 1 x', '"normal 1 x" is no command')])
 def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
     plcs[0].faults = before = Faults(slow=2)
@@ -306,17 +310,34 @@ def test_commands_by_the_clock(start: Start) -> None:
 
 
 def _refused(capsys: pytest.CaptureFixture[str], *options: str) -> str:
-    assert main(options) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ''
-    assert captured.err.startswith('simulator: ')
-    return captured.err
+    said = call(main, capsys, *options)
+    assert (said.status, said.out) == (2, '')
+    assert said.err.startswith('simulator: ')
+    return said.err
 
 
-@pytest.mark.parametrize('at', ['soon silent 1', 'silent 1', '', 'x'])
+def test_commands_of_one_time_keep_their_order(start: Start) -> None:
+    simulator = start('--at', '0.1 quit', '--at', '0 slow 1 2', '--at', '0 delay 1 5')
+    lines = [simulator.line() for _ in range(3)]
+    assert lines[1:] == ['simulator: station 1: slow 2', 'simulator: station 1: delay 5']
+    assert simulator.end() == (0, '')
+
+
+@pytest.mark.parametrize('at', [
+    'soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1', 'inf silent 1',
+    '1_0 silent 1', '\u0661 silent 1', '5', '5 '])
 def test_bad_time(capsys: pytest.CaptureFixture[str], data: Path, at: str) -> None:
     assert _refused(capsys, '--data', str(data), '--at', at) == \
-        f'simulator: --at "{at}" should be seconds and a command\n'
+        f'simulator: --at "{at}" should be seconds from 0 and a command, as in "5 silent 1"\n'
+
+
+@pytest.mark.parametrize('command, text', [
+    ('hush 1', '--at: "hush 1" is no command'), ('silent 3', '--at: name a station (1, 2)'),
+    ('msg 1 N7:0 5', '--at: "msg 1 N7:0 5" is no command'),
+    ('slow 1 x', '--at: slow 1 x: "x" should be')])
+def test_command_for_later_is_looked_at_before(
+        capsys: pytest.CaptureFixture[str], data: Path, command: str, text: str) -> None:
+    assert text in _refused(capsys, '--data', str(data), '--at', f'5 {command}')
 
 
 def test_bad_data_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -337,7 +358,8 @@ def test_missing_data_file(capsys: pytest.CaptureFixture[str]) -> None:
 def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server:
         where = f'127.0.0.1:{server.getsockname()[1]}'
-        assert 'Address already in use' in _refused(capsys, '--data', str(data), '--tcp', where)
+        said = _refused(capsys, '--data', str(data), '--tcp', where)
+    assert said.startswith(f'simulator: --tcp "{where}": Address already in use')
 
 
 @pytest.mark.parametrize('where', ['127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b'])
@@ -348,13 +370,62 @@ def test_bad_tcp_port(capsys: pytest.CaptureFixture[str], data: Path, where: str
 
 def test_name_of_a_pty_that_is_a_file_already(
         capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert 'File exists' in _refused(capsys, '--data', str(data), '--pty', str(data))
+    assert _refused(capsys, '--data', str(data), '--pty', str(data)) == (
+        f'simulator: {data} is there already, and no link that a simulator has left; give another '
+        'name\n')
     assert data.read_text(encoding='utf-8') == DATA
+
+
+def test_link_of_somebody_else_is_left_alone(
+        capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path) -> None:
+    name = tmp_path / 'adapter'
+    name.symlink_to('/dev/ttyUSB0')
+    assert 'is there already' in _refused(capsys, '--data', str(data), '--pty', str(name))
+    assert os.readlink(name) == '/dev/ttyUSB0'
+
+
+def test_two_simulators_do_not_share_a_name(
+        capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
+    name = tmp_path / 'plc'
+    simulator = start('--pty', str(name))
+    simulator.line()
+    before = os.readlink(name)
+    assert _refused(capsys, '--data', str(data), '--pty', str(name)) == \
+        f'simulator: {name} is in use by another simulator or sniff\n'
+    assert os.readlink(name) == before
+    simulator.signal(signal.SIGKILL)
+    simulator.end()
+    assert os.path.lexists(name)
+    again = start('--pty', str(name))
+    assert again.line().startswith('simulator: stations')
+    assert 'is in use' in _refused(capsys, '--data', str(data), '--pty', str(name))
+    again.signal(signal.SIGTERM)
+    assert again.end() == (0, '')
+    assert not os.path.lexists(name)
+
+
+def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
+    name = tmp_path / 'plc'
+    line = PtyLine(str(name))
+    name.unlink()
+    name.symlink_to('/dev/ttyUSB0')
+    line.close()
+    assert os.readlink(name) == '/dev/ttyUSB0'
 
 
 def test_folder_of_a_pty_that_is_missing(
         capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert 'No such file' in _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc')
+    assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc') == \
+        'simulator: /nowhere/plc cannot be made: No such file or directory\n'
+
+
+@pytest.mark.parametrize('name', ['/nowhere/tty', '/dev/null', 'socket://127.0.0.1:1'])
+def test_port_that_is_not_there_is_an_error_at_once(
+        capsys: pytest.CaptureFixture[str], data: Path, name: str) -> None:
+    said = call(main, capsys, '--data', str(data), '--port', name)
+    assert (said.status, said.out) == (1, '')
+    assert said.err.startswith('simulator: ')
+    assert name in said.err
 
 
 def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
@@ -368,12 +439,13 @@ def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
         line.close()
 
 
-@pytest.mark.parametrize('option', ['--check=XOR', '--baud=9601', '--seconds=x', '--what'])
+@pytest.mark.parametrize('option', [
+    '--check=XOR', '--baud=9601', '--baud=9_600', '--seconds=x', '--seconds=-1', '--what',
+    '--pty=', '--port='])
 def test_bad_option(capsys: pytest.CaptureFixture[str], option: str) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main([option])
-    assert caught.value.code == 2
-    assert capsys.readouterr().err.startswith('usage: simulator')
+    said = call(main, capsys, option)
+    assert said.status == 2
+    assert said.err.startswith('usage: simulator')
 
 
 def test_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -135,19 +135,56 @@ def test_bad_line_ends_with_file_and_line_and_the_summary_so_far(
         'as in 0.004210 < 10 04\n')
 
 
-def test_missing_files_and_ports(capsys: Output, tmp_path: Path) -> None:
+def test_file_that_cannot_be_read_is_an_error_without_an_empty_summary(
+        capsys: Output, tmp_path: Path, capture: str) -> None:
     none = tmp_path / 'none'
-    assert 'No such file or directory' in refused(capsys, str(none))
+    for path, reason in ((none, 'No such file or directory'), (tmp_path, 'Is a directory')):
+        assert main([str(path)]) == 1
+        assert capsys.readouterr() == ('', f'sniff: {path}: cannot be read: {reason}\n')
+    assert main([capture, str(none)]) == 1
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[:5] == LINES
+    assert 'summary: 0.0 s, 45 bytes' in captured.out
+    assert captured.err.startswith(f'sniff: {none}: cannot be read: ')
+
+
+@pytest.mark.parametrize('text', ['', '# abdf1_ros capture 1\n# baud: 9600\n', '# a remark\n'])
+def test_file_without_bytes_is_told(capsys: Output, tmp_path: Path, text: str) -> None:
+    path = tmp_path / 'empty'
+    path.write_text(text, encoding='ascii')
+    assert main([str(path)]) == 0
+    assert capsys.readouterr().err == f'sniff: {path}: there are no bytes in it\n'
+
+
+def test_end_of_the_time_is_no_empty_file(capsys: Output, capture: str) -> None:
+    assert main(['--seconds', '1e-9', capture, capture]) == 0
+    captured = capsys.readouterr()
+    assert (captured.out.splitlines()[0], captured.err) == ('summary: 0 bytes', '')
+
+
+@pytest.mark.parametrize('baud', ['9' * 5000, '-9600', '\\u0661', '0', 'fast'])
+def test_speed_in_a_capture_that_is_none(capsys: Output, tmp_path: Path, baud: str) -> None:
+    path = tmp_path / 'line.cap'
+    path.write_text(f'# abdf1_ros capture 1\n# baud: {baud}\n0.0 > 10 05\n1.0 > 10 05\n',
+                    encoding='ascii')
+    assert not any('load' in line for line in lines_of(capsys, str(path)))
+
+
+def test_missing_ports(capsys: Output, tmp_path: Path) -> None:
+    none = tmp_path / 'none'
     assert f'sniff: {none}: ' in refused(capsys, '--port', str(none))
     assert f'sniff: {none}: ' in refused(capsys, '--tap', 'pty', str(none))
+    assert refused(capsys, '--port', 'pty', '--save', '/nowhere/x').endswith(
+        'sniff: /nowhere/x: No such file or directory\n')
     assert 'is no capture; give another name' in refused(
         capsys, '--port', 'pty', '--save', str(tmp_path))
 
 
 @pytest.mark.parametrize('args', [
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
-    ['--port', 'x', '--binary'], ['--tap', 'x'], ['x', '--check', 'md5'], ['x', '--baud', '7'],
-    ['x', '--seconds', 'many']])
+    ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
+    ['x', '--check', 'md5'], ['x', '--baud', '7'],
+    ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
 def test_bad_options(capsys: Output, args: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(args)
@@ -231,6 +268,17 @@ def test_port_until_a_signal(tmp_path: Path, number: signal.Signals) -> None:
     assert kinds == ['command', 'ACK', 'poll', 'reply', 'ACK']
     assert (status, err) == (0, '')
     assert json.loads(out)['kind'] == 'summary'
+
+
+def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
+    name = tmp_path / 'pipe'
+    os.mkfifo(name)
+    with Command('sniff', str(name)) as sniff:
+        writer = os.open(name, os.O_WRONLY)  # waits until it is opened there
+        status, out, err = sniff.end()
+        os.close(writer)
+    assert (status, err) == (0, '')
+    assert out.startswith('summary: 0 bytes')
 
 
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:

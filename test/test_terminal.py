@@ -17,18 +17,23 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 import io
+import signal
 import sys
 
 from abdf1_ros import terminal
 from abdf1_ros.terminal import (
     colour,
+    interruptible,
     is_terminal,
     prepare_output,
     Progress,
+    reason_of,
     RED,
     seconds_option,
     table,
+    whole_option,
 )
 import pytest
 
@@ -118,8 +123,56 @@ def test_output_that_knows_few_characters_shows_escapes(
     assert raw.getvalue() == b'h\\xe9llo\n'
 
 
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def _interrupts(number: signal.Signals) -> bool:
+    try:
+        signal.raise_signal(number)
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.usefixtures('handlers')
+def test_only_the_first_signal_interrupts(number: signal.Signals) -> None:
+    with interruptible():
+        assert _interrupts(number)
+        assert not _interrupts(number)
+        assert not _interrupts(signal.SIGINT)
+    assert not _interrupts(number)
+
+
+@pytest.mark.usefixtures('handlers')
+def test_no_signal_interrupts_what_comes_after_the_block() -> None:
+    with interruptible():
+        pass
+    assert not _interrupts(signal.SIGINT)
+    assert not _interrupts(signal.SIGTERM)
+
+
 def test_seconds_of_an_option_are_above_0() -> None:
     assert seconds_option('0.5') == 0.5
-    for text in ('0', '-1', 'nan', 'inf', 'soon'):
+    for text in ('0', '-1', 'nan', 'inf', 'soon', '1_0', '\u0661'):
         with pytest.raises(argparse.ArgumentTypeError, match='a number of seconds above 0'):
             seconds_option(text)
+
+
+def test_whole_numbers_of_options() -> None:
+    assert whole_option('9600') == 9600
+    for text in ('', '96.5', '9_600', '\u0661', '9' * 5000):
+        with pytest.raises(argparse.ArgumentTypeError, match='should be a whole number$'):
+            whole_option(text)
+
+
+@pytest.mark.parametrize(('error', 'text'), [
+    (OSError(2, 'No such file'), '/dev/x: No such file'), (OSError('taken'), '/dev/x: taken'),
+    (OSError(2, 'could not open port /dev/x: gone'), 'could not open port /dev/x: gone')])
+def test_reason_has_the_name_once(error: OSError, text: str) -> None:
+    assert reason_of('/dev/x', error) == text

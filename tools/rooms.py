@@ -58,14 +58,14 @@ class Room(NamedTuple):
 ROOMS = (
     Room(('messages.py',), 'numbered errors and notices', ()),
     Room(('counters.py',), 'status counters', ()),
-    Room(('text.py',), 'text from outside, made safe to show', ()),
+    Room(('text.py', 'numerals.py'), 'text and numbers from outside', ()),
     Room(('errors.py',), 'the exceptions', ('messages', 'text')),
     Room(('df1',), 'data-link layer: frames, checksums, machine, stations; master, standard '
                    'polling, slave, peer', _BASE),
     Room(('pccc',), 'application layer: addresses, commands of each PLC family, data table, '
                     'server', (*_BASE, 'text', 'df1.packet')),
     Room(('driver',), 'both CSV files, points, read planner, scheduler, served words, driver',
-         (*_BASE, 'df1', 'pccc')),
+         (*_BASE, 'numerals', 'df1', 'pccc')),
     Room(('capture.py',), 'the format of recorded bytes', ('errors', 'text')),
     Room(('dumps.py',), 'recorded bytes from files of other kinds', ('errors', 'capture')),
     Room(('sniffer',), 'traffic told to people', ('errors', 'capture', 'df1', 'pccc')),

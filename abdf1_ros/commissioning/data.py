@@ -18,18 +18,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
+from concurrent.futures import Future
 from dataclasses import replace
+import re
 
 from abdf1_ros.commissioning.session import Session
 from abdf1_ros.driver.csv_table import Row
 from abdf1_ros.driver.forecast import line_model
 from abdf1_ros.driver.map_row import read_mapping
-from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.mapping import Command, Mapping
 from abdf1_ros.driver.planner import Planner
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.driver.transactions import carry_out, Ending, identify, read_values
 from abdf1_ros.driver.values import Values, ValueType
-from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
+from abdf1_ros.numerals import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
@@ -37,6 +40,11 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 # The family in a diagnostic status, and its PLC_Type.
 _FAMILIES = {'SLC': 'SLC', 'PLC-5': 'PLC5', 'PLC-3': 'PLC3', 'PLC-2': 'PLC2'}
 
+# What stands on the command line for a column of a map CSV.
+_ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
+              'Word_Order': '--word-order', 'Access': '--access', 'Processor': '--processor'}
+
+_WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
 _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
 
@@ -45,15 +53,37 @@ def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Map
     """
     Return the mapping of an address; ``cells`` are other columns of a map CSV.
 
-    Raises ConfigurationError with every fault.
+    Raises ConfigurationError with every fault, each by the argument that it is in.
     """
-    return read_mapping(Row('command line', item, item, {
-        'Tag': f'address_{item}', 'Address': address, **cells}, {}))
+    row = Row('', item, item, {'Tag': f'address_{item}', 'Address': address, **cells}, {})
+    try:
+        return read_mapping(row)
+    except ConfigurationError as error:
+        raise ConfigurationError(
+            [_in_arguments(problem, row) for problem in error.problems]) from None
+
+
+def _in_arguments(problem: Problem, row: Row) -> Problem:
+    """Return a problem of a row in the words of the command line."""
+    column = next((name for name in _ARGUMENTS if row.where(name) == problem.where), '')
+    argument, text = _ARGUMENTS.get(column, 'options'), problem.text
+    text = text.removeprefix(f'Item: {row.item}, ').removeprefix(f'{column} = ')
+    text = text.replace('leave the cell empty', f'leave {argument} out')
+    if column == 'Length':
+        if problem.message is not None:  # the numbered text alone says what is too long
+            text = f'{row.get(column)} elements do not fit at {row.get("Address")}; {text}'
+        if row.get('Command') != Command.READ.value:  # there it is how many values are given
+            argument = 'VALUE'
+    elif column == 'Address':
+        argument += f' "{row.get(column)}"'
+    return Problem(argument, text)
 
 
 def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
     """Return the Length of a write; in A and N files a string takes a word for two characters."""
-    is_packed = kind == ValueType.STRING.value and not address.upper().startswith('ST')
+    if address.upper().startswith('ST'):
+        return 1
+    is_packed = kind == ValueType.STRING.value
     return max(1, (len(texts[0]) + 1) // 2) if is_packed else len(texts)
 
 
@@ -101,8 +131,10 @@ class Writing:
 
     def carry_out(self, session: Session) -> Ending:
         """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
-        future = session.start(self.mapping.station, carry_out(self._write))
+        future: Future[Ending] = Future()
         try:
+            # Inside, as an interrupt may come while the command is on the line already.
+            session.start(self.mapping.station, carry_out(self._write), future)
             return session.wait(future)
         except (KeyboardInterrupt, PortLost) as error:
             session.close()
@@ -123,12 +155,20 @@ def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | st
 
 
 def _number(mapping: Mapping, text: str) -> float:
-    try:
-        if mapping.type is ValueType.FLOAT32:
-            return float(text.replace(',', '.'))
-        return int(text, 0) if text[1:2].lower() in ('x', 'b', 'o') else int(text)
-    except ValueError:
-        raise FormatError(f'"{text}" is no {mapping.type.value}') from None
+    kind = mapping.type
+    low, high = kind.range
+    value: float | None
+    if kind is not ValueType.FLOAT32:
+        value = int(text, 0) if _WITH_BASE.fullmatch(text) else whole_number(text)
+        right = f'a whole number from {low:.0f} to {high:.0f}'
+    elif right := two_readings(text):
+        raise FormatError(f'"{text}" could be two numbers; write {right}')
+    else:
+        value = decimal_number(text.replace(',', '.'))
+        right = 'a number such as -1.5 or 2e3'
+    if value is None or not low <= value <= high:
+        raise FormatError(f'"{text}" is no {kind.value}, {right}')
+    return value
 
 
 def rows(mapping: Mapping, values: Values) -> Iterator[tuple[str, str]]:

@@ -22,6 +22,7 @@ from abdf1_ros.commissioning.line import DEFAULTS, MODES
 from abdf1_ros.driver.network import BAUD_RATES
 from abdf1_ros.driver.station_lists import parse_stations
 from abdf1_ros.driver.values import ValueType, WordOrder
+from abdf1_ros.numerals import decimal_number, whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
@@ -119,10 +120,11 @@ def _add_line_options(parser: argparse.ArgumentParser) -> None:
                                       f'(default: {DEFAULTS.baud})')
     group.add_argument('--check', type=str.upper, help='CRC or BCC (default: CRC)')
     group.add_argument('--parity', help='None, Even or Odd (default: None)')
-    group.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
-                       help='half: several stations on a line (default); full: one PLC')
-    group.add_argument('--peer', action='store_const', const='full', dest='duplex',
-                       help='the same as --duplex full')
+    either = group.add_mutually_exclusive_group()
+    either.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
+                        help='half: several stations on a line (default); full: one PLC')
+    either.add_argument('--peer', action='store_const', const='full', dest='duplex',
+                        help='the same as --duplex full')
     group.add_argument('--own-station', metavar='N',
                        help=f'our own address, which no PLC has (default: {DEFAULTS.station})')
     group.add_argument('--timeout', metavar='MS',
@@ -155,19 +157,17 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
 
 
 def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 <= value <= 86400:
+    value = decimal_number(text)
+    if value is None or not 0 <= value <= 86400:
         raise argparse.ArgumentTypeError(f'"{text}" should be seconds from 0 to 86400')
     return value
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
+    value = whole_number(text)
+    if value is None or value < 1:
         raise argparse.ArgumentTypeError(f'"{text}" should be a whole number from 1')
-    return int(text)
+    return value
 
 
 def _stations(text: str) -> tuple[int, ...]:

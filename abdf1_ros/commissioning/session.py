@@ -28,6 +28,7 @@ from abdf1_ros.driver.errands import Errands, Order
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
 from abdf1_ros.port import LinkThread, open_port, Port, PortState
+from abdf1_ros.terminal import reason_of
 
 # So often (s) a wait looks whether there still is a port.
 _GLANCE = 0.2
@@ -41,7 +42,10 @@ def opened(network: Network) -> Callable[[], Port]:
 
     So a port that is not there is an OSError here, not a state of a thread.
     """
-    ports = [open_port(network)]
+    try:
+        ports = [open_port(network)]
+    except OSError as error:
+        raise OSError(reason_of(network.port, error)) from None
     return lambda: ports.pop() if ports else open_port(network)
 
 
@@ -81,9 +85,10 @@ class Session:
         """Carry out an order and return its result; raises what the order raises."""
         return self.wait(self.start(station, order))
 
-    def start(self, station: int, order: Order[_Result]) -> Future[_Result]:
-        """Begin to carry out an order."""
-        future: Future[_Result] = Future()
+    def start(self, station: int, order: Order[_Result],
+              future: Future[_Result] | None = None) -> Future[_Result]:
+        """Begin to carry out an order; ``future`` is where its result goes."""
+        future = future or Future()
         self._errands.add(station, order, future.set_result, future.set_exception)
         self._link.wake()
         return future

@@ -29,7 +29,6 @@ from dataclasses import dataclass
 import difflib
 import io
 from pathlib import Path
-import re
 
 from abdf1_ros.errors import ConfigurationError, Problem
 
@@ -76,11 +75,6 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
         return _parse(path, lines, known)
     except csv.Error as error:
         raise ConfigurationError([Problem(path, f'not a CSV file: {error}')]) from None
-
-
-def whole_number(text: str) -> int | None:
-    """Return the number that a cell of decimal digits stands for, None for anything else."""
-    return int(text) if re.fullmatch(r'[+-]?[0-9]{1,20}', text) else None
 
 
 def _read_lines(path: str) -> list[str]:

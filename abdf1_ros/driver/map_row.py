@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from enum import Enum
 import math
-import re
 from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.columns import MAP_COLUMNS
-from abdf1_ros.driver.csv_table import Row, whole_number
+from abdf1_ros.driver.csv_table import Row
 from abdf1_ros.driver.mapping import Command, Mapping, Publish
 from abdf1_ros.driver.names import MAX_LENGTH, sanitise
 from abdf1_ros.driver.scaling import Scaling
@@ -31,6 +30,7 @@ from abdf1_ros.driver.structures import type_fault, write_fault
 from abdf1_ros.driver.values import types_of, ValueType, WordOrder
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Message
+from abdf1_ros.numerals import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access, accesses_of
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
@@ -139,16 +139,14 @@ class RowReader:
 
     def _decimal(self, column: str, default: float) -> float:
         text = self._row.get(column)
-        try:
-            value = float(text.replace(',', '.')) if text else default
-        except ValueError:
-            value = math.nan
-        if re.fullmatch(r'[+-]?[0-9]+,[0-9]{3}', text):
-            self._fault(column, f'{column} = "{text}" could be two numbers; write '
-                                f'{text.replace(",", "")} or {text.replace(",", ".")}')
-        elif math.isnan(value) or (text and math.isinf(value)):
+        if not text:
+            return default
+        value = decimal_number(text.replace(',', '.'))
+        if right := two_readings(text):
+            self._fault(column, f'{column} = "{text}" could be two numbers; write {right}')
+        elif value is None:
             self._fault(column, f'{column} = "{text}" should be a number')
-        return value
+        return default if value is None else value
 
     def _scaling(self) -> Scaling | None:
         if not self._row.get('Scale') and not self._row.get('Offset'):

@@ -24,9 +24,10 @@ from urllib.parse import urlsplit
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.driver.csv_table import read_rows, whole_number
+from abdf1_ros.driver.csv_table import read_rows
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Message
+from abdf1_ros.numerals import whole_number
 
 MODES = ('Master', 'Slave', 'Peer')
 SUPPORTED_MODES = MODES

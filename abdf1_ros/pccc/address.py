@@ -126,8 +126,10 @@ class Address:
                   plc_type: PlcType) -> Address:
         if bit is None or not bit.isdigit() or file_type is not FileType.BINARY:
             raise AddressSyntaxError('an element is missing, as in N7:0')
+        last = (_last_element(file_type, plc_type) + 1) * BITS - 1
+        if int(bit) > last:
+            raise AddressRangeError(f'bits of {file_type.value}{file} run from 0 to {last}')
         element, bit_number = divmod(int(bit), BITS)
-        _check_element(element, file_type, plc_type)
         return cls(plc_type, file_type, file, element, 0, bit_number)
 
     def _with_member(self, name: str) -> Address:

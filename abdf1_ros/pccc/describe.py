@@ -26,6 +26,7 @@ from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import diagnostics, notation, plc2, plc5, slc, word_range
 from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.identity import decode_identity
 from abdf1_ros.pccc.notation import count_of, hexadecimal, part_of, words_text
 from abdf1_ros.pccc.plc3 import ExtendedAddress
 from abdf1_ros.pccc.plc5 import SystemAddress
@@ -191,6 +192,19 @@ def _basic_bit_write(request: plc2.BasicBitWrite) -> str:
         f'set {change.set:02X} reset {change.reset:02X}' for change in request.changes)
 
 
+def _identity_reply(request: object, data: bytes) -> str:
+    identity = decode_identity(data)
+    if identity.interface is None and not identity.family:
+        raise FormatError('nothing is known of this processor')
+    text = str(identity)
+    notes = [] if identity.name in text else [f'name {identity.name}']
+    return '; '.join([text, *notes, *identity.faults, *identity.remarks])
+
+
+def _no_parameters(reader: Reader) -> None:
+    reader.end()
+
+
 def _words_reply(request: object, data: bytes) -> str:
     return words_text(data)
 
@@ -210,6 +224,8 @@ _COMMANDS: dict[_Code, _Command] = {
         'unprotected bit write', plc2.BasicBitWrite.read, _basic_bit_write),
     (plc2.PROTECTED_BIT_WRITE, None): _Command(
         'protected bit write', plc2.BasicBitWrite.read, _basic_bit_write),
+    (diagnostics.CMD, diagnostics.STATUS): _Command(
+        'diagnostic status', _no_parameters, lambda request: '', _identity_reply),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): _Command(
         'read diagnostic counters', diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {count_of(request.size, "byte")}', _words_reply),
@@ -242,7 +258,7 @@ _COMMANDS: dict[_Code, _Command] = {
 # What else there is (M 7-2, 7-3; 0F/94 is from practice); the parameters are given as bytes.
 _NAMES: dict[_Code, str] = {
     (0x03, None): 'physical write', (0x04, None): 'physical read',
-    (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables', (0x06, 0x03): 'diagnostic status',
+    (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables',
     (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs', (0x06, 0x06): 'set ENQs',
     (0x06, 0x07): 'reset diagnostic counters', (0x06, 0x08): 'set data table size',
     (0x06, 0x09): 'read link parameters', (0x06, 0x0A): 'set link parameters',

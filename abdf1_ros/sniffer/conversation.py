@@ -58,7 +58,12 @@ class Facts(NamedTuple):
 
 
 class Conversation:
-    """Remember the messages of a line; every good one is handed to ``take``."""
+    """
+    Remember the messages of a line; every good one is handed to ``take``.
+
+    Times that go back far are those of another recording; what is open then gets no reply. A
+    little they may go back where two ports are heard.
+    """
 
     def __init__(self) -> None:
         self._open: dict[_Key, Transaction] = {}
@@ -81,9 +86,9 @@ class Conversation:
         command = transaction.command
         if packet.cmd != command.cmd | REPLY_BIT:
             return Facts(marks=(*marks, Mark.WRONG_COMMAND))
-        latency = None
-        if not transaction.answered and time is not None and transaction.time is not None:
-            latency = time - transaction.time
+        begun, latency = transaction.time, None
+        if not transaction.answered and time is not None and begun is not None and begun <= time:
+            latency = time - begun
         transaction.answered = True
         return Facts(command, latency, marks)
 
@@ -100,7 +105,7 @@ class Conversation:
         while self._open:
             key, oldest = next(iter(self._open.items()))
             is_old = now is not None and oldest.time is not None and (
-                now - oldest.time > _PATIENCE)
+                abs(now - oldest.time) > _PATIENCE)
             if not is_old and len(self._open) <= _MOST_OPEN:
                 return
             del self._open[key]

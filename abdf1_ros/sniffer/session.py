@@ -31,6 +31,10 @@ from abdf1_ros.sniffer.entries import Entry, Kind
 # characters, and what an operating system or a device server may hold bytes back.
 _PAUSE = 0.15
 
+# Bytes for a decoder at once, which drops what is more than MAX_WAITING: a line of a dump can be
+# as long as its file.
+_PART = 4096
+
 _CONTROLS = {
     Code.ACK: (Kind.ACK, ''), Code.NAK: (Kind.NAK, ''),
     Code.EOT: (Kind.EOT, 'nothing to send'), Code.ENQ: (Kind.ENQ, 'asks for the last answer'),
@@ -46,9 +50,9 @@ class _Wire:
         self._noise_told = 0
 
     def feed(self, chunk: Chunk) -> None:
-        """Take bytes; what broke off before a pause is noise."""
+        """Take bytes; what broke off before a pause, or another recording, is noise."""
         if chunk.time is not None and self.last_time is not None and (
-                chunk.time - self.last_time > _PAUSE):
+                not 0 <= chunk.time - self.last_time <= _PAUSE):
             self.decoder.reset()
         self.last_time = chunk.time
         self.decoder.feed(chunk.data)
@@ -82,10 +86,11 @@ class Session:
         wire = self._wires.get(chunk.direction)
         if wire is None:
             wire = self._wires[chunk.direction] = _Wire(self.kind)
-        wire.feed(chunk)
-        while (symbol := wire.decoder.next_symbol()) is not None:
-            yield from self._noise(wire, chunk)
-            yield from self._entries(symbol, chunk, wire.decoder.checksum)
+        for start in range(0, len(chunk.data) or 1, _PART):
+            wire.feed(chunk._replace(data=chunk.data[start:start + _PART]))
+            while (symbol := wire.decoder.next_symbol()) is not None:
+                yield from self._noise(wire, chunk)
+                yield from self._entries(symbol, chunk, wire.decoder.checksum)
         for transaction in self._conversation.expired(chunk.time):
             yield self._unanswered(transaction, chunk.time)
 

@@ -75,22 +75,29 @@ class Counts:
 
 
 class Summary:
-    """Count what a session gives; ``baud`` is needed for the load of the line."""
+    """
+    Count what a session gives; ``baud`` is needed for the load of the line.
+
+    Where the times go back another recording has begun.
+    """
 
     def __init__(self, baud: int | None = None) -> None:
         self.baud = baud
         self.all = Counts()
         self.stations: defaultdict[int, Counts] = defaultdict(Counts)
         self.bytes: Counter[Direction] = Counter()
+        self._earlier = 0.0  # seconds of the recordings before this one
         self._first: float | None = None
         self._last: float | None = None
 
     def take(self, chunk: Chunk) -> None:
         """Count the bytes of a chunk."""
         self.bytes[chunk.direction] += len(chunk.data)
-        if chunk.time is not None:
-            self._first = chunk.time if self._first is None else self._first
-            self._last = chunk.time
+        if chunk.time is None:
+            return
+        if self._last is None or chunk.time < self._last:
+            self._earlier, self._first = self.seconds or 0.0, chunk.time
+        self._last = chunk.time
 
     def add(self, entry: Entry) -> None:
         """Count an entry."""
@@ -100,10 +107,10 @@ class Summary:
 
     @property
     def seconds(self) -> float | None:
-        """Return the seconds from the first byte to the last; None without times."""
+        """Return the seconds from first to last byte of all recordings; None without times."""
         if self._first is None or self._last is None:
             return None
-        return self._last - self._first
+        return self._earlier + self._last - self._first
 
     def load(self, duplex: Duplex | None) -> float | None:
         """

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from array import array
+from concurrent.futures import Future
+from typing import cast
 
 from abdf1_ros.commissioning.data import (
     element,
@@ -25,9 +27,13 @@ from abdf1_ros.commissioning.data import (
     parse_values,
     processor_of,
     rows,
+    Writing,
 )
+from abdf1_ros.commissioning.session import Session
 from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.errors import ConfigurationError, FormatError
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.transactions import Ending
+from abdf1_ros.errors import ConfigurationError, FormatError, PortLost
 from abdf1_ros.pccc.identity import Identity
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,9 +51,26 @@ def test_columns_are_those_of_a_map_file() -> None:
         4, 'int32', 'High', 7)
 
 
-def test_faults_name_the_address_by_its_number() -> None:
-    with pytest.raises(ConfigurationError, match=r'command line:3 \(Address\): 2503 .* Item: 3'):
-        mapping_of('N7', {'Command': 'Read', 'Station': '1', 'PLC_Type': 'SLC'}, 3)
+@pytest.mark.parametrize(('address', 'cells', 'text'), [
+    ('N7', {}, 'ADDRESS "N7": an element is missing, as in N7:0'),
+    ('B3/4096', {}, 'ADDRESS "B3/4096": bits of B3 run from 0 to 4095'),
+    ('N7:0', {'Length': '0', 'Command': 'Read'},
+     '--length: "0" should be a whole number from 1 to 65535'),
+    ('N7:0', {'Length': '1_0', 'Command': 'Read'},
+     '--length: "1_0" should be a whole number from 1 to 65535'),
+    ('N7:250', {'Length': '9', 'Command': 'Read'},
+     '--length: 9 elements do not fit at N7:250; the last word there can be is N7:255'),
+    ('N7:250', {'Length': '9'},
+     'VALUE: 9 elements do not fit at N7:250; the last word there can be is N7:255'),
+    ('N7:0', {'Type': 'bool'}, '--type: N7:0 can be int16, uint16, bcd16, int32, uint32, '
+     'float32, string; a bool needs a bit address such as B3:0/5'),
+    ('N7:0', {'Access': 'Typed'}, '--access: "Typed" of a SLC should be one of Slot, Flat'),
+    ('N7:0', {'PLC_Type': 'PLC5', 'Processor': '5/02'}, '--processor: Processor is for PLCs of '
+     'type SLC that we read or write; leave --processor out')])
+def test_faults_name_the_argument(address: str, cells: dict[str, str], text: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        make(address, **cells)
+    assert str(caught.value) == text
 
 
 @pytest.mark.parametrize('address, kind, number, expected', [
@@ -77,10 +100,39 @@ def test_values(address: str, kind: str, texts: list[str], values: object) -> No
 
 @pytest.mark.parametrize('address, texts', [
     ('N7:0', ['x']), ('N7:0', ['']), ('N7:0', ['0x']), ('N7:0', ['1.0']), ('F8:0', ['1.5.2']),
-    ('ST9:0', ['a', 'b'])])
+    ('ST9:0', ['a', 'b']), ('N7:0', ['1_000']), ('N7:0', ['0x1_0']), ('N7:0', ['\u0661']),
+    ('N7:0', ['\uff11']), ('N7:0', [' 1']), ('F8:0', ['1_0.5']), ('F8:0', ['\u0661']),
+    ('F8:0', ['nan']), ('F8:0', ['1e39']), ('F8:0', ['1,000'])])
 def test_no_values(address: str, texts: list[str]) -> None:
     with pytest.raises(FormatError):
         parse_values(make(address), texts)
+
+
+@pytest.mark.parametrize('address, text, right', [
+    ('N7:0', '1_000', '"1_000" is no int16, a whole number from -32768 to 32767'),
+    ('B3:0/1', '2', '"2" is no bool, a whole number from 0 to 1'),
+    ('F8:0', '1_000', '"1_000" is no float32, a number such as -1.5 or 2e3'),
+    ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
+def test_value_that_is_none_says_what_would_be_right(address: str, text: str, right: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        parse_values(make(address), [text])
+    assert str(caught.value) == right
+
+
+class InterruptedSession:
+    """A session that is interrupted when its command is on the line already."""
+
+    def start(self, station: int, order: object, future: Future[Ending]) -> None:
+        self._future = future
+        raise KeyboardInterrupt
+
+    def close(self) -> None:
+        self._future.set_exception(PortLost('closed'))
+
+
+def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
+    ending = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession()))
+    assert (ending.outcome, ending.detail) == (Outcome.UNKNOWN, 'port lost: closed')
 
 
 @pytest.mark.parametrize('model, processor', [
@@ -100,6 +152,7 @@ def test_whole_numbers_in_every_notation(value: int) -> None:
 
 @pytest.mark.parametrize('address, kind, texts, length', [
     ('N7:0', None, ['1', '2'], 2), ('ST9:0', 'string', ['Tank 5'], 1),
-    ('N7:0', 'string', ['abcde'], 3), ('A10:0', 'string', [''], 1)])
+    ('N7:0', 'string', ['abcde'], 3), ('A10:0', 'string', [''], 1), ('st9:0', None, ['a', 'b'], 1)
+])
 def test_length_of_a_write(address: str, kind: str | None, texts: list[str], length: int) -> None:
     assert length_of(address, kind, texts) == length

@@ -54,7 +54,7 @@ def plc_on(path: Path, check: str, duplex: Duplex) -> Iterator[Network]:
     link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
     link.start()
     try:
-        yield Network(com_port=str(path), timeout=60)
+        yield Network(com_port=str(path), timeout=250)
     finally:
         link.stop()
         line.close()

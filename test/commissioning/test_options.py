@@ -55,7 +55,10 @@ def test_lists_of_stations() -> None:
 @pytest.mark.parametrize('args', [
     ('scan', ''), ('scan', '300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
     ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
-    ('watch', 'N7:0', '--count', '1.5'), ('read',), ('write', 'N7:0'), ('fly',),
+    ('watch', 'N7:0', '--count', '1.5'), ('watch', 'N7:0', '--count', '\u0661'),
+    ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'), ('read',),
+    ('scan', '1', '--peer', '--duplex', 'half'), ('scan', '1', '--duplex', 'half', '--peer'),
+    ('write', 'N7:0'), ('fly',),
     ('read', 'N7:0', '--type', 'int8')])
 def test_wrong(args: tuple[str, ...]) -> None:
     with pytest.raises(SystemExit) as ending:

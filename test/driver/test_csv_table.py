@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from abdf1_ros.driver.csv_table import read_rows, Row, whole_number
+from abdf1_ros.driver.csv_table import read_rows, Row
 from abdf1_ros.errors import ConfigurationError
 from hypothesis import given
 from hypothesis import strategies as st
@@ -211,11 +211,3 @@ def test_any_bytes_give_rows_or_a_configuration_error(
         assert [row.item for row in rows] == list(range(1, len(rows) + 1))
         assert all(row.cells.keys() <= set(KNOWN) for row in rows)
         assert all(before.line < after.line for before, after in zip(rows, rows[1:]))
-
-
-@pytest.mark.parametrize('text, value', [
-    ('0', 0), ('-7', -7), ('+7', 7), ('007', 7), ('65535', 65535),
-    ('', None), ('1.0', None), ('1e3', None), ('0x10', None), ('1 0', None), ('1_0', None),
-    ('²', None), ('٣', None), ('-', None), ('5\n', None), ('9' * 5000, None)])
-def test_whole_number(text: str, value: int | None) -> None:
-    assert whole_number(text) == value

@@ -124,6 +124,8 @@ def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
      ' from 0 to 86400000'),
     ('Min', 'low', '2:11 (Min): Item: 1, Min = "low" should be a number'),
     ('Min', 'nan', '2:11 (Min): Item: 1, Min = "nan" should be a number'),
+    ('Min', '1_000', '2:11 (Min): Item: 1, Min = "1_000" should be a number'),
+    ('Min', '\u0661', '2:11 (Min): Item: 1, Min = "\u0661" should be a number'),
     ('Max', 'inf', '2:12 (Max): Item: 1, Max = "inf" should be a number'),
     ('Max', '1e999', '2:12 (Max): Item: 1, Max = "1e999" should be a number'),
     ('Tag', '--', '2:1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),

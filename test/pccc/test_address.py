@@ -134,6 +134,14 @@ def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
         Address.parse(beyond, family)
 
 
+@pytest.mark.parametrize(('family', 'text', 'last'), [
+    (SLC, 'B3/4096', 'B3 run from 0 to 4095'), (PLC5, 'b10/16000', 'B10 run from 0 to 15999')])
+def test_bits_counted_through_a_file_have_limits_of_their_own(
+        family: PlcType, text: str, last: str) -> None:
+    with pytest.raises(AddressRangeError, match=f'^bits of {last}$'):
+        Address.parse(text, family)
+
+
 def test_errors_are_format_errors() -> None:
     assert issubclass(AddressSyntaxError, FormatError)
     assert issubclass(AddressRangeError, FormatError)

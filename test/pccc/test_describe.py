@@ -119,6 +119,20 @@ def test_replies(asked: str, data: str, text: str) -> None:
     assert describe(request.reply(bytes.fromhex(data)), request) == text
 
 
+@pytest.mark.parametrize(('data', 'text'), [
+    ('00 EE 34 49 22 35 2F 30 33 20 20 20 20 20 20 20 00 00 06 00 00 00 10 00',
+     'SLC 5/03 series B revision 3, REM RUN'),
+    ('40 EE 34 95 22 35 2F 30 39 20 20 20 20 20 20 20 16 01 01 20 00 00 10 00',
+     '5/09 series B revision 3, REM PROG; major error 0x0116, processor halted; testing edits'),
+    ('00 EE 34 49 22 4C 49 4E 45 20 34 20 20 20 20 20 00 00 06 00 00 00 10 00',
+     'SLC 5/03 series B revision 3, REM RUN; name LINE 4'),
+    ('08 BB', 'PLC-5/15, PROG; major processor fault (word S:11 says which)'),
+    ('00 99 01 02 03 04 05 06 07 08', '00 99 01 02 03 04 05 06 07 08'), ('00', '00')])
+def test_diagnostic_status(data: str, text: str) -> None:
+    request = command('03', 0x06)
+    assert describe(request.reply(bytes.fromhex(data)), request) == text
+
+
 def test_reply_without_its_command_is_bytes() -> None:
     assert describe(command('').reply(b'\x34\x12')) == '34 12'
 

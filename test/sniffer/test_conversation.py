@@ -112,6 +112,17 @@ def test_broadcast_has_no_reply(talk: Talk) -> None:
     assert talk.unanswered() == []
 
 
+def test_another_recording_begins(talk: Talk) -> None:
+    talk.now = 100.0
+    talk.out(COMMAND)
+    talk.out(Packet(2, 5, 0x0F, 0, 7))
+    assert list(talk.expired(100.0)) == []  # the ports of a tap are not exactly together
+    talk.now = 0.0
+    assert talk.back(REPLY) == Facts(COMMAND, None)
+    assert [entry.command.dst for entry in talk.expired(talk.now)] == [2]
+    assert talk.unanswered() == []
+
+
 def test_command_that_waits_too_long(talk: Talk) -> None:
     talk.out(COMMAND)
     assert list(talk.expired(10.5)) == []

@@ -184,6 +184,20 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
     assert kinds(decode(said, pause=0.1)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
 
 
+def test_frame_that_breaks_off_does_not_reach_into_another_recording() -> None:
+    session = Session()
+    found = [*session.feed(Chunk(5.0, OUT, master(COMMAND)[:9])),
+             *session.feed(Chunk(0.0, OUT, frames.poll_frame(1)))]
+    assert kinds(found) == [Kind.NOISE, Kind.POLL]
+
+
+def test_nothing_is_lost_of_a_chunk_of_any_size() -> None:
+    polls = frames.poll_frame(1) * 20_000
+    assert len(polls) > frames.MAX_WAITING
+    found = kinds(decode([(UNKNOWN, polls)]))
+    assert (found.count(Kind.POLL), found.count(Kind.NOISE)) == (20_000, 0)
+
+
 def test_unknown_symbol() -> None:
     (entry,) = decode([(IN, b'\x10\x1b')])
     assert (entry.kind, entry.text) == (Kind.UNKNOWN, 'DLE 1B')

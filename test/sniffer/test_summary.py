@@ -70,6 +70,12 @@ def test_load(baud: int | None, duplex: Duplex | None, load: float | None) -> No
     assert summary.bytes == {OUT: 300, IN: 180}
 
 
+def test_recordings_one_after_the_other() -> None:
+    summary = _heard(_heard(Summary(9600)))
+    assert summary.seconds == 2.0
+    assert summary.load(Duplex.HALF) == 0.5
+
+
 def test_without_times_there_is_no_load() -> None:
     summary = Summary(9600)
     assert summary.seconds is None

@@ -12,13 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A serial device server for rfc2217:// URLs, whose line gives back what is sent."""
+"""
+Serial device servers for rfc2217:// URLs.
+
+The line of ``DeviceServer`` gives back what is sent; ``LineServer`` has a port for its line.
+"""
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+import os
+from pathlib import Path
+import select
 import socket
+import struct
 import threading
+import time
 
+from abdf1_ros.driver.network import Network
+from abdf1_ros.port import DescriptorPort, open_port
 import serial
 import serial.rfc2217
 
@@ -73,3 +87,126 @@ class DeviceServer:
                 back = self._line.read(self._line.in_waiting)
                 if back:
                     self.write(b''.join(manager.escape(back)))
+
+
+_TURN = 0.01  # s; so long the server listens before it looks at what it has been told
+
+_RESET = struct.pack('ii', 1, 0)  # SO_LINGER: closing drops what is under way, and tells so
+
+
+class LineServer:
+    """
+    A device server on 127.0.0.1 with one client at a time, for the port ``line``.
+
+    ``start`` and ``stop`` are its power switch; it comes back with the same ``url``. What is
+    set from outside holds from then on: bytes in both directions take ``latency`` seconds; while
+    ``is_frozen`` it neither takes nor gives anything, and the kernel keeps what it is sent;
+    ``hangs_up`` on every client.
+    """
+
+    def __init__(self, line: Path) -> None:
+        self.latency = 0.0
+        self.is_frozen = self.hangs_up = False
+        self._line_name = str(line)
+        self._port = 0
+        self._line: DescriptorPort
+        self._listener: socket.socket
+        self._client: socket.socket | None = None
+        self._manager: serial.rfc2217.PortManager
+        self._is_lost = False
+        self._under_way: deque[tuple[float, Callable[[], None]]] = deque()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def url(self) -> str:
+        """Return what the node calls its port."""
+        return f'rfc2217://127.0.0.1:{self._port}'
+
+    def __enter__(self) -> LineServer:
+        self.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Be there."""
+        line = open_port(Network(com_port=self._line_name))
+        assert isinstance(line, DescriptorPort)
+        self._line = line
+        self._listener = socket.create_server(('127.0.0.1', self._port))
+        self._port = self._listener.getsockname()[1]
+        self._is_lost = False
+        self._thread = threading.Thread(target=self._run, name='device server')
+        self._is_working = True
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Go away, with all connections."""
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            self._is_working = False
+            thread.join()
+
+    def reset(self) -> None:
+        """Lose the connection, as a server does that begins anew."""
+        self._is_lost = True
+
+    def write(self, data: bytes) -> None:
+        """Send to the client; what ``PortManager`` answers comes this way too."""
+        if self._client is not None:
+            with suppress(OSError):  # it has gone, and the next turn finds that out
+                self._client.sendall(data)
+
+    def _run(self) -> None:
+        with self._listener:
+            while self._is_working:
+                if self._is_lost:
+                    self._is_lost = False
+                    self._drop_client(is_reset=True)
+                self._turn()
+            self._drop_client()
+        self._line.close()
+
+    def _turn(self) -> None:
+        while self._under_way and self._under_way[0][0] <= time.monotonic():
+            self._under_way.popleft()[1]()
+        near = self._listener if self._client is None else self._client
+        ends = [] if self.is_frozen else [near, self._line]
+        ready = select.select(ends, [], [], _TURN)[0]
+        if self._line in ready:
+            data = os.read(self._line.fileno(), 1024)
+            self._later(lambda: self.write(b''.join(self._manager.escape(data))))
+        if self._listener in ready:
+            self._accept()
+        elif near in ready:
+            self._take_from_client()
+
+    def _later(self, action: Callable[[], None]) -> None:
+        self._under_way.append((time.monotonic() + self.latency, action))
+
+    def _accept(self) -> None:
+        self._client = self._listener.accept()[0]
+        self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # It keeps the settings that are asked for; a pseudo-terminal has no modem lines.
+        self._manager = serial.rfc2217.PortManager(serial.serial_for_url('loop://'), self)
+        if self.hangs_up:
+            self._drop_client()
+
+    def _take_from_client(self) -> None:
+        assert self._client is not None
+        data = b''
+        with suppress(OSError):
+            data = self._client.recv(1024)
+        if data:
+            self._later(lambda: self._line.write(b''.join(self._manager.filter(data))))
+        else:
+            self._drop_client()
+
+    def _drop_client(self, is_reset: bool = False) -> None:
+        client, self._client = self._client, None
+        self._under_way.clear()
+        if client is not None:
+            if is_reset:
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+            client.close()
