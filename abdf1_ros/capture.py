@@ -40,6 +40,7 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from abdf1_ros.errors import Problem
+from abdf1_ros.numerals import decimal_number
 from abdf1_ros.text import printable
 
 VERSION = 1
@@ -157,11 +158,14 @@ def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> I
 def _chunk(line: str, where: str) -> Chunk:
     time, _, rest = line.partition(' ')
     direction, _, data = rest.partition(' ')
+    number = decimal_number(time)
     try:
-        chunk = Chunk(float(time), Direction(direction), bytes.fromhex(data))
+        chunk = Chunk(number, Direction(direction), bytes.fromhex(data))
     except ValueError:
+        number = None
+    if number is None:
         raise Problem(where, f'"{line[:_SHOWN]}" should be seconds, ">", "<" or "?", and bytes, '
-                      'as in 0.004210 < 10 04') from None
-    if chunk.time is None or not abs(chunk.time) < _LATEST:  # also NaN
+                      'as in 0.004210 < 10 04')
+    if abs(number) >= _LATEST:
         raise Problem(where, f'"{time[:_SHOWN]}" is no number of seconds')
     return chunk

@@ -262,6 +262,8 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     if motion is not Motion.NONE:
         if codec.type is ValueType.STRING:
             raise Problem(row.where('Motion'), 'a string does not move')
+        if codec.type is ValueType.BOOL and motion is Motion.RAMP:
+            raise Problem(row.where('Motion'), 'bits have no Ramp, only Toggle')
         period = _number(row, 'Period', 1, 3_600_000)
         plc.move(_Mover(address, codec, motion, period / 1000))
 

@@ -128,7 +128,8 @@ class Tap:
                 return
             if isinstance(item, OSError):
                 raise item
-            yield item._replace(time=(item.time or 0.0) - self._begun)
+            # In microseconds, as a capture has it: live and saved traffic read the same.
+            yield item._replace(time=round((item.time or 0.0) - self._begun, 6))
 
     def _open(self, name: str, stack: ExitStack) -> Port:
         line: PtyLine | SerialLine = SerialLine(name, self._network)

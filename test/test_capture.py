@@ -134,14 +134,15 @@ def test_empty_file_is_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('line', [
-    '0.1 > 10 0', '0.1 > zz', '0.1 = 10 04', '0.1', 'soon > 10 04', '> 10 04', 'x'])
+    '0.1 > 10 0', '0.1 > zz', '0.1 = 10 04', '0.1', 'soon > 10 04', '> 10 04', 'x',
+    'nan > 10 04', '-inf > 10 04', '1_0.5 > 10 04'])
 def test_bad_line_is_named(line: str) -> None:
     with pytest.raises(Problem, match='should be seconds, ">", "<" or "[?]", and bytes') as caught:
         list(read_capture('a.cap', ['# abdf1_ros capture 1', '', line], {}))
     assert str(caught.value).startswith('a.cap:3: ')
 
 
-@pytest.mark.parametrize('time', ['nan', 'inf', '-inf', '1e10', '-1e10', '9' * 100])
+@pytest.mark.parametrize('time', ['1e10', '-1e10', '9' * 100])
 def test_time_is_a_number(time: str) -> None:
     with pytest.raises(Problem, match='a.cap:2: .* is no number of seconds'):
         list(read_capture('a.cap', ['# abdf1_ros capture 1', f'{time} > 10 04'], {}))

@@ -179,6 +179,7 @@ def test_message_of_a_plc2_and_a_plc3(plc: str, text: str, cmd: int, clock: Cloc
     ('1,PLC5,N7:0,1,,Ramp,0', '2:7 (Period): Period = "0" should be a whole number from 1 to '
                               '3600000'),
     ('1,PLC5,ST9:0,1,,Ramp,5', '2:6 (Motion): a string does not move'),
+    ('1,PLC5,B3:0/4,2,,Ramp,5', '2:6 (Motion): bits have no Ramp, only Toggle'),
 ])
 def test_fault_of_the_data_file(path: Path, row: str, text: str) -> None:
     assert faults(path, row) == [text]

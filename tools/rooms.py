@@ -66,7 +66,7 @@ ROOMS = (
                     'server', (*_BASE, 'text', 'df1.packet')),
     Room(('driver',), 'both CSV files, points, read planner, scheduler, served words, driver',
          (*_BASE, 'numerals', 'df1', 'pccc')),
-    Room(('capture.py',), 'the format of recorded bytes', ('errors', 'text')),
+    Room(('capture.py',), 'the format of recorded bytes', ('errors', 'text', 'numerals')),
     Room(('dumps.py',), 'recorded bytes from files of other kinds', ('errors', 'capture')),
     Room(('sniffer',), 'traffic told to people', ('errors', 'capture', 'df1', 'pccc')),
     Room(('monitor_view.py',), 'the state of a running node as lines of text', ('text',)),

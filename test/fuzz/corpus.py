@@ -21,14 +21,20 @@ A stored corpus is a text file, one input a line in hexadecimal.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 
+from abdf1_ros import simulated_plc
+from abdf1_ros.capture import Chunk, Direction
+from abdf1_ros.df1.frames import ACK
 from abdf1_ros.driver.columns import COLUMNS
 from abdf1_ros.driver.network import FIELDS
 from abdf1_ros.pccc import plc5, slc
+from abdf1_ros.pccc.file_types import PlcType
 from support.vectors import CAPTURED, commands, MESSAGES, VECTORS
 
-TARGETS = ('frames', 'addresses', 'net_csv', 'map_csv', 'typed_data', 'server', 'links')
+TARGETS = ('frames', 'addresses', 'net_csv', 'map_csv', 'simulator_csv', 'typed_data', 'server',
+           'links', 'captures')
 
 _FOLDER = Path(__file__).resolve().parent / 'corpus'
 _CONFIG = Path(__file__).resolve().parent.parent.parent / 'config'
@@ -44,16 +50,35 @@ _SCRIPT = bytes.fromhex(
     '0405 0700 0205 0001020304 0405 0701 0204 F0060000 0500 0405 0701 0203 000000 0702 0704'
     '0309 68000001000702 0515 0405 0600 0420')
 
+# Bytes as xxd prints them and as hexdump -C does, which leaves out lines that repeat.
+_DUMPS = (
+    b'00000000: 1005 01ff 1004 1002                      ........\n',
+    b'00000000  10 05 01 ff 10 04 10 02  00 00 00 00 00 00 00 00  |................|\n'
+    b'00000010  00 00 00 00 00 00 00 00  00 00 00 00 00 00 00 00  |................|\n'
+    b'*\n00000040\n',
+    b'# a poll\n0x10, 0x05, 0x01, 0xFF\n1004\n')
+
+_CAPTURE = b'# abdf1_ros capture 1'
+# A command and its reply, full duplex.
+_EXCHANGE = (
+    b'10 02 01 02 06 00 07 00 00 10 03 a3 1f', b'10 02 02 01 46 00 07 00 10 03 5a 1e')
 
 # What was found once, and is no more.
 _FOUND = {
     # A served PLC-3 word range write to a word inside a structure that has no name.
-    'server': ('0F0000002102240423FF' + 55 * 'B6',)}
+    'server': (bytes.fromhex('0F0000002102240423FF') + 55 * b'\xb6',),
+    # A file that is longer than its PLC can have.
+    'simulator_csv': (b'Station,PLC_Type,Address,Length\n1,PLC5,N7:999,1000\n',),
+    # A line shown in full; a latency without end; a reply that comes in an earlier recording.
+    'captures': (
+        _CAPTURE + 600 * b'x',
+        _CAPTURE + b'\n-1e308 > %b\n1e308 < %b\n' % _EXCHANGE,
+        _CAPTURE + b'\n# baud: 9600\n5 > %b\n1 < %b\n' % _EXCHANGE)}
 
 
 def seeds(target: str) -> list[bytes]:
     """Return the inputs made for a target."""
-    return [*_SEEDS[target](), *map(bytes.fromhex, _FOUND.get(target, ()))]
+    return [*_SEEDS[target](), *_FOUND.get(target, ())]
 
 
 def stored(target: str) -> list[bytes]:
@@ -94,6 +119,16 @@ def _map_csv() -> Iterable[bytes]:
                    f'a;ReadWrite;{address};1;{plc};2\nb;Serve;{address};5;{plc};1\n').encode()
 
 
+def _simulator_csv() -> Iterable[bytes]:
+    rows = (_CONFIG / 'simulator.csv').read_bytes().splitlines(keepends=True)
+    head, *rows = (row for row in rows if not row.startswith(b'#'))
+    yield from (b'# data\n' + head + row for row in rows)
+    for plc in PlcType:
+        for address in _ADDRESSES:
+            yield (';'.join(simulated_plc.COLUMNS) + f'\n3;{plc.value};{address};2;1 -1.5;;\n'
+                   f'3;{plc.value};{address};1;;Toggle;100\n').encode()
+
+
 def _typed_data() -> Iterable[bytes]:
     for entry in commands(plc5.TYPED_WRITE, plc5.TYPED_READ, plc5.READ_MODIFY_WRITE):
         for start in (7, 11, 15, 16):
@@ -115,6 +150,20 @@ def _links() -> Iterable[bytes]:
     return (bytes((mode,)) + _SCRIPT for mode in range(16))
 
 
+def _captures() -> Iterable[bytes]:
+    yield from _DUMPS
+    for command, reply in pairwise(entry for entry in VECTORS if entry.pair):
+        if command.pair == reply.pair:
+            lines = [f'# check: {command.checksum.value}', '# baud: 9600',
+                     *(Chunk(time, direction, data) for time, direction, data in (
+                         (0.0, Direction.OUT, command.frame), (0.01, Direction.IN, ACK),
+                         (0.02, Direction.IN, reply.frame)))]
+            yield '\n'.join([_CAPTURE.decode(), *map(str, lines), '']).encode()
+            yield b''.join(bytes((how, 30, len(entry.link_data))) + entry.link_data
+                           for how, entry in ((0, command), (1, reply)))
+
+
 _SEEDS = {
     'frames': _frames, 'addresses': _addresses, 'net_csv': _net_csv, 'map_csv': _map_csv,
-    'typed_data': _typed_data, 'server': _server, 'links': _links}
+    'simulator_csv': _simulator_csv, 'typed_data': _typed_data, 'server': _server,
+    'links': _links, 'captures': _captures}

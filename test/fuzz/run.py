@@ -47,7 +47,7 @@ _MOST_STORED = 40_000
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of one target; ``finding`` is empty when nothing was found."""
+    """What came of one target; ``finding`` is empty when it ran and nothing was found."""
 
     target: str
     executions: int
@@ -57,7 +57,7 @@ class Outcome:
     def __str__(self) -> str:
         """Return one line of the table."""
         rate = self.executions // max(1, self.seconds)
-        return (f'{self.target:<12}{self.executions:>12,}{self.seconds:>8}{rate:>10,}  '
+        return (f'{self.target:<14}{self.executions:>12,}{self.seconds:>8}{rate:>10,}  '
                 f'{self.finding or "nothing found"}')
 
 
@@ -70,7 +70,7 @@ def main() -> int:
             _store(target, work)
         return 0
     seconds = max(1, arguments.seconds // len(arguments.targets))
-    print(f'{"target":<12}{"executions":>12}{"seconds":>8}{"a second":>10}')
+    print(f'{"target":<14}{"executions":>12}{"seconds":>8}{"a second":>10}')
     found = False
     for target in arguments.targets:
         outcome = _fuzz(target, work, seconds)
@@ -104,7 +104,9 @@ def _fuzz(target: str, work: Path, seconds: int) -> Outcome:
     done = re.search(r'Done \d+ runs in (\d+) second', said.stderr)
     if said.returncode or count is None or done is None:
         print(said.stdout + said.stderr, file=sys.stderr)
-        return Outcome(target, int(count[1]) if count else 0, seconds,
+        if count is None:
+            return Outcome(target, 0, 0, 'DID NOT RUN: see above')
+        return Outcome(target, int(count[1]), seconds,
                        f'FOUND: see above; the input is in {findings}')
     return Outcome(target, int(count[1]), int(done[1]))
 
