@@ -32,6 +32,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import signal
 import sys
 import time
 from typing import Any
@@ -41,6 +42,7 @@ import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 import std_msgs.msg
 
@@ -150,7 +152,10 @@ def main() -> int:
                              'twice its write_timeout, for a write that is read back '
                              '(default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    rclpy.init()
+    # rclpy's own handlers would leave nobody to say what became of the write.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
         node = CommandWriter(options.node, options.topic, options.tags or [options.topic])

@@ -28,16 +28,18 @@ from __future__ import annotations
 
 import argparse
 import math
+import signal
 import sys
+import threading
 from typing import Any
 
 import rclpy
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import UInt8MultiArray
 
@@ -109,7 +111,7 @@ def seconds(text: str) -> float:
 
 
 def main() -> int:
-    """Run until Ctrl-C."""
+    """Run until Ctrl-C or SIGTERM."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--topic', default='/abdf1/read/cell_interlocks')
@@ -117,18 +119,19 @@ def main() -> int:
     parser.add_argument('--patience', type=seconds, default=2.0,
                         help='seconds without a value after which motion is not permitted')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    rclpy.init()
+    # rclpy's own handlers take the ground from under a spin that is under way.
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = InterlockConsumer(options.topic, options.bit, options.patience)
     except InvalidTopicNameException as error:
         parser.error(' '.join(str(error).split()))
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    while not ended.is_set():
+        rclpy.spin_once(node, timeout_sec=0.1)
+    node.destroy_node()
+    rclpy.try_shutdown()
     return 0
 
 

@@ -32,6 +32,7 @@ from datetime import datetime, UTC
 import math
 import signal
 import sys
+import threading
 import time
 from typing import Any, TextIO
 
@@ -98,10 +99,12 @@ class Recorder(Node):
         return take
 
 
-def record(node: Recorder, seconds: float, wait: float) -> bool:
-    """Spin until the time is up; whether the bridge was there."""
+def record(node: Recorder, seconds: float, wait: float, ended: threading.Event) -> bool:
+    """Spin until the time is up or a signal has come; whether the bridge was there."""
     begin = said = time.monotonic()
     while time.monotonic() < begin + seconds:
+        if ended.is_set():
+            return True
         rclpy.spin_once(node, timeout_sec=0.1)
         if not node.has_found_topics and time.monotonic() > begin + wait:
             return False
@@ -122,24 +125,24 @@ def main() -> int:
     parser.add_argument('--wait', type=float, default=10.0,
                         help='seconds to look for the bridge (default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    # Both signals are Ctrl-C here; rclpy's handlers would not let the file be closed in order.
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    # rclpy's own handlers would not let the file be closed in order.
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
     try:
         with open(options.file, 'w', newline='', encoding='utf-8') as file:
-            return run(options, file)
+            return run(options, file, ended)
     except OSError as error:
         print(f'{options.file}: cannot be written: {error.strerror}', file=sys.stderr)
         return 2
 
 
-def run(options: argparse.Namespace, file: TextIO) -> int:
+def run(options: argparse.Namespace, file: TextIO, ended: threading.Event) -> int:
     """Record into ``file``; return the exit status."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Recorder(options.node, file)
     try:
-        found = record(node, options.seconds, options.wait)
-    except KeyboardInterrupt:
-        found = True
+        found = record(node, options.seconds, options.wait, ended)
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
