@@ -24,9 +24,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import os
+from pathlib import Path
 import signal
+import sys
 from types import FrameType
 
+_NOT_INSTALLED = 2
 _INTERRUPTED = 130  # of the commands whose status tells whether they have done what they should
 
 
@@ -86,7 +89,14 @@ def _ending_quietly(status: int = 0) -> Iterator[None]:
 
     usual = {number: signal.signal(number, leave)
              for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith('abdf1_ros'):
+            raise
+        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; '
+              'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?', file=sys.stderr)
+        sys.exit(_NOT_INSTALLED)
     for number, handler in usual.items():
         signal.signal(number, handler)
 

@@ -22,6 +22,7 @@ starts and destroyed after it has ended.
 
 from __future__ import annotations
 
+import argparse
 from collections import defaultdict, deque
 from collections.abc import Sequence
 import random
@@ -66,6 +67,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import Trigger
 
@@ -73,6 +75,21 @@ NODE_NAME = 'abdf1'
 
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
+
+_HELP = """\
+Read and write the data tables of PLCs over DF1, and show them as topics.
+
+parameters, behind --ros-args (docs/reference/parameters.md has all of them):
+  -p net_file:=PATH   the line; without it that of the package
+  -p map_file:=PATH   what is read and written
+  -p port:=DEVICE     a device path or URL instead of the file's Com_Port
+
+examples:
+  node --ros-args -p net_file:=net.csv -p map_file:=map.csv
+  node --ros-args -p port:=/dev/ttyUSB0 -r __node:=line_1
+
+exit status: 0 after Ctrl-C or SIGTERM, 2 for faulty files or parameters, 1 after internal errors
+"""
 
 # So many values of a reply are published while its ACK is on the line (two characters), the
 # others together with the next command: a hundred would keep the line waiting for 3 ms.
@@ -106,6 +123,8 @@ class BridgeNode(Node):
             raise
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
+        if not configuration.mappings:
+            self.get_logger().warning('the map has no usable row: nothing is read or written')
         self._log = EventLog(self.get_logger(), time.monotonic)
         self._lines = LineLog(self.get_logger(), time.monotonic)
         self._read_publishers: dict[str, Any] = {}
@@ -316,11 +335,12 @@ def main(args: Sequence[str] | None = None) -> int:
     def end(number: int, frame: FrameType | None) -> None:
         ended.set()
 
+    given = list(sys.argv if args is None else args)
     signal.signal(signal.SIGINT, end)
     signal.signal(signal.SIGTERM, end)
     try:
-        rclpy.init(args=list(sys.argv if args is None else args),
-                   signal_handler_options=SignalHandlerOptions.NO)
+        _parse(remove_ros_args(given)[1:])
+        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
         node = BridgeNode()
     except ConfigurationError as error:
         for problem in error.problems:
@@ -341,6 +361,16 @@ def main(args: Sequence[str] | None = None) -> int:
     node.destroy_node()
     rclpy.try_shutdown()
     return EXIT_FAULT if failed else 0
+
+
+def _parse(args: Sequence[str]) -> None:
+    """Tell who asks for help; all that the node takes are ROS arguments."""
+    parser = argparse.ArgumentParser(
+        prog='node', description=_HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
+    _, unknown = parser.parse_known_args(args)
+    if unknown:
+        parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
+                     '--ros-args, as in --ros-args -p net_file:=net.csv')
 
 
 def _spin(node: BridgeNode, ended: threading.Event) -> None:

@@ -23,6 +23,7 @@ from statistics import fmean
 import time
 
 from abdf1_ros.df1.polling import StandardPollingMaster
+from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
@@ -37,6 +38,9 @@ _WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR'}
 
 # How long a failed write keeps its status at WARN, in seconds.
 _WRITE_MEMORY = 10.0
+
+# A master that has not polled us for so long (s) is worth a warning.
+_LONGEST_UNPOLLED = 5.0
 
 _FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
@@ -123,6 +127,9 @@ class Diagnostics:
         state = self._link.state if self._link else None
         if state is None or not state.is_open:
             return ERROR, state.text if state else 'not started yet'
+        link = self._driver.link
+        if isinstance(link, SlaveLink) and now - link.last_poll > _LONGEST_UNPOLLED:
+            return WARN, f'port open, but not polled for {now - link.last_poll:.0f} s'
         active = sum(station.active for station in self._driver.stations)
         total = sum(1 for _ in self._driver.stations)
         if total and not active:

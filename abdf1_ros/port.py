@@ -40,10 +40,16 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
 import serial
+import serial.rfc2217
 import serial.rs485
 
 _READ_SIZE = 4096
 _WRITE_TIMEOUT = 2.0
+
+# A port without a descriptor cannot be waited for together with the wake descriptor; so long (s)
+# it is waited for alone. It is set once, in open_port: at every change of it pyserial negotiates
+# all settings of an rfc2217 port anew, which takes 0.1 s.
+_GLANCE = 0.01
 
 # Between attempts to open a port (s). They cost next to nothing, and whoever has plugged a
 # cable in again is waiting.
@@ -122,20 +128,16 @@ class DescriptorPort:
 class SerialPort:
     """A pyserial port without a file descriptor."""
 
-    # The wake descriptor cannot be waited for together with such a port.
-    _GLANCE = 0.01
-
-    def __init__(self, port: serial.Serial) -> None:
+    def __init__(self, port: serial.Serial | serial.rfc2217.Serial) -> None:
         self._port = port
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
         end = math.inf if timeout is None else time.monotonic() + timeout
         while True:
-            left = max(0.0, end - time.monotonic())
-            self._port.timeout = min(left, self._GLANCE)
-            data = self._port.read(max(1, self._port.in_waiting))
-            if data or not left or select.select([wake], [], [], 0)[0]:
+            is_over = time.monotonic() >= end
+            data = self._port.read(max(not is_over, self._port.in_waiting))
+            if data or is_over or select.select([wake], [], [], 0)[0]:
                 return bytes(data)
 
     def write(self, data: bytes) -> None:
@@ -145,6 +147,15 @@ class SerialPort:
     def close(self) -> None:
         """Give the line back."""
         self._port.close()
+
+
+class _Rfc2217Port(serial.rfc2217.Serial):
+    """A port on a device server."""
+
+    def _telnet_read_loop(self) -> None:
+        """End without a traceback when the server hangs up during the negotiation."""
+        with suppress(OSError):  # whoever opens or reads the port finds the thread dead
+            super()._telnet_read_loop()  # type: ignore[misc]  # the stubs do not have it
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +183,12 @@ def open_port(network: Network, name: str | None = None, options: PortOptions = 
     OSError, also where pyserial has another exception for it.
     """
     try:
-        port = serial.serial_for_url(
-            name or network.port, baudrate=network.baud, bytesize=network.data_bits,
+        url = name or network.port
+        open_url = _Rfc2217Port if url.lower().startswith('rfc2217:') else serial.serial_for_url
+        port = open_url(
+            url, baudrate=network.baud, bytesize=network.data_bits,
             parity=_PARITIES[network.parity], stopbits=network.stop_bits,
-            rtscts=network.handshake == 'Yes', timeout=0, exclusive=True)
+            rtscts=network.handshake == 'Yes', timeout=_GLANCE, exclusive=True)
     except serial.SerialException as error:
         reason = error.__context__
         if isinstance(reason, termios.error) and reason.args[0] == errno.ENOTTY:

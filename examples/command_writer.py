@@ -77,7 +77,11 @@ class CommandWriter(Node):
         # Volatile, so that a bridge that starts later does not execute an old command.
         self._publisher = self.create_publisher(self._type(), self._topic, QoSProfile(depth=10))
         return self._spin_until(lambda: self._publisher.get_subscription_count() > 0
-                                and self._listener.get_publisher_count() > 0, timeout)
+                                and self.has_bridge, timeout)
+
+    @property
+    def has_bridge(self) -> bool:
+        return self._listener.get_publisher_count() > 0
 
     def write(self, words: list[str], timeout: float) -> bool:
         """Send the values once; whether all results have come."""
@@ -85,10 +89,11 @@ class CommandWriter(Node):
         if isinstance(message, std_msgs.msg.String):
             message.data = ' '.join(words)
         elif isinstance(message, std_msgs.msg.Float32MultiArray):
-            message.data = list(map(float, words))
+            message.data = [number(float, word, 'a number') for word in words]
             self._numbers = [f'{value:.7g}' for value in message.data]
         else:
-            message.data = [int(word, 0) for word in words]
+            message.data = [number(lambda text: int(text, 0), word, 'a whole number')
+                            for word in words]
             self._numbers = list(map(str, message.data))
         self._publisher.publish(message)
         return self._spin_until(lambda: len(self.results) == len(self._tags), timeout)
@@ -115,6 +120,14 @@ class CommandWriter(Node):
         return bool(condition())
 
 
+def number(convert: Callable[[str], Any], text: str, what: str) -> Any:
+    """Return a value; ValueError, in words for people, when it is none."""
+    try:
+        return convert(text)
+    except ValueError:
+        raise ValueError(f'"{text}" should be {what}') from None
+
+
 def judge(message: str) -> int:
     """Return the exit status that the text of a result stands for."""
     if message == 'written':
@@ -125,7 +138,8 @@ def judge(message: str) -> int:
 def run(node: CommandWriter, options: argparse.Namespace) -> int:
     """Write and tell the results; return the exit status."""
     if not node.connect(options.timeout):
-        print(f'not written: {options.node} does not listen to write/{options.topic}')
+        print(f'not written: {options.node} does not listen to write/{options.topic}'
+              if node.has_bridge else f'not written: there is no node {options.node}')
         return NOT_WRITTEN
     complete = node.write(options.values, options.timeout)
     for tag, result in node.results.items():

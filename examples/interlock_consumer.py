@@ -67,8 +67,7 @@ class InterlockConsumer(Node):
             event_callbacks=SubscriptionEventCallbacks(
                 deadline=lambda event: self._decide(False, 'no value within the deadline'),
                 liveliness=self._liveliness,
-                incompatible_qos=lambda event: self._decide(
-                    False, 'the bridge does not promise values that often')))
+                incompatible_qos=self._incompatible))
         # DDS reports no missed deadline before the first value, so the start has a timer.
         self._start_timer = self.create_timer(patience, self._still_silent)
         self._decide(False, 'no value yet')
@@ -81,6 +80,10 @@ class InterlockConsumer(Node):
     def _liveliness(self, event: Any) -> None:
         if event.alive_count == 0:
             self._decide(False, 'the bridge or its PLC is gone')
+
+    def _incompatible(self, event: Any) -> None:
+        self._start_timer.cancel()  # nothing will be heard, and this is why
+        self._decide(False, 'the bridge does not promise values that often')
 
     def _still_silent(self) -> None:
         self._start_timer.cancel()

@@ -63,3 +63,16 @@ def test_signals_are_as_they_were_when_main_begins(tmp_path: Path, name: str) ->
     result = subprocess.run([sys.executable, tmp_path / 'fake.py'], capture_output=True,
                             text=True, timeout=10, check=True)
     assert result.stdout == 'True\n'
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
+    slow, _ = NAMES[name]
+    (tmp_path / f'{slow}.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n")
+    call = f'import sys; from abdf1_ros.executables import {name}; sys.exit({name}())'
+    result = subprocess.run([sys.executable, '-c', call], capture_output=True, text=True,
+                            timeout=10, check=False,
+                            env=os.environ | {'PYTHONPATH': str(tmp_path)})
+    assert result.returncode == 2
+    assert result.stderr == ('-c: the Python module rclpy is missing; is ROS 2 sourced, as by '
+                             '". /opt/ros/jazzy/setup.bash"?\n')

@@ -410,6 +410,21 @@ def refusal(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., list[st
         signal.signal(number, handler)
 
 
+@pytest.mark.parametrize('arguments', [['net.csv', 'map.csv'], ['-p', 'net_file:=net.csv']])
+def test_argument_outside_of_ros_arguments(
+        arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ending:
+        main(['node', *arguments])
+    assert ending.value.code == 2
+    assert 'parameters follow --ros-args' in capsys.readouterr().err
+
+
+def test_map_without_a_row_is_told(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    make_bench()
+    assert 'the map has no usable row' in ''.join(capfd.readouterr())
+
+
 @pytest.mark.parametrize(('assignment', 'expected'), [
     ('net_file:=/nowhere/net.csv', '/nowhere/net.csv: cannot be read: No such file or directory'),
     ('net.station:=300',

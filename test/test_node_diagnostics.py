@@ -22,6 +22,7 @@ from pathlib import Path
 import time
 from typing import Any
 
+from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
@@ -68,10 +69,10 @@ class Listener:
 class Bench:
     """Diagnostics of a driver that no port moves; tests set its state."""
 
-    def __init__(self, folder: Path, rows: tuple[str, ...] = ROWS) -> None:
+    def __init__(self, folder: Path, rows: tuple[str, ...] = ROWS, mode: str = 'Master') -> None:
         mappings, problems = load_mappings(str(write_csv(folder / 'map.csv', HEADER, rows)))
         assert not problems
-        self.driver = Driver(Network(), mappings, DriverSettings(), Listener())
+        self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Listener())
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.diagnostics = Diagnostics('line_a', self.driver, PORT)
         self.diagnostics.attach(self.link)
@@ -101,8 +102,8 @@ class Bench:
 
 @pytest.fixture
 def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., Bench]:
-    def make(*rows: str) -> Bench:
-        bench = Bench(tmp_path, rows or ROWS)
+    def make(*rows: str, mode: str = 'Master') -> Bench:
+        bench = Bench(tmp_path, rows or ROWS, mode)
         request.addfinalizer(bench.close)
         return bench
     return make
@@ -147,6 +148,18 @@ def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
     bench.driver.stations.heard(1, NOW)
     bench.driver.stations.heard(2, NOW)
     assert bench.says('link')[0] == OK
+
+
+def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(mode='Slave')
+    link = bench.driver.link
+    assert isinstance(link, SlaveLink)
+    link.last_poll = NOW - 5.0
+    assert bench.says('link')[0] == OK
+    link.last_poll = NOW - 6.0
+    assert bench.says('link') == (WARN, 'WARN: port open, but not polled for 6 s')
+    bench.set_port(False, 'gone')
+    assert bench.says('link') == (ERROR, 'ERROR: gone')
 
 
 def test_last_numbered_error_has_its_age(bench: Bench) -> None:

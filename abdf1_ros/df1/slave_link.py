@@ -40,10 +40,16 @@ _TICK = 0.25
 
 @dataclass(slots=True)
 class _Outstanding:
-    """The command on its way; ``deadline`` (clock value in s) runs from the master's ACK."""
+    """
+    The command on its way.
+
+    ``deadline`` (clock value in s) runs from the master's ACK, and before that from its last
+    poll: a command that is no longer repeated must not wait for a master to come back.
+    """
 
     task: Task
-    deadline: float | None = None
+    deadline: float
+    is_delivered: bool = False
 
 
 class SlaveLink:
@@ -51,8 +57,9 @@ class SlaveLink:
     Serve the master on the line of ``machine``, and send the commands of a source.
 
     ``cmd_timeout`` (s) is how long a command waits for its reply after the master has taken
-    it, ``poll_timeout`` (s, 0 for ever) how long we may be left unpolled. ``serve`` and
-    ``report`` are those of every link. It is the ``Initiator`` of its own slave.
+    it, or before that for the next poll, ``poll_timeout`` (s, 0 for ever) how long we may be
+    left unpolled. ``serve`` and ``report`` are those of every link. It is the ``Initiator`` of
+    its own slave. ``last_poll`` is the clock value (s) of the last poll, or of the start.
     """
 
     def __init__(self, machine: Machine, settings: SlaveSettings, stations: ActiveStationList,
@@ -68,14 +75,14 @@ class SlaveLink:
         self._slave: HalfDuplexSlave | None = None
         self._source: TaskSource | None = None
         self._outstanding: _Outstanding | None = None
-        self._last_poll = 0.0
+        self.last_poll = 0.0
 
     def run(self, source: TaskSource) -> Procedure:
         """Answer the master for ever."""
         slave = HalfDuplexSlave(self._settings, self._serve, self._machine.counters, self)
         self._slave, self._source = slave, source
         self._outstanding = None
-        self._last_poll = self._machine.now
+        self.last_poll = self._machine.now
         next_look = self._machine.now + _TICK
         while True:
             # Not afresh after each symbol: the line may never be still.
@@ -90,7 +97,10 @@ class SlaveLink:
 
     def polled(self) -> None:
         """Take note that the master has polled us."""
-        self._last_poll = self._machine.now
+        self.last_poll = self._machine.now
+        entry = self._outstanding
+        if entry is not None and not entry.is_delivered:
+            entry.deadline = self.last_poll + self._cmd_timeout
 
     def next_command(self) -> Packet | None:
         """Return a command to send now, one at a time."""
@@ -101,7 +111,7 @@ class SlaveLink:
         if task is None:
             return None
         task.sent = True
-        self._outstanding = _Outstanding(task)
+        self._outstanding = _Outstanding(task, now + self._cmd_timeout)
         return task.command
 
     def delivered(self, command: Packet) -> None:
@@ -113,6 +123,7 @@ class SlaveLink:
             self._outstanding = None
             entry.task.reply(command.reply())
             return
+        entry.is_delivered = True
         entry.deadline = self._machine.now + self._cmd_timeout
 
     def undelivered(self, command: Packet) -> None:
@@ -143,13 +154,13 @@ class SlaveLink:
         now = self._machine.now
         source.expire(now)
         entry = self._outstanding
-        if entry is not None and entry.deadline is not None and now >= entry.deadline:
-            self._fail()
-        if not self._poll_timeout or now - self._last_poll < self._poll_timeout:
-            return
-        if self._slave is not None:
+        is_overdue = entry is not None and now >= entry.deadline
+        is_alone = 0 < self._poll_timeout <= now - self.last_poll
+        if (is_overdue or is_alone) and self._slave is not None:
             self._slave.withdraw()
-        self._fail()
+            self._fail()
+        if not is_alone:
+            return
         waiting = []  # all first: a read that fails is soon due again
         while (task := source.next_task(now)) is not None:
             waiting.append(task)

@@ -79,6 +79,9 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
 
 def _read_lines(path: str) -> list[str]:
     try:
+        # A pipe into which nobody writes would hold us up for ever.
+        if Path(path).is_fifo():
+            raise ConfigurationError([Problem(path, 'is a pipe, not a file')])
         with Path(path).open('rb') as file:
             raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
     except OSError as error:

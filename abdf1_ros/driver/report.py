@@ -43,6 +43,7 @@ _NAMED_TAGS = 3
 class Kind(Enum):
     """What a remark is about; the value is what programs see."""
 
+    MAP = 'map'
     STATION = 'station'
     PERIOD = 'period'
     LOAD = 'load'
@@ -94,6 +95,8 @@ class Report:
 
     def remarks(self) -> list[Remark]:
         """Return all that is odd."""
+        if not self.mappings:
+            return [Remark(Kind.MAP, 'the map has no usable row: nothing is read or written')]
         return [*_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
                 *_gap_remarks(self)]
 

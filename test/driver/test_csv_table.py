@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from abdf1_ros.driver.csv_table import read_rows, Row
@@ -211,3 +212,10 @@ def test_any_bytes_give_rows_or_a_configuration_error(
         assert [row.item for row in rows] == list(range(1, len(rows) + 1))
         assert all(row.cells.keys() <= set(KNOWN) for row in rows)
         assert all(before.line < after.line for before, after in zip(rows, rows[1:]))
+
+
+def test_pipe_is_no_file(tmp_path: Path) -> None:
+    path = tmp_path / 'pipe'
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match='is a pipe, not a file'):
+        read_rows(str(path), KNOWN)

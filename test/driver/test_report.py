@@ -55,6 +55,12 @@ def test_times_of_one_read(plc: str, settings: dict[str, object], line_time: flo
     assert report.remarks() == []
 
 
+def test_map_without_a_row_is_odd() -> None:
+    remark, = report_of().remarks()
+    assert (remark.kind, remark.station) == (Kind.MAP, None)
+    assert remark.text == 'the map has no usable row: nothing is read or written'
+
+
 def test_slower_plc_makes_everything_slower() -> None:
     report = report_of(make_mapping('N7:0', length=2), response=0.03)
     assert report.scan_time == pytest.approx(TWO_WORDS + 0.06)

@@ -79,11 +79,11 @@ def test_value_that_no_reply_confirms_is_unknown(simulator: Process) -> None:
 
 def test_nobody_who_listens_is_not_written() -> None:
     assert write('recipe', '1', '--timeout', '0.5', node='/nobody') == (
-        1, 'not written: /nobody does not listen to write/recipe')
+        1, 'not written: there is no node /nobody')
 
 
 @pytest.mark.parametrize(('words', 'text'), [
-    (('recipe', '1', '2', '3', 'x'), '1 2 3 x: cannot be sent: invalid literal for int()'),
+    (('recipe', '1', '2', '3', 'x'), '1 2 3 x: cannot be sent: "x" should be a whole number'),
     (('recipe', '1', '2', '3', '70000'), '1 2 3 70000: cannot be sent: signed short integer'),
     (('a b', '1'), "1: cannot be sent: topic name '/writing/abdf1/write/a b' is invalid"),
 ])

@@ -123,17 +123,18 @@ class LineServer:
         return f'rfc2217://127.0.0.1:{self._port}'
 
     def __enter__(self) -> LineServer:
+        line = open_port(Network(com_port=self._line_name))
+        assert isinstance(line, DescriptorPort)
+        self._line = line
         self.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
         self.stop()
+        self._line.close()
 
     def start(self) -> None:
         """Be there."""
-        line = open_port(Network(com_port=self._line_name))
-        assert isinstance(line, DescriptorPort)
-        self._line = line
         self._listener = socket.create_server(('127.0.0.1', self._port))
         self._port = self._listener.getsockname()[1]
         self._is_lost = False
@@ -166,7 +167,6 @@ class LineServer:
                     self._drop_client(is_reset=True)
                 self._turn()
             self._drop_client()
-        self._line.close()
 
     def _turn(self) -> None:
         while self._under_way and self._under_way[0][0] <= time.monotonic():
@@ -175,8 +175,7 @@ class LineServer:
         ends = [] if self.is_frozen else [near, self._line]
         ready = select.select(ends, [], [], _TURN)[0]
         if self._line in ready:
-            data = os.read(self._line.fileno(), 1024)
-            self._later(lambda: self.write(b''.join(self._manager.escape(data))))
+            self._take_from_line()
         if self._listener in ready:
             self._accept()
         elif near in ready:
@@ -193,15 +192,26 @@ class LineServer:
         if self.hangs_up:
             self._drop_client()
 
+    def _take_from_line(self) -> None:
+        data = b''
+        with suppress(OSError):  # the PLC has ended
+            data = os.read(self._line.fileno(), 1024)
+        if data and self._client is not None:
+            self._later(lambda: self.write(b''.join(self._manager.escape(data))))
+
     def _take_from_client(self) -> None:
         assert self._client is not None
         data = b''
         with suppress(OSError):
             data = self._client.recv(1024)
         if data:
-            self._later(lambda: self._line.write(b''.join(self._manager.filter(data))))
+            self._later(lambda: self._tell_line(b''.join(self._manager.filter(data))))
         else:
             self._drop_client()
+
+    def _tell_line(self, data: bytes) -> None:
+        with suppress(OSError):
+            self._line.write(data)
 
     def _drop_client(self, is_reset: bool = False) -> None:
         client, self._client = self._client, None

@@ -1,0 +1,225 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Two nodes on one line, a master and a slave, and a box between them that spoils it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+import time
+from typing import Any
+
+from abdf1_ros.port import DescriptorPort
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Int16MultiArray
+from support.fault_box import FaultBox
+from support.ptys import Pty
+from support.ros import (
+    EVERYTHING,
+    Inbox,
+    Observer,
+    OK,
+    Process,
+    ros_args,
+    until_status,
+    values_in,
+    write_csv,
+)
+from support.simulator_process import NET_HEADER, NET_ROW
+
+STATIONS = {'Master': 5, 'Slave': 9}
+
+# DDS takes a killed process to be there for a while, so no name is used twice: what is said to
+# the topics of the dead is lost.
+_NUMBERS = count(1)
+
+
+class LineBox(FaultBox):
+    """
+    A fault box between two nodes, with the slave where the node is and the master at the far end.
+
+    So ``to_node`` leads to the slave, ``to_plc`` to the master. ``pass_on`` is called with the
+    Mode of who speaks and what it says; what it returns is what the other one hears.
+    """
+
+    def __init__(self, far: Path, name: Path) -> None:
+        super().__init__(far, name)
+        self.pass_on: Callable[[str, bytes], bytes] = lambda mode, data: data
+
+    def _take_from_node(self, data: bytes) -> None:
+        super()._take_from_node(self.pass_on('Slave', data))
+
+    def _tell_node(self, data: bytes) -> None:
+        super()._tell_node(self.pass_on('Master', data))
+
+    def _find_far(self) -> None:
+        pty = Pty(Path(self._far_name))
+        self._far = DescriptorPort(pty.fileno(), pty.close)
+
+
+@dataclass(slots=True)
+class End:
+    """
+    A node, and what is heard of it.
+
+    It serves the word ``ours``, and reads and writes that of the other end as ``theirs``.
+    """
+
+    observer: Observer
+    name: str
+    node: Process
+    diagnostics: Inbox
+    results: Inbox
+    ours: Inbox
+    theirs: Inbox
+    publisher: Any = None
+    writes: int = 0
+
+    def until_well(self) -> None:
+        """Wait until the other end is read."""
+        until_status(self.diagnostics, 'mappings', OK)
+        until_status(self.diagnostics, 'link', OK)
+
+    def status(self, name: str, level: bytes, *words: str) -> DiagnosticStatus:
+        """Wait for a status with this level and these words."""
+        return until_status(self.diagnostics, name, level,
+                            lambda status: all(word in status.message for word in words))
+
+    def ask(self, value: int) -> None:
+        """Ask for a write to the other end."""
+        if self.publisher is None:
+            self.publisher = self.observer.publisher(
+                Int16MultiArray, f'/{self.name}/write/theirs')
+        self.publisher.publish(Int16MultiArray(data=[value]))
+        self.writes += 1
+
+    def result(self) -> str:
+        """Wait for the result of the last write; return its text."""
+        self.observer.until(lambda: len(self.results) >= self.writes, 'the result of a write')
+        return str(self.results[self.writes - 1].message)
+
+    def write(self, value: int) -> str:
+        """Write to the other end; return the text of the result."""
+        self.ask(value)
+        return self.result()
+
+    def was_told(self, value: int) -> int:
+        """Return how often the other end has written ``value`` here."""
+        return [values_in(message) for message in self.ours].count([value])
+
+    def forget(self) -> None:
+        """Listen no more."""
+        for inbox in (self.diagnostics, self.results, self.ours, self.theirs):
+            self.observer.forget(inbox)
+        if self.publisher is not None:
+            self.observer.node.destroy_publisher(self.publisher)
+
+
+@dataclass(slots=True)
+class Line:
+    """Both ends, the box between them, and all ends there have ever been."""
+
+    observer: Observer
+    folder: Path
+    box: LineBox
+    master: End = field(init=False)
+    slave: End = field(init=False)
+    ends: list[End] = field(default_factory=list)
+    values: Iterator[int] = field(default_factory=lambda: count(1))
+
+    def start(self, mode: str, *assignments: str) -> End:
+        """Start a node, under a name that no node before it has had."""
+        name = f'{mode.lower()}_{next(_NUMBERS)}'
+        us, port = STATIONS[mode], self.folder / mode
+        other, = set(STATIONS.values()) - {us}
+        net = write_csv(self.folder / f'{mode}_net.csv', f'Mode,Station,PLC_Type,{NET_HEADER}',
+                        [f'{mode},{us},SLC,{NET_ROW}'])
+        rows = write_csv(self.folder / f'{mode}_map.csv', 'Tag,Command,Address,Station,PLC_Type', [
+            f'ours,Serve,N7:0,{us},SLC', f'theirs,ReadWrite,N7:0,{other},SLC'])
+        inboxes = (
+            self.observer.diagnostics(port), self.observer.results(f'/{name}'),
+            self.observer.listen(Int16MultiArray, f'/{name}/read/ours', EVERYTHING),
+            self.observer.listen(Int16MultiArray, f'/{name}/read/theirs', EVERYTHING))
+        node = Process('node', *ros_args(
+            f'net_file:={net}', f'map_file:={rows}', f'port:={port}', *assignments),
+            '-r', f'__node:={name}')
+        self.ends.append(End(self.observer, name, node, *inboxes))
+        return self.ends[-1]
+
+    def until_well(self) -> None:
+        """Wait until each end reads the other."""
+        self.master.until_well()
+        self.slave.until_well()
+
+    def recovers(self, limit: float) -> None:
+        """Wait for new values at both ends, for ``limit`` s at most, and good diagnostics."""
+        began = time.monotonic()
+        before = {end.name: len(end.theirs) for end in (self.master, self.slave)}
+        back: dict[str, float] = {}
+        for end in (self.master, self.slave):
+            end.diagnostics.clear()
+
+        def are_both_back() -> bool:
+            for end in (self.master, self.slave):
+                if len(end.theirs) > before[end.name]:
+                    back.setdefault(end.name, time.monotonic() - began)
+            return len(back) == len(before)
+
+        self.observer.until(are_both_back, 'new values')
+        print('values are back:', ', '.join(f'{end} {time:.2f} s' for end, time in back.items()))
+        assert max(back.values()) < limit
+        self.until_well()
+
+    def works(self) -> None:
+        """Let each end write to the other."""
+        for writer, reader in ((self.master, self.slave), (self.slave, self.master)):
+            value = next(self.values)
+            assert writer.write(value) == 'written'
+            self.observer.until(lambda reader=reader, value=value: reader.was_told(value),
+                                'what was written')
+            assert reader.was_told(value) == 1
+
+    def check(self) -> None:
+        """Check what holds whatever happens: no result too many, no value from nowhere."""
+        for end in self.ends:
+            assert len(end.results) == end.writes, f'{end.name}: {end.results}'
+        told = {values_in(message)[0] for end in self.ends for message in end.ours}
+        assert {values_in(message)[0] for end in self.ends for message in end.theirs} <= {0, *told}
+
+
+@contextmanager
+def two_nodes(observer: Observer, folder: Path, *slave_assignments: str) -> Iterator[Line]:
+    """Run box and nodes, all of them well when the block begins."""
+    with LineBox(folder / 'Master', folder / 'Slave') as box:
+        line = Line(observer, folder, box)
+        try:
+            line.master, line.slave = line.start('Master'), line.start('Slave', *slave_assignments)
+            for end in (line.master, line.slave):  # two at a time may take long to start
+                end.node.wait_for('[INFO]', ': open')
+            line.until_well()
+            yield line
+            for end in (line.master, line.slave):
+                end.node.end()
+            line.check()
+        except AssertionError:
+            print(*(f'{end.name} has said:\n{end.node.text}' for end in line.ends), sep='\n')
+            raise
+        finally:
+            for end in line.ends:
+                end.node.__exit__()
+                end.forget()

@@ -1,0 +1,222 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What happens to a line of two nodes, a master and a slave; see docs/faults.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import signal
+import time
+
+from abdf1_ros.df1 import frames
+import pytest
+from support.fault_rig import NOT_SENT, UNKNOWN
+from support.ros import details, ERROR, Observer, OK, until_status
+from support.slave_rig import End, Line, two_nodes
+
+NO_ANSWER = '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'
+NO_REPLY = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+TOO_OLD = 'not written: not sent: waited longer than 1.5 s for the line'
+REFUSED = 'not written: refused: '
+
+WRITE_TIMEOUT = 'write_timeout:=1.5'  # of the slave
+
+
+@pytest.fixture(scope='module')
+def observer() -> Iterator[Observer]:
+    with Observer() as observer:
+        yield observer
+
+
+@pytest.fixture(scope='module')
+def shared_line(
+        observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
+    with two_nodes(observer, tmp_path_factory.mktemp('line'), WRITE_TIMEOUT) as line:
+        yield line
+
+
+@pytest.fixture
+def line(shared_line: Line) -> Iterator[Line]:
+    """Return a line that is well; nothing that is done to it makes it lie."""
+    shared_line.works()
+    yield shared_line
+    shared_line.check()
+
+
+def lose_slave(line: Line) -> int:
+    """Let the master find out that the slave does not answer; return what it wanted to write."""
+    master, value = line.master, next(line.values)
+    # What was on its way when the fault began decides whether it was sent.
+    assert master.write(value).startswith((UNKNOWN + NO_ANSWER, NOT_SENT + NO_ANSWER))
+    master.status('link', ERROR, 'port open, but none of 1 stations answers')
+    master.status('mappings', ERROR, '1 failed')
+    assert master.write(next(line.values)) == NOT_SENT + NO_ANSWER
+    return value
+
+
+def test_master_is_killed_and_returns(line: Line) -> None:
+    line.master.node.send(signal.SIGKILL)
+    line.master.node.result()
+    line.slave.status('mappings', ERROR, '1 stale')
+    value = next(line.values)
+    assert line.slave.write(value) == TOO_OLD
+    line.master = line.start('Master')
+    line.master.node.wait_for('[INFO]', 'open')
+    line.recovers(4.0)
+    line.works()
+    assert not line.master.was_told(value)
+
+
+def test_slave_is_killed_and_returns(line: Line) -> None:
+    lines = len(line.master.node.lines)
+    line.slave.node.send(signal.SIGKILL)
+    line.slave.node.result()
+    value = lose_slave(line)
+    line.master.node.wait_for('[ERROR]', NO_ANSWER, after=lines)
+    line.slave = line.start('Slave', WRITE_TIMEOUT)
+    line.slave.node.wait_for('[INFO]', 'open')
+    line.recovers(3.0)
+    line.master.node.wait_for('[INFO]', 'station 9 answers again', after=lines)
+    line.works()
+    assert not line.slave.was_told(value)
+
+
+@pytest.mark.parametrize('way, result', [
+    ('to_node', TOO_OLD), ('to_plc', UNKNOWN + NO_REPLY)], ids=['not-to-slave', 'not-to-master'])
+def test_only_one_direction_works(line: Line, way: str, result: str) -> None:
+    setattr(line.box, way, False)
+    lose_slave(line)
+    line.slave.status('mappings', ERROR)
+    value = next(line.values)
+    assert line.slave.write(value).startswith(result)
+    setattr(line.box, way, True)
+    line.recovers(3.0)
+    line.works()
+    assert not line.master.was_told(value)
+
+
+def test_line_babbles_at_the_slave(line: Line) -> None:
+    line.box.babbles = True
+    written = []
+    for _ in range(3):
+        for writer, reader in ((line.master, line.slave), (line.slave, line.master)):
+            value = next(line.values)
+            written.append((reader, value, writer.write(value)))
+    line.box.babbles = False
+    line.recovers(3.0)
+    line.works()
+    for reader, value, result in written:
+        assert result == 'written' or result.startswith((UNKNOWN, NOT_SENT))
+        assert reader.was_told(value) in ((1,) if result == 'written' else (0, 1))
+
+
+def test_port_of_the_slave_vanishes_and_returns(line: Line) -> None:
+    line.box.unplug()
+    line.slave.status('link', ERROR, 'cannot open the port: ')
+    line.slave.status('mappings', ERROR, '1 failed')
+    assert line.slave.write(next(line.values)) == REFUSED + 'the port is not open'
+    value = lose_slave(line)
+    lines = len(line.slave.node.lines)
+    line.box.plug()
+    line.recovers(3.0)
+    line.slave.node.wait_for('[INFO]', 'open', after=lines)
+    line.works()
+    assert not line.slave.was_told(value)
+
+
+def test_slave_is_stopped_and_goes_on(line: Line) -> None:
+    line.slave.node.send(signal.SIGSTOP)
+    own = next(line.values)
+    line.slave.ask(own)
+    asked = time.monotonic()
+    value = lose_slave(line)
+    was_sent = line.master.results[-2].message.startswith(UNKNOWN)
+    line.observer.until(lambda: time.monotonic() - asked > 1.6, 'the write to become old')
+    line.slave.node.send(signal.SIGCONT)
+    line.recovers(3.0)
+    assert line.slave.result().startswith(REFUSED + 'it came ')
+    line.works()
+    assert not line.master.was_told(own)
+    # The port has kept the command and its repetitions; it was executed once, or never sent.
+    assert line.slave.was_told(value) == was_sent
+
+
+@pytest.mark.parametrize('receiver', ['Slave', 'Master'])
+def test_command_whose_ack_is_lost_is_executed_once(line: Line, receiver: str) -> None:
+    writer, reader = (line.master, line.slave) if receiver == 'Slave' \
+        else (line.slave, line.master)
+    word = 0x1234 + (receiver == 'Slave')
+    before = repetitions(reader)
+    line.box.pass_on, lost = losing_ack(receiver, word.to_bytes(2, 'little'))
+    assert writer.write(word) == 'written'
+    assert lost == [frames.ACK]
+    line.works()
+    assert reader.was_told(word) == 1
+    assert repetitions(reader) == before + 1
+
+
+def repetitions(end: End) -> int:
+    """Return how many messages have come a second time."""
+    end.diagnostics.clear()
+    counters = details(until_status(end.diagnostics, 'counters', OK))
+    return int(counters['CNT_DUPLICATE_MSGS_RCVD'])
+
+
+def losing_ack(receiver: str, word: bytes) -> tuple[Callable[[str, bytes], bytes], list[bytes]]:
+    """Return what takes away the first ACK of a command with that word, and what was taken."""
+    heard: list[bytes] = []
+    lost: list[bytes] = []
+
+    def pass_on(mode: str, data: bytes) -> bytes:
+        if mode != receiver and word in data:
+            heard.append(data)
+        elif mode == receiver and heard and not lost and data.startswith(frames.ACK):
+            lost.append(frames.ACK)
+            return data.removeprefix(frames.ACK)
+        return data
+
+    return pass_on, lost
+
+
+def test_polls_stay_away(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> None:
+    with two_nodes(observer, tmp_path_factory.mktemp('line'), 'poll_timeout:=1.0') as line:
+        line.master.node.send(signal.SIGSTOP)
+        line.slave.status('mappings', ERROR, '1 failed')
+        value = next(line.values)
+        assert line.slave.write(value) == NOT_SENT + NO_REPLY
+        line.master.node.send(signal.SIGCONT)
+        line.recovers(3.0)
+        line.works()
+        assert not line.master.was_told(value)
+
+
+def test_master_is_killed_while_the_slave_sends_a_command(line: Line) -> None:
+    master, word = line.master, 0x2345
+
+    def kill(mode: str, data: bytes) -> bytes:
+        if mode == 'Slave' and word.to_bytes(2, 'little') in data:
+            master.node.send(signal.SIGKILL)
+            return b''
+        return data
+
+    line.box.pass_on = kill
+    assert line.slave.write(word).startswith(UNKNOWN + NO_REPLY)
+    master.node.result()
+    line.box.pass_on = lambda mode, data: data
+    line.master = line.start('Master')
+    line.master.node.wait_for('[INFO]', 'open')
+    line.recovers(4.0)
+    line.works()
+    assert not line.master.was_told(word)
