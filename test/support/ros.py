@@ -25,6 +25,7 @@ from collections.abc import Callable, Iterable, Sequence
 import os
 from pathlib import Path
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -48,10 +49,28 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile
 
+
+
+def _claim_domain() -> tuple[int, socket.socket]:
+    """Return a domain that no other session on this machine has, and what keeps it ours."""
+    for number in range(os.getpid(), os.getpid() + 100):
+        domain = 1 + number % 100
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            claim.bind(f'\0abdf1_ros.test.domain.{domain}')  # a name in no file system
+        except OSError:
+            claim.close()
+        else:
+            return domain, claim
+    raise RuntimeError('all ROS domains are in use by other test sessions')
+
+
+_DOMAIN, _CLAIM = _claim_domain()
+
 # Read when the first context is made, here and in every child process.
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
-    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN),
     'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0'}
 
 EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
