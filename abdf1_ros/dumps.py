@@ -29,6 +29,9 @@ from abdf1_ros.capture import Chunk, Direction, is_capture_line, read_capture
 from abdf1_ros.errors import Problem
 
 _BLOCK = 4096
+# Bytes of a line of text: no program writes longer ones, and what has no line ends at all, such as
+# /dev/zero, must not fill the memory.
+_LONGEST_LINE = 1_000_000
 # The bytes, and behind two spaces what they are as characters.
 _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?',
@@ -54,8 +57,13 @@ class Recording:
         self._file = path.open('rb')
 
     @property
+    def has_size(self) -> bool:
+        """Tell whether the size of the file is known; that of a pipe or device is not."""
+        return self._size > 0
+
+    @property
     def percent(self) -> int:
-        """Return how much of the file has been read."""
+        """Return how much of the file has been read, where it has a size."""
         return 100 * self._position // max(1, self._size)
 
     def chunks(self) -> Iterator[Chunk]:
@@ -77,13 +85,16 @@ class Recording:
             yield Chunk(None, Direction.UNKNOWN, data)
 
     def _lines(self) -> Iterator[str]:
-        for number, line in enumerate(self._file, 1):
+        limited = iter(lambda: self._file.readline(_LONGEST_LINE + 1), b'')
+        for number, line in enumerate(limited, 1):
             self._position += len(line)
-            try:
-                yield line.decode('ascii').rstrip('\r\n')
-            except UnicodeDecodeError:
-                raise Problem(f'{self._name}:{number}', 'this is no text; for a file of raw '
-                              'bytes give --binary') from None
+            where = f'{self._name}:{number}'
+            if not line.isascii() or b'\0' in line:
+                raise Problem(where, 'this is no text; for a file of raw bytes give --binary')
+            if len(line) > _LONGEST_LINE:
+                raise Problem(where, f'the line is longer than {_LONGEST_LINE // 1_000_000} MB; '
+                              'divide it, or for a file of raw bytes give --binary')
+            yield line.decode('ascii').rstrip('\r\n')
 
 
 def _chained(first: str, rest: Iterable[str]) -> Iterator[str]:

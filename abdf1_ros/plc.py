@@ -266,7 +266,7 @@ def _detect(options: argparse.Namespace) -> int:
     progress.clear()
     if found is None:
         _complain('nothing answers with any of these settings')
-        for trace in search.traces:
+        for trace in search.traces or [presence.SILENCE]:
             _complain(trace)
         return EXIT_FAILED
     there = found.presence

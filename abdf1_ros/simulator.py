@@ -89,8 +89,10 @@ commands, on standard input or with --at:
   counters STATION            say what its port has counted
   msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
   quit                        end the simulator
-
-exit status: 0 when it is ended, 1 when the port cannot be opened, 2 for bad options or data files
+"""
+_EPILOG = _COMMANDS + """
+exit status: 0 when it is ended, 1 when the port cannot be opened or the name of --pty is taken,
+2 for bad options or data files
 
 examples:
   simulator --pty /tmp/plc
@@ -135,7 +137,7 @@ def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) ->
         elif verb == 'error' and len(arguments) in (1, 2):
             faults.status = tuple(map(_byte, arguments))
         elif verb != 'normal' or arguments:
-            raise CommandError(f'"{line.strip()}" is no command\n{_COMMANDS}')
+            raise CommandError(f'"{line.strip()}" is no command\n{_COMMANDS.rstrip()}')
     except ValueError as error:
         raise CommandError(f'{line.strip()}: {error}') from None
     return faults
@@ -186,7 +188,7 @@ def _station(arguments: list[str],
         if arguments and arguments[0] == str(plc.station):
             return plc, arguments[1:]
     known = ', '.join(str(plc.station) for plc in plcs)
-    raise CommandError(f'name a station ({known})\n{_COMMANDS}')
+    raise CommandError(f'name a station ({known})\n{_COMMANDS.rstrip()}')
 
 
 class _FaultyPort:
@@ -364,8 +366,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run until SIGINT, SIGTERM, "quit" or the end of --seconds.
 
-    Returns 0, 2 for faulty files or options, 1 where the port cannot be opened and after internal
-    errors.
+    The exit statuses are those of --help, and 1 after internal errors.
     """
     prepare_output()
     options = _parse(args)
@@ -383,9 +384,12 @@ def _run(options: argparse.Namespace) -> int:
             _try_out(script, options)
         plcs = _load(options)
         line = _make_line(options)
-    except (CommandError, ConfigurationError, OSError, ValueError) as error:
+    except (CommandError, ConfigurationError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return EXIT_CONFIGURATION
+    except OSError as error:  # of the line; what is wrong with a file is a ConfigurationError
+        print(f'simulator: {error}', file=sys.stderr)
+        return EXIT_FAULT
     try:
         return _play(plcs, line, script, options)
     finally:
@@ -471,7 +475,7 @@ class _Announcer:
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog='simulator', description=__doc__, epilog=_COMMANDS,
+        prog='simulator', description=__doc__, epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
     line = parser.add_mutually_exclusive_group()

@@ -231,7 +231,8 @@ def _decode_files(options: argparse.Namespace, output: _Output) -> int:
                     return status
                 has_bytes = True
                 output.take(chunk, recording.settings)
-                output.show_progress(f'{name}: {recording.percent} %')
+                output.show_progress(
+                    f'{name}: {recording.percent} %' if recording.has_size else name)
             if not has_bytes:
                 _say(f'{name}: there are no bytes in it')
     except KeyboardInterrupt:  # also out of reading a pipe into which nobody writes

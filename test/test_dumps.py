@@ -124,6 +124,28 @@ def test_binary_file_taken_for_text(tmp_path: Path) -> None:
         chunks(tmp_path / 'x', DATA)
 
 
+@pytest.mark.parametrize('content', [b'\0', b'10 04\0'])
+def test_zeros_are_no_text(tmp_path: Path, content: bytes) -> None:
+    with pytest.raises(Problem, match=r'x:1: this is no text; for a file of raw bytes give --b'):
+        chunks(tmp_path / 'x', content)
+
+
+def test_longest_line(tmp_path: Path) -> None:
+    longest = b'10' * 500_000
+    assert [len(chunk.data) for chunk in chunks(tmp_path / 'x', b'10\n' + longest)] == [
+        1, 500_000]
+    with pytest.raises(Problem, match='x:2: the line is longer than 1 MB; divide it, or for a '
+                                      'file of raw bytes give --binary'):
+        chunks(tmp_path / 'x', b'10\n' + longest + b'1')
+
+
+def test_file_without_an_end() -> None:
+    with pytest.raises(Problem, match='/dev/zero:1: this is no text'):
+        next(Recording(Path('/dev/zero')).chunks())
+    endless = Recording(Path('/dev/zero'), is_binary=True).chunks()
+    assert all(0 < len(next(endless).data) <= 65536 for _ in range(3))
+
+
 def test_settings_and_percent(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     path.write_text('# abdf1_ros capture 1\n# check: BCC\n0 > 10\n1 > 20\n', encoding='ascii')
@@ -131,6 +153,8 @@ def test_settings_and_percent(tmp_path: Path) -> None:
     percents = [recording.percent for _ in recording.chunks()]
     assert recording.settings == {'check': 'BCC'}
     assert 0 < percents[0] < percents[1] == 100
+    assert recording.has_size
+    assert not Recording(Path('/dev/zero')).has_size
 
 
 def test_missing_file(tmp_path: Path) -> None:

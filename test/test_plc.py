@@ -271,7 +271,16 @@ def test_watch_goes_on_until_it_is_interrupted(line: str) -> None:
     with Process('plc', 'watch', 'N7:10', '--station', '2', '--period', '0.05', '--port',
                  line) as process:
         process.wait_for('N7:10  [')
-        process.end()
+        process.send(signal.SIGINT)
+        assert process.result() == 0
+
+
+def test_ping_goes_on_until_it_is_interrupted(line: str) -> None:
+    with Process('plc', 'ping', '2', '--count', '1000000', '--port', line) as process:
+        process.wait_for('station 2: ')
+        process.send(signal.SIGINT)
+        assert process.result() == 0
+    assert ' answered; shortest ' in process.text
 
 
 def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
@@ -323,7 +332,19 @@ def test_detect_of_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
                 '30', '--baud', '9600')
     line.close()
     assert said.status == 1
-    assert said.err == 'plc: nothing answers with any of these settings\n'
+    assert said.err == ('plc: nothing answers with any of these settings\n'
+                        'plc: not one character came: cable, port, power?\n')
+
+
+def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'line')
+    with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
+        said = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--check', 'CRC',
+                    '--duplex', 'half', '--baud', '9600')
+    assert said.status == 1
+    assert said.err.splitlines() == ['plc: nothing answers with any of these settings',
+                                     'plc: 9600 baud, half duplex, CRC: 2 characters came']
 
 
 def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
@@ -382,6 +403,7 @@ def test_help_has_examples_and_exit_statuses(command: str,
     assert said.status == 0
     assert 'exit status:' in said.out
     assert f'plc {command}' in said.out.partition('example')[2]
+    assert 'watch and ping, once they have begun, end by it with 0 or 1' in said.out
 
 
 def test_process_needs_no_ros() -> None:

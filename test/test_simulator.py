@@ -109,6 +109,16 @@ def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
     assert plcs[0].faults is before
 
 
+@pytest.mark.parametrize('line', ['hush 1', 'silent 3'])
+def test_bad_command_is_told_the_commands_and_no_more(
+        plcs: list[SimulatedPlc], line: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        execute(line, plcs)
+    lines = str(caught.value).split('\n')
+    assert lines[1] == 'commands, on standard input or with --at:'
+    assert lines[-1].split() == ['quit', 'end', 'the', 'simulator']
+
+
 @pytest.mark.parametrize('setting', Setting)
 def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
     plcs[1].faults = before = Faults(slow=9)
@@ -309,9 +319,9 @@ def test_commands_by_the_clock(start: Start) -> None:
     assert simulator.end() == (0, '')
 
 
-def _refused(capsys: pytest.CaptureFixture[str], *options: str) -> str:
+def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2) -> str:
     said = call(main, capsys, *options)
-    assert (said.status, said.out) == (2, '')
+    assert (said.status, said.out) == (status, '')
     assert said.err.startswith('simulator: ')
     return said.err
 
@@ -358,7 +368,7 @@ def test_missing_data_file(capsys: pytest.CaptureFixture[str]) -> None:
 def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server:
         where = f'127.0.0.1:{server.getsockname()[1]}'
-        said = _refused(capsys, '--data', str(data), '--tcp', where)
+        said = _refused(capsys, '--data', str(data), '--tcp', where, status=1)
     assert said.startswith(f'simulator: --tcp "{where}": Address already in use')
 
 
@@ -370,7 +380,7 @@ def test_bad_tcp_port(capsys: pytest.CaptureFixture[str], data: Path, where: str
 
 def test_name_of_a_pty_that_is_a_file_already(
         capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert _refused(capsys, '--data', str(data), '--pty', str(data)) == (
+    assert _refused(capsys, '--data', str(data), '--pty', str(data), status=1) == (
         f'simulator: {data} is there already, and no link that a simulator has left; give another '
         'name\n')
     assert data.read_text(encoding='utf-8') == DATA
@@ -380,7 +390,8 @@ def test_link_of_somebody_else_is_left_alone(
         capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path) -> None:
     name = tmp_path / 'adapter'
     name.symlink_to('/dev/ttyUSB0')
-    assert 'is there already' in _refused(capsys, '--data', str(data), '--pty', str(name))
+    assert 'is there already' in _refused(
+        capsys, '--data', str(data), '--pty', str(name), status=1)
     assert os.readlink(name) == '/dev/ttyUSB0'
 
 
@@ -390,7 +401,7 @@ def test_two_simulators_do_not_share_a_name(
     simulator = start('--pty', str(name))
     simulator.line()
     before = os.readlink(name)
-    assert _refused(capsys, '--data', str(data), '--pty', str(name)) == \
+    assert _refused(capsys, '--data', str(data), '--pty', str(name), status=1) == \
         f'simulator: {name} is in use by another simulator or sniff\n'
     assert os.readlink(name) == before
     simulator.signal(signal.SIGKILL)
@@ -398,7 +409,7 @@ def test_two_simulators_do_not_share_a_name(
     assert os.path.lexists(name)
     again = start('--pty', str(name))
     assert again.line().startswith('simulator: stations')
-    assert 'is in use' in _refused(capsys, '--data', str(data), '--pty', str(name))
+    assert 'is in use' in _refused(capsys, '--data', str(data), '--pty', str(name), status=1)
     again.signal(signal.SIGTERM)
     assert again.end() == (0, '')
     assert not os.path.lexists(name)
@@ -415,7 +426,7 @@ def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
 
 def test_folder_of_a_pty_that_is_missing(
         capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc') == \
+    assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc', status=1) == \
         'simulator: /nowhere/plc cannot be made: No such file or directory\n'
 
 

@@ -21,11 +21,13 @@ import json
 import os
 from pathlib import Path
 import re
+import resource
 import signal
 import subprocess
 import sys
 from typing import Any
 
+from abdf1_ros import sniff
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
@@ -133,6 +135,31 @@ def test_bad_line_ends_with_file_and_line_and_the_summary_so_far(
     assert captured.err == (
         f'sniff: {capture}:10: "0.05 > 1\\x1b" should be seconds, ">", "<" or "?", and bytes, '
         'as in 0.004210 < 10 04\n')
+
+
+@pytest.mark.parametrize('options, status, err, ends_with_summary', [
+    ([], 2, 'sniff: /dev/zero:1: this is no text; for a file of raw bytes give --binary\n', False),
+    (['--binary', '--seconds', '1'], 0, '', True)])
+def test_endless_file_does_not_fill_the_memory(
+        options: list[str], status: int, err: str, ends_with_summary: bool) -> None:
+    limit = 400_000_000
+    said = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros.sniff', *options, '/dev/zero'], text=True,
+        capture_output=True, timeout=PATIENCE, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+    assert (said.returncode, said.stderr) == (status, err)
+    assert ('summary: ' in said.stdout) is ends_with_summary
+
+
+def test_progress_has_a_percentage_where_the_size_is_known(
+        capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sniff, '_PROGRESS_PERIOD', 0.0)
+    monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
+    assert main(['--summary', capture]) == 0
+    assert capsys.readouterr().err.splitlines()[-1] == \
+        f'sniff: {capture}: 100 %, 45 bytes so far'
+    assert main(['--summary', '--binary', '--seconds', '0.1', '/dev/zero']) == 0
+    assert re.match('sniff: /dev/zero, [0-9]+ bytes so far\n', capsys.readouterr().err)
 
 
 def test_file_that_cannot_be_read_is_an_error_without_an_empty_summary(

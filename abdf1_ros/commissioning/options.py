@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 
 from abdf1_ros.commissioning.line import DEFAULTS, MODES
 from abdf1_ros.driver.network import BAUD_RATES
@@ -28,7 +29,24 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 
 _DEFAULT_STATION = 1
-_SHORT_TIMEOUT = '200'  # ms: most of what is tried does not answer
+
+
+@dataclass(frozen=True, slots=True)
+class _LineDefaults:
+    """What a command does about its line where no option says it, in words."""
+
+    baud: str = str(DEFAULTS.baud)
+    check: str = DEFAULTS.error_code
+    duplex: str = 'half'
+    timeout: str = str(DEFAULTS.timeout)
+    net: str = 'the line'
+
+
+_TRIED = 'all are tried'
+_DETECT_DEFAULTS = _LineDefaults(
+    baud=f'{_TRIED}, but none at a URL', check=_TRIED, duplex=_TRIED,
+    timeout='200',  # most of what is tried does not answer
+    net='port, parity and own station')
 
 
 _STATUSES = """\
@@ -38,7 +56,7 @@ exit status:
   2    wrong options, addresses or values; a port that cannot be opened; a write not confirmed
        with --yes. Nothing was written
   3    a write without a reply, or broken off: unknown whether the PLC has it, or has all of it
-  130  interrupted by Ctrl-C
+  130  interrupted by Ctrl-C; but watch and ping, once they have begun, end by it with 0 or 1
 """
 _EPILOG = _STATUSES + """
 examples:
@@ -47,6 +65,7 @@ examples:
   plc status 1 --port /dev/ttyUSB0 --baud 19200
   plc read N7:0 --length 10 --peer --port /dev/ttyUSB0
   plc write N7:10 5 6 7 --yes --net net.csv
+  plc write F8:2 --yes --net net.csv -- -1.5e3
   plc watch B3:0 N7:0 T4:0.ACC --net net.csv
 
 "plc COMMAND --help" explains each command.
@@ -60,17 +79,20 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
 
-    def add(name: str, text: str, example: str) -> argparse.ArgumentParser:
+    def add(name: str, text: str, *examples: str,
+            defaults: _LineDefaults = _LineDefaults()) -> argparse.ArgumentParser:
+        shown = '\n'.join(f'  plc {example}' for example in examples)
         command = commands.add_parser(
             name, help=text, description=f'{text[0].upper()}{text[1:]}.',
-            epilog=f'example:\n  plc {example}\n\n{_STATUSES}',
+            epilog=f'example:\n{shown}\n\n{_STATUSES}',
             formatter_class=argparse.RawDescriptionHelpFormatter)
-        _add_line_options(command)
+        _add_line_options(command, defaults)
         return command
 
     _add_addresses(add('read', 'read addresses once', 'read N7:0 --length 10 --net net.csv'))
     _complete_write(add('write', 'write values to an address',
-                        'write N7:10 5 6 7 --yes --net net.csv'))
+                        'write N7:10 5 6 7 --yes --net net.csv',
+                        'write F8:2 --yes --net net.csv -- -1.5e3'))
     _complete_watch(add('watch', 'show values live until Ctrl-C',
                         'watch B3:0 N7:0 --period 0.5 --net net.csv'))
     status = add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv')
@@ -84,10 +106,10 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     scan = add('scan', 'look for stations', 'scan 0-31 --net net.csv')
     scan.add_argument('stations', metavar='STATIONS', type=_stations, help='such as 0-31 or 1,5')
     search = add('detect', 'find out the settings of a line by trying them',
-                 'detect --port /dev/ttyUSB0 --stations 1-4')
+                 'detect --port /dev/ttyUSB0 --stations 1-4', defaults=_DETECT_DEFAULTS)
     search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
                         help='who may be there in half duplex (default: 0-7)')
-    search.set_defaults(timeout=_SHORT_TIMEOUT)
+    search.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
     return parser
 
 
@@ -96,7 +118,7 @@ def _complete_write(write: argparse.ArgumentParser) -> None:
     write.add_argument('address', metavar='ADDRESS', help='such as N7:10, B3:0/5, F8:2')
     write.add_argument('values', metavar='VALUE', nargs='+',
                        help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string; '
-                            'before one such as -1.5e3 put --')
+                            'one such as -1.5e3 goes last, behind all options and --')
     write.add_argument('--yes', action='store_true',
                        help='do it; without it, what is there now is shown, and a terminal '
                             'is asked')
@@ -109,26 +131,27 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
     watch.add_argument('--count', type=_count, metavar='N', help='end after so many reads')
 
 
-def _add_line_options(parser: argparse.ArgumentParser) -> None:
+def _add_line_options(parser: argparse.ArgumentParser, defaults: _LineDefaults) -> None:
     """Add what says how to reach the line."""
     group = parser.add_argument_group('line')
     group.add_argument('--port', metavar='NAME',
                        help='serial port, or URL such as socket://192.168.0.9:4001')
     group.add_argument('--net', metavar='FILE',
-                       help='take the line from this net CSV; other options go before it')
+                       help=f'take {defaults.net} from this net CSV; other options go before it')
     group.add_argument('--baud', help=f'one of {", ".join(map(str, BAUD_RATES))} '
-                                      f'(default: {DEFAULTS.baud})')
-    group.add_argument('--check', type=str.upper, help='CRC or BCC (default: CRC)')
+                                      f'(default: {defaults.baud})')
+    group.add_argument('--check', type=str.upper, help=f'CRC or BCC (default: {defaults.check})')
     group.add_argument('--parity', help='None, Even or Odd (default: None)')
     either = group.add_mutually_exclusive_group()
     either.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
-                        help='half: several stations on a line (default); full: one PLC')
+                        help='half: several stations on a line; full: one PLC '
+                             f'(default: {defaults.duplex})')
     either.add_argument('--peer', action='store_const', const='full', dest='duplex',
                         help='the same as --duplex full')
     group.add_argument('--own-station', metavar='N',
                        help=f'our own address, which no PLC has (default: {DEFAULTS.station})')
     group.add_argument('--timeout', metavar='MS',
-                       help=f'to wait for each answer (default: {DEFAULTS.timeout})')
+                       help=f'to wait for each answer (default: {defaults.timeout})')
 
 
 def _add_data_options(parser: argparse.ArgumentParser) -> None:

@@ -28,6 +28,8 @@ from abdf1_ros.pccc.identity import Identity
 
 _ECHO = bytes(range(1, 17))
 
+SILENCE = 'not one character came: cable, port, power?'
+
 
 @dataclass(frozen=True, slots=True)
 class Presence:
@@ -99,7 +101,7 @@ def hint(session: Session, error: Abdf1Error) -> str:
         return ''
     received = session.counters.chars_received
     if not received:
-        return 'not one character came: cable, port, power? "plc detect" tries other settings'
+        return f'{SILENCE} "plc detect" tries other settings'
     if session.counters.messages_received + session.counters.acks_received == 0:
         return (f'{received} characters came, but no answer that makes sense: baud rate, '
                 'check, duplex, or another master? "plc detect" tries other settings')

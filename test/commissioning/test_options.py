@@ -41,6 +41,34 @@ def test_negative_values_are_no_options() -> None:
     assert parse('write', 'F8:0', '-1', '-2.5', '--yes').values == ['-1', '-2.5']
 
 
+def test_value_that_looks_like_an_option_goes_last() -> None:
+    options = parse('write', 'F8:2', '--yes', '--net', 'x', '--', '-1.5e3')
+    assert (options.values, options.yes, options.net) == (['-1.5e3'], True, 'x')
+
+
+def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
+    with pytest.raises(SystemExit):
+        parse(*args, '--help')
+    return ' '.join(capsys.readouterr().out.split())
+
+
+def test_help_tells_where_such_a_value_goes(capsys: pytest.CaptureFixture[str]) -> None:
+    text = help_of(capsys, 'write')
+    assert 'one such as -1.5e3 goes last, behind all options and --' in text
+    assert 'plc write F8:2 --yes --net net.csv -- -1.5e3' in text
+
+
+def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[str]) -> None:
+    text = help_of(capsys, 'detect')
+    assert text.count('(default: all are tried') == 3
+    assert 'to wait for each answer (default: 200)' in text
+    assert 'take port, parity and own station from this net CSV' in text
+    text = help_of(capsys, 'scan')
+    for default in (9600, 'CRC', 'half', 300):
+        assert f'(default: {default})' in text
+    assert 'take the line from this net CSV' in text
+
+
 def test_detect_waits_for_a_short_time_only() -> None:
     assert parse('detect').timeout == '200'
     assert parse('detect').stations == tuple(range(8))

@@ -50,7 +50,6 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile
 
 
-
 def _claim_domain() -> tuple[int, socket.socket]:
     """Return a domain that no other session on this machine has, and what keeps it ours."""
     for number in range(os.getpid(), os.getpid() + 100):
