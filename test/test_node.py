@@ -263,7 +263,7 @@ def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
 
 
 def test_write_that_waits_too_long_for_the_line_is_not_sent(make_bench: Benches) -> None:
-    bench = make_bench(PULSES, parameters=('write_timeout:=0.2',))
+    bench = make_bench(PULSES, parameters=('write_timeout:=0.2', 'processor_period:=0.0'))
     publish = bench.publisher(UInt8MultiArray, 'pulses')
     bench.plcs.say('slow 1 100000')  # the first one takes all of Cmd_Timeout
     for bit in range(3):
