@@ -93,7 +93,8 @@ class _Request:
     """
     A write that was asked for: how often it was ``done``, and how often by its ``results``.
 
-    ``unseen`` and ``unseen_until`` count what no check has seen, at its beginning and end.
+    ``unseen`` and ``unseen_until`` count what no check has seen, when it was asked for and when
+    it was last heard of.
     """
 
     unseen: int
@@ -116,8 +117,8 @@ class Judge:
         self._held: defaultdict[tuple[int, str], deque[tuple[float, bytes]]] = defaultdict(
             lambda: deque(maxlen=_VERSIONS))
         self._requests: dict[bytes, _Request] = {}
-        self._executed: defaultdict[int, deque[tuple[int, int]]] = defaultdict(
-            lambda: deque(maxlen=_COMMANDS))
+        self._executed: defaultdict[int, deque[tuple[int, int] | None]] = defaultdict(
+            lambda: deque(maxlen=_COMMANDS))  # None: a command that nobody has sent
 
     @property
     def unseen(self) -> int:
@@ -157,19 +158,24 @@ class Judge:
     def executed(self, station: int, command: Packet, ear: Ear) -> None:
         """Judge a command that a station executes."""
         self.counts['commands'] += 1
+        executed = self._executed[station]
         if ear.is_deceived:
             self.counts['deceived commands'] += 1
+            executed.append(None)
             return
         key = command.src, command.tns
-        if key in self._executed[station]:
-            self.counts['twice'] += 1
-        self._executed[station].append(key)
+        if key in executed:
+            # A station knows its last command only: a forged one has made it forget this one.
+            since = list(executed)[executed.index(key):]
+            self.counts['deceived commands' if None in since else 'twice'] += 1
+        executed.append(key)
 
     def written(self, content: bytes, ear: Ear) -> None:
         """Take note that a station has stored values."""
         request = self._requests.get(content)
         if request is not None:
             request.done += 1
+            request.unseen_until = self.unseen
         else:
             self.counts['deceived writes' if ear.is_deceived else 'wrong values'] += 1
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, message_frame
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome
 from noise.judge import Ear, Judge
 from noise.rig import MODES, Rig
@@ -162,3 +163,29 @@ def test_judge_knows_what_was_held_and_when() -> None:
     ear.is_deceived = True
     judge.published(mapping, b'c', 0.0, ear)
     assert (judge.counts['deceived values'], judge.faults) == (1, 2)
+
+
+def test_judge_excuses_what_a_forged_command_has_made_a_station_repeat() -> None:
+    judge, ear = Judge(), an_ear(Wire())
+    command = Packet(1, 5, 0x0F, 0, 7)
+    for is_deceived in (False, True, False):
+        ear.is_deceived = is_deceived
+        judge.executed(1, command, ear)
+    assert (judge.counts['deceived commands'], judge.faults) == (2, 0)
+    judge.executed(1, command, ear)
+    assert judge.faults == 0  # the forged one is still between it and the first
+    judge.executed(2, command, ear)
+    judge.executed(2, command, ear)
+    assert judge.counts['twice'] == 1
+
+
+def test_judge_excuses_a_second_execution_after_the_result() -> None:
+    judge, ear = Judge(), an_ear(Wire())
+    judge.ears.append(ear)
+    judge.asked(b'a')
+    judge.written(b'a', ear)
+    judge.resulted(b'a', Outcome.WRITTEN)
+    ear.unseen += 1
+    judge.written(b'a', ear)
+    judge.settle()
+    assert (judge.counts['deceived results'], judge.faults) == (1, 0)
