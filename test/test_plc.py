@@ -268,15 +268,16 @@ def test_watch_tells_why_there_is_no_value(plc: Plc) -> None:
 
 
 def test_watch_goes_on_until_it_is_interrupted(line: str) -> None:
-    with Process('plc', 'watch', 'N7:10', '--station', '2', '--period', '0.05', '--port',
-                 line) as process:
+    with Process('plc', 'watch', 'N7:10', '--station', '2', '--period', '0.05', '--timeout',
+                 '5000', '--port', line) as process:
         process.wait_for('N7:10  [')
         process.send(signal.SIGINT)
         assert process.result() == 0
 
 
 def test_ping_goes_on_until_it_is_interrupted(line: str) -> None:
-    with Process('plc', 'ping', '2', '--count', '1000000', '--port', line) as process:
+    with Process('plc', 'ping', '2', '--count', '1000000', '--timeout', '5000', '--port',
+                 line) as process:
         process.wait_for('station 2: ')
         process.send(signal.SIGINT)
         assert process.result() == 0
