@@ -65,7 +65,8 @@ class Terms:
     """
     What blocks of an area cost, and which there can be.
 
-    ``costs`` are seconds by number of words, from 0 up to the most that one command reads.
+    ``costs`` are seconds by number of words, from 0 up to the most that one command reads,
+    ``limit``.
     Blocks of more than one word hold whole elements of ``per_element`` words, and none of the
     spans in ``refused`` as a whole.
     """
@@ -73,19 +74,18 @@ class Terms:
     def __init__(self, costs: Sequence[float], per_element: int = 1,
                  refused: Iterable[Span] = ()) -> None:
         self.costs = costs
+        self.limit = len(costs) - 1
         self.per_element = per_element
         self._refused = sorted(refused, key=lambda span: span.end)
         self._refused_ends = [span.end for span in self._refused]
 
-    @property
-    def limit(self) -> int:
-        """Return the most words of a block."""
-        return len(self.costs) - 1
-
     def first_allowed(self, end: int) -> int:
         """Return the first word that a block up to ``end`` may begin with."""
+        lowest = end - self.limit
+        if not self._refused:
+            return lowest
         known = self._refused[:bisect_right(self._refused_ends, end)]
-        return max([end - self.limit, *(span.first + 1 for span in known)])
+        return max([lowest, *(span.first + 1 for span in known)])
 
     def together(self, one: Span, other: Span) -> Span:
         """Return the shortest block that holds both."""
@@ -174,11 +174,13 @@ def _best_pair(drafts: Sequence[Draft], terms: Terms,
         return terms.cost(draft.span) / max(draft.period, scan_time)
 
     best, most = None, 0.0
+    loads = [load(draft) for draft in drafts]
     for index, one in enumerate(drafts):
-        for other in drafts[index + 1:]:
+        for at in range(index + 1, len(drafts)):
+            other = drafts[at]
             if other.span.first - one.span.first >= terms.limit:
                 break
-            saved = load(one) + load(other) - load(_joined(one, other, terms))
-            if saved > most + _ROUNDING * load(one):
+            saved = loads[index] + loads[at] - load(_joined(one, other, terms))
+            if saved > most + _ROUNDING * loads[index]:
                 best, most = (one, other), saved
     return best
