@@ -124,11 +124,11 @@ def test_bridge_that_does_not_promise_enough_permits_nothing(
         files: Files, simulator: Process) -> None:
     with Process('node', *files.args('stale_after:=30'), '-r', '__node:=slow') as node, \
             consumer('/slow/read/bits', 0) as cell:
-        cell.wait_for('not permitted: the bridge does not promise values that often')
-        cell.wait_for(SILENT)
+        reason = cell.wait_for('not permitted: the bridge does not promise values that often')
         cell.end()
         node.end()
     assert PERMITTED not in cell.lines
+    assert cell.lines[-1] == reason  # silence is no news then
 
 
 @pytest.mark.parametrize(('args', 'text'), [
