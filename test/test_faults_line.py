@@ -98,7 +98,7 @@ def test_line_babbles(observer: Observer, tmp_path: Path) -> None:
                    for text in results)
         rig.node.wait_for('[INFO]', '2514 NTC_INVALID_SYMBOL')
         box.babbles = False
-        rig.recovers(3.0)
+        rig.recovers(6.0)
         assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 
@@ -132,7 +132,7 @@ def test_second_master_on_the_line(observer: Observer, tmp_path: Path) -> None:
         assert 'unusable reply' not in rig.node.text  # no reply of others was taken for ours
         assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
         box.overhear = lambda data: b''
-        rig.recovers(3.0)
+        rig.recovers(6.0)  # after two late replies in a row a station is tried less often
 
 
 def test_plc_loses_power_in_the_middle_of_a_write(
