@@ -91,9 +91,14 @@ class DescriptorPort:
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
         self._poll.register(wake, select.POLLIN)  # changes nothing from the second time on
-        ready = self._poll.poll(None if timeout is None else math.ceil(timeout * 1000))
-        if all(descriptor != self._descriptor for descriptor, _ in ready):
-            return b''
+        milliseconds = None if timeout is None else math.ceil(timeout * 1000)
+        for descriptor, _ in self._poll.poll(milliseconds):
+            if descriptor == self._descriptor:
+                return self._take()
+        return b''
+
+    def _take(self) -> bytes:
+        """Read what has come."""
         try:
             data = os.read(self._descriptor, _READ_SIZE)
         except BlockingIOError:

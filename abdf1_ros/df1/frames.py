@@ -26,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from functools import cache
+from typing import Final
 
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
@@ -147,7 +148,16 @@ class Duplex(Enum):
     FULL = 'full duplex'
 
 
-_Step = Callable[[], Symbol | None]
+class Need(Enum):
+    """What a step says that can do nothing without more bytes."""
+
+    MORE = 'more bytes'
+
+
+MORE: Final = Need.MORE
+
+Result = Symbol | Need | None
+"""What a step comes to: a symbol, the need of more bytes, or nothing but the next step."""
 
 
 class FrameDecoder:
@@ -165,7 +175,7 @@ class FrameDecoder:
         self._is_half_duplex = duplex is Duplex.HALF
         self._buffer = bytearray()
         self._data = bytearray()
-        self._step: _Step = self._idle
+        self._step: Callable[[], Result] = self._idle
         self._station: int | None = None
         self.last_byte = 0
         self.noise = 0
@@ -183,38 +193,35 @@ class FrameDecoder:
     def feed(self, data: bytes) -> None:
         """Take bytes from the line, in any chunks; with ``MAX_WAITING`` unread, drop them."""
         if data:
-            room = MAX_WAITING - len(self._buffer)
-            self._buffer += data[:room]
-            self.noise += max(0, len(data) - room)
+            self._buffer += data
             self.last_byte = data[-1]
+            if len(self._buffer) > MAX_WAITING:
+                self.noise += len(self._buffer) - MAX_WAITING
+                del self._buffer[MAX_WAITING:]
 
     def next_symbol(self) -> Symbol | None:
         """Return the next whole symbol, or None when more bytes are needed."""
         while self._buffer:
-            step, length = self._step, len(self._buffer)
-            symbol = step()
-            if symbol is not None:
-                return symbol
-            if len(self._buffer) == length and self._step == step:
-                return None  # a step that neither moved nor ate needs more bytes
+            result = self._step()
+            if result is MORE:
+                return None
+            if result is not None:
+                return result
         return None
 
-    def _idle(self) -> Symbol | None:
+    def _idle(self) -> Result:
         start = self._buffer.find(DLE)
         if start:
             skipped = len(self._buffer) if start < 0 else start
             self.noise += skipped
             del self._buffer[:skipped]
         if len(self._buffer) < 2:
-            return None
-        return self._begin(self._take_pair())
-
-    def _take_pair(self) -> bytes:
+            return MORE
         pair = bytes(self._buffer[:2])
         del self._buffer[:2]
-        return pair
+        return self._begin(pair)
 
-    def _begin(self, pair: bytes) -> Symbol | None:
+    def _begin(self, pair: bytes) -> Result:
         if pair == STX:
             self._begin_data(None)
         elif pair == SOH and self._is_half_duplex:
@@ -234,88 +241,84 @@ class FrameDecoder:
         self._station = station
         self._data.clear()
 
-    def _take_station(self, following: _Step) -> None:
+    def _take_station(self, following: Callable[[], Result]) -> Result:
         """Read STN, which is stuffed like data (M 3-4), and go on to ``following``."""
         if self._buffer[0] != Code.DLE:
             self._station = self._buffer[0]
             del self._buffer[:1]
         elif len(self._buffer) < 2:
-            return
+            return MORE
         elif self._buffer[1] == Code.DLE:
             self._station = int(Code.DLE)
             del self._buffer[:2]
         else:  # another symbol broke in
             self._step = self._idle
-            return
+            return None
         self._step = following
-
-    def _soh_station(self) -> Symbol | None:
-        self._take_station(self._soh_stx)
         return None
 
-    def _poll_station(self) -> Symbol | None:
+    def _soh_station(self) -> Result:
+        return self._take_station(self._soh_stx)
+
+    def _poll_station(self) -> Result:
         # A master that does not double STN 10: DLE ENQ 10 F0 (F0 being its BCC).
         if self._buffer[:2] == bytes((Code.DLE, bcc(DLE))):
             del self._buffer[:1]
             self._station = int(Code.DLE)
             self._step = self._poll_check
-        else:
-            self._take_station(self._poll_check)
-        return None
+            return None
+        return self._take_station(self._poll_check)
 
-    def _poll_check(self) -> Symbol | None:
+    def _poll_check(self) -> Poll:
         check = self._buffer.pop(0)
         self._step = self._idle
         assert self._station is not None
         return Poll(self._station, check == bcc(b'', self._station))
 
-    def _soh_stx(self) -> Symbol | None:
+    def _soh_stx(self) -> Result:
         if self._buffer[0] != Code.DLE:
             self._step = self._idle
-        elif len(self._buffer) > 1:
-            if self._buffer[1] == Code.STX:
-                del self._buffer[:2]
-                self._begin_data(self._station)
-            else:
-                self._step = self._idle
+        elif len(self._buffer) < 2:
+            return MORE
+        elif self._buffer[1] == Code.STX:
+            del self._buffer[:2]
+            self._begin_data(self._station)
+        else:
+            self._step = self._idle
         return None
 
-    def _link_data(self) -> Symbol | None:
+    def _link_data(self) -> Result:
         end = self._buffer.find(DLE)
-        if end:
-            return self._store(len(self._buffer) if end < 0 else end)
+        if end and not self._take_data(len(self._buffer) if end < 0 else end):
+            return self._frame(Fault.TOO_LONG)
         if len(self._buffer) < 2:
-            return None
+            return MORE
         pair = bytes(self._buffer[:2])
-        if pair == _DATA_DLE:
-            del self._buffer[:1]
-            return self._store(1)
         if pair == ETX:
             del self._buffer[:2]
             self._step = self._check
-            return None
+            return self._check()
+        if pair == _DATA_DLE:
+            del self._buffer[:1]
+            return None if self._take_data(1) else self._frame(Fault.TOO_LONG)
         if pair in (ACK, NAK) and not self._is_half_duplex:
             del self._buffer[:2]
             return _CONTROLS[pair]  # an embedded response (M 4-3)
-        self._step = self._idle  # the pair that broke in is read again as a symbol
-        return self._frame(Fault.NO_ETX)
+        return self._frame(Fault.NO_ETX)  # the pair that broke in is read again as a symbol
 
-    def _store(self, count: int) -> Symbol | None:
+    def _take_data(self, count: int) -> bool:
+        """Take bytes of a message; return whether it is none too long."""
         count = min(count, MAX_LINK_DATA + 1 - len(self._data))
         self._data += self._buffer[:count]
         del self._buffer[:count]
-        if len(self._data) <= MAX_LINK_DATA:
-            return None
-        self._step = self._idle
-        return self._frame(Fault.TOO_LONG)
+        return len(self._data) <= MAX_LINK_DATA
 
-    def _check(self) -> Symbol | None:
+    def _check(self) -> Result:
         size = self._checksum.size
         if len(self._buffer) < size:
-            return None
+            return MORE
         received = int.from_bytes(self._buffer[:size], 'little')
         del self._buffer[:size]
-        self._step = self._idle
         expected = self._checksum.of_message(self._data, self._station)
         if received != expected:
             return self._frame(Fault.BAD_CHECK, received, expected)
@@ -323,5 +326,7 @@ class FrameDecoder:
         return self._frame(fault, received, expected)
 
     def _frame(self, fault: Fault | None, received: int = 0, expected: int = 0) -> Frame:
+        """End the message."""
+        self._step = self._idle
         self.in_message = False
         return Frame(bytes(self._data), self._station, fault, received, expected)

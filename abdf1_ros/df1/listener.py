@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, EOT, FrameDecoder, SOH, STX, Symbol
+from abdf1_ros.df1.frames import Duplex, EOT, Frame, FrameDecoder, MORE, Poll, Result, SOH, STX
 
 # One in 256 wrong frames has what looks like a good BCC, so one alone proves nothing.
 _BCC_FRAMES = 2
@@ -54,15 +54,17 @@ class ListeningDecoder(FrameDecoder):
         """Return the check that the last frame was read with."""
         return self._checksum
 
-    def finish(self) -> Symbol | None:
+    def finish(self) -> Frame | None:
         """Return a frame that waits for a second check byte which will not come."""
         waits = self._step == self._check and len(self._buffer) == 1
         if not waits or self._kind.checksum is not None or not self._matches(Checksum.BCC):
             return None
         self._checksum = Checksum.BCC
-        return super()._check()
+        result = super()._check()
+        assert isinstance(result, Frame)
+        return result
 
-    def _begin(self, pair: bytes) -> Symbol | None:
+    def _begin(self, pair: bytes) -> Result:
         kind = self._kind
         if not self._duplex_given:
             if pair in (SOH, EOT):
@@ -72,17 +74,17 @@ class ListeningDecoder(FrameDecoder):
         self._is_half_duplex = kind.duplex is not Duplex.FULL
         return super()._begin(pair)
 
-    def _poll_check(self) -> Symbol | None:
+    def _poll_check(self) -> Poll:
         poll = super()._poll_check()
-        if not self._duplex_given and getattr(poll, 'valid', False):
+        if not self._duplex_given and poll.valid:
             self._kind.duplex = Duplex.HALF
         return poll
 
-    def _check(self) -> Symbol | None:
+    def _check(self) -> Result:
         if self._kind.checksum is not None:
             self._checksum = self._kind.checksum
         elif len(self._buffer) < Checksum.CRC.size:
-            return None
+            return MORE
         else:
             self._find_checksum()
         return super()._check()

@@ -170,9 +170,11 @@ class Machine:
 
     def _hear_out(self, now: float, deadline: float) -> None:
         """Let a message that has begun in time be heard to its end, unless it pauses."""
+        if not self.decoder.in_message:
+            return
         if now <= self._due:
             self._message = self.decoder.begun
-        if self.decoder.in_message and self.decoder.begun == self._message:
+        if self.decoder.begun == self._message:
             self.deadline = max(deadline, now + self._pause_limit)
 
     def handle_timeout(self, now: float) -> None:

@@ -329,9 +329,11 @@ class MasterLine:
         return self.settings.accept_slave_messages and packet.dst != self.settings.station
 
     def _count_sent(self, packet: Packet) -> None:
-        self.counters.commands_sent += not packet.is_reply
-        self.counters.replies_sent += packet.is_reply
-        self.counters.error_messages_sent += packet.is_reply and packet.sts != 0
+        if packet.is_reply:
+            self.counters.replies_sent += 1
+            self.counters.error_messages_sent += packet.sts != 0
+        else:
+            self.counters.commands_sent += 1
 
     def fail_inactive(self, number: int) -> NoReturn:
         """Take a station out of the active ones, and say so."""

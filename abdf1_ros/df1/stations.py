@@ -96,9 +96,8 @@ class ActiveStationList:
 
     def __getitem__(self, number: int) -> Station:
         """Return the record of a station (0-254), of the list or not."""
-        if number in self._stations:
-            return self._stations[number]
-        return self._strangers.setdefault(number, Station(number))
+        station = self._stations.get(number)
+        return station or self._strangers.setdefault(number, Station(number))
 
     def heard(self, number: int, now: float) -> None:
         """Note an answer of any kind: the station is active."""

@@ -24,12 +24,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Generator
 from inspect import GEN_CLOSED, getgeneratorstate
+from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
 from abdf1_ros.pccc.dialect import Request
 
 Steps = Generator[Request, Packet, None]
+
+_With = TypeVar('_With', Packet, LinkError)
 
 
 class JobTasks:
@@ -103,18 +106,18 @@ class JobTask:
     def reply(self, packet: Packet) -> None:
         """Take the reply and go on to the next request."""
         self._tasks.transactions += 1
-        self._advance(lambda: self._steps.send(packet))
+        self._advance(self._steps.send, packet)
 
     def fail(self, error: LinkError) -> None:
         """Raise ``error`` in the job, unless it has ended."""
         if getgeneratorstate(self._steps) == GEN_CLOSED:  # by the garbage collector, with the line
             return
         error.sent = self.sent
-        self._advance(lambda: self._steps.throw(error))
+        self._advance(self._steps.throw, error)
 
-    def _advance(self, resume: Callable[[], Request]) -> None:
+    def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
         try:
-            request = resume()
+            request = resume(what)
         except StopIteration:
             self._tasks.advanced(self, is_done=True)
             return
