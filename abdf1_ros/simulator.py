@@ -25,20 +25,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import fcntl
+from contextlib import suppress
 import math
 from operator import itemgetter
 import os
-from pathlib import Path
-import re
 import select
 import signal
-import socket
 import sys
 import threading
 import time
 import traceback
-import tty
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameDecoder, NAK
@@ -48,12 +44,12 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.lines import Line, PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.numerals import decimal_number, whole_number
 from abdf1_ros.paths import config_file
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.emulated import Setting
-from abdf1_ros.port import DescriptorPort, LinkThread, open_port, Port, PortState
-from abdf1_ros.simulated_plc import Faults, load_plcs, numbers, SimulatedPlc
+from abdf1_ros.port import LinkThread, Port, PortState
+from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
+from abdf1_ros.simulator_commands import CommandError, COMMANDS, execute
 from abdf1_ros.terminal import (
     drop_output,
     interruptible,
@@ -66,31 +62,7 @@ from abdf1_ros.terminal import (
 EXIT_FAULT = 1
 EXIT_CONFIGURATION = 2
 
-WAITING = 'waiting for a client'
-
-_LONGEST = 3_600_000  # ms
-
-# Where a simulated PLC sends its messages: the default Station of a net CSV.
-BRIDGE_STATION = Network().station
-
-_PTYS = '/dev/pts/'
-
-_COMMANDS = """\
-commands, on standard input or with --at:
-  silent STATION              it stops answering
-  full STATION                it has no room for commands
-  slow STATION POLLS          so many polls get EOT before each reply
-  delay STATION MS            polls get EOT until so many ms after each command
-  noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
-  error STATION STS [EXT]     every reply says this error (hexadecimal)
-  normal STATION              it works again
-  mode STATION MODE           its processor is in mode run, program, remote (run), test, or
-                              has a fault
-  counters STATION            say what its port has counted
-  msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
-  quit                        end the simulator
-"""
-_EPILOG = _COMMANDS + """
+_EPILOG = COMMANDS + """
 exit status: 0 when it is ended, 1 when the port cannot be opened or the name of --pty is taken,
 2 for bad options or data files
 
@@ -100,95 +72,6 @@ examples:
   simulator --full-duplex 1 --pty /tmp/plc --at '3 msg 1 N7:50 11 22'
   simulator --pty /tmp/plc --at '5 silent 2' --at '10 normal 2'
 """
-
-
-class CommandError(Exception):
-    """A line that is no command; the text says what would be right."""
-
-
-def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False) -> str:
-    """Carry out a command line; return what has been done, or raise CommandError."""
-    verb, *words = line.split()
-    plc, arguments = _station(words, plcs)
-    if verb == 'msg' and is_full_duplex and len(arguments) > 1:
-        return _send(plc, *arguments)
-    if verb == 'mode' and len(arguments) == 1:
-        return _set_mode(plc, arguments[0])
-    if verb == 'counters' and not arguments:
-        counts = plc.counters.by_mnemonic().items()
-        return f'station {plc.station}: {" ".join(f"{name}={count}" for name, count in counts)}'
-    plc.faults = _faults(line, verb, arguments, is_full_duplex)
-    return f'station {plc.station}: {" ".join([verb, *arguments])}'
-
-
-def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) -> Faults:
-    faults = Faults()
-    try:
-        if verb == 'silent' and not arguments:
-            faults.silent = True
-        elif verb == 'full' and not arguments:
-            faults.full = True
-        elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
-            faults.slow = _polls(arguments[0])
-        elif verb == 'delay' and len(arguments) == 1 and not is_full_duplex:
-            faults.delay = _decimal(arguments[0], 'ms', _LONGEST) / 1000
-        elif verb == 'noise' and len(arguments) == 1:
-            faults.noise = _decimal(arguments[0], 'a share', 1)
-        elif verb == 'error' and len(arguments) in (1, 2):
-            faults.status = tuple(map(_byte, arguments))
-        elif verb != 'normal' or arguments:
-            raise CommandError(f'"{line.strip()}" is no command\n{_COMMANDS.rstrip()}')
-    except ValueError as error:
-        raise CommandError(f'{line.strip()}: {error}') from None
-    return faults
-
-
-def _polls(text: str) -> int:
-    value = whole_number(text)
-    if value is None or value < 0:
-        raise ValueError(f'"{text}" should be a whole number from 0')
-    return value
-
-
-def _decimal(text: str, what: str, high: float) -> float:
-    value = decimal_number(text)
-    if value is None or not 0 <= value <= high:
-        raise ValueError(f'"{text}" should be {what} from 0 to {high:.0f}')
-    return value
-
-
-def _byte(text: str) -> int:
-    if not re.fullmatch('[0-9A-Fa-f]{2}', text):
-        raise ValueError(f'"{text}" should be a byte in hexadecimal, as in 0B')
-    return int(text, 16)
-
-
-def _set_mode(plc: SimulatedPlc, text: str) -> str:
-    try:
-        plc.processor.setting = Setting(text)
-    except ValueError:
-        known = ', '.join(setting.value for setting in Setting)
-        raise CommandError(f'mode {plc.station} {text}: the modes are {known}') from None
-    return f'station {plc.station}: mode {text}'
-
-
-def _send(plc: SimulatedPlc, address: str, *values: str) -> str:
-    try:
-        place = Address.parse(address, plc.table.plc_type)
-        plc.send(place, numbers(values), BRIDGE_STATION,
-                 lambda outcome: _say(f'station {plc.station}: msg {place} {outcome}'))
-    except ValueError as error:
-        raise CommandError(f'msg {address}: {error}') from None
-    return f'station {plc.station}: msg {place} {" ".join(values)}'
-
-
-def _station(arguments: list[str],
-             plcs: Sequence[SimulatedPlc]) -> tuple[SimulatedPlc, list[str]]:
-    for plc in plcs:
-        if arguments and arguments[0] == str(plc.station):
-            return plc, arguments[1:]
-    known = ', '.join(str(plc.station) for plc in plcs)
-    raise CommandError(f'name a station ({known})\n{_COMMANDS.rstrip()}')
 
 
 class _FaultyPort:
@@ -223,141 +106,6 @@ class _FaultyPort:
         self._port.close()
 
 
-class PtyLine:
-    """
-    A pseudo-terminal; ``link`` is a name for its other end.
-
-    A link that an earlier run has left is replaced; OSError where anything else has the name.
-    """
-
-    def __init__(self, link: str | None) -> None:
-        self._link = Path(link) if link else None
-        if self._link:
-            # Before we have a terminal: it may get the number that an old link leads to.
-            _remove_left_over(self._link)
-        self._ours, self._theirs = os.openpty()
-        # Open at both ends all the time, or a read fails whenever nobody is connected.
-        tty.setraw(self._theirs)
-        self._target = os.ttyname(self._theirs)
-        self.name = link or self._target
-        if self._link:
-            # So others see that the link is in use. A client's lock is a flock, another kind.
-            fcntl.lockf(self._theirs, fcntl.LOCK_EX)
-            try:
-                _make_link(self._link, self._target)
-            except OSError:
-                self.close()
-                raise
-
-    def open(self) -> Port:
-        """Return our end."""
-        descriptor = os.dup(self._ours)
-        return DescriptorPort(descriptor, lambda: os.close(descriptor))
-
-    def close(self) -> None:
-        """Take the line and its name away."""
-        if self._link and _target_of(self._link) == self._target:
-            self._link.unlink()
-        os.close(self._ours)
-        os.close(self._theirs)
-
-
-def _remove_left_over(link: Path) -> None:
-    """Remove what an earlier run has left; OSError where that still runs."""
-    target = _target_of(link)
-    if target.startswith(_PTYS):
-        if _is_in_use(target):
-            raise OSError(f'{link} is in use by another simulator or sniff')
-        link.unlink()
-
-
-def _make_link(link: Path, target: str) -> None:
-    """Let ``link`` lead to a pseudo-terminal; OSError says why it cannot."""
-    try:
-        link.symlink_to(target)
-    except FileExistsError:
-        raise OSError(f'{link} is there already, and no link that a simulator has left; '
-                      'give another name') from None
-    except OSError as error:
-        raise OSError(f'{link} cannot be made: {error.strerror}') from None
-
-
-def _target_of(link: Path) -> str:
-    """Return where a symbolic link leads, empty where there is none."""
-    try:
-        return os.readlink(link)
-    except OSError:
-        return ''
-
-
-def _is_in_use(target: str) -> bool:
-    """Tell whether another process has made and still has a pseudo-terminal."""
-    try:
-        descriptor = os.open(target, os.O_RDWR | os.O_NOCTTY)
-    except OSError:
-        return False
-    try:
-        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
-
-
-class TcpLine:
-    """A listening TCP port, "HOST:PORT"; one client at a time is the line."""
-
-    def __init__(self, address: str) -> None:
-        host, _, port = address.rpartition(':')
-        number = whole_number(port)
-        if number is None or not 0 <= number <= 65535:
-            raise ValueError(f'--tcp "{address}" should be HOST:PORT')
-        try:
-            self._listener = socket.create_server((host or '127.0.0.1', number))
-        except OSError as error:
-            raise OSError(reason_of(f'--tcp "{address}"', error)) from None
-        self._listener.settimeout(0.2)
-        self.name = 'socket://{}:{}'.format(*self._listener.getsockname()[:2])
-
-    def open(self) -> Port:
-        """Return the connection of a client; OSError while there is none."""
-        try:
-            client, _ = self._listener.accept()
-        except TimeoutError:
-            raise OSError(WAITING) from None
-        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return DescriptorPort(client.fileno(), client.close)
-
-    def close(self) -> None:
-        """Stop listening."""
-        self._listener.close()
-
-
-class SerialLine:
-    """A serial port, or anything that pyserial opens."""
-
-    def __init__(self, name: str, network: Network) -> None:
-        self.name = name
-        self._network = network
-        self._first: Port | None = None
-
-    def open_now(self) -> None:
-        """Open the port, for the next ``open`` to return; OSError where it is not there."""
-        self._first = open_port(self._network, self.name)
-
-    def open(self) -> Port:
-        """Open the port."""
-        port, self._first = self._first, None
-        return port or open_port(self._network, self.name)
-
-    def close(self) -> None:
-        """Close what ``open`` has not handed out; the link thread closes the rest."""
-        if self._first is not None:
-            self._first.close()
-
-
-Line = PtyLine | TcpLine | SerialLine
 Script = list[tuple[float, str]]
 """Seconds and command."""
 
@@ -399,13 +147,6 @@ def _run(options: argparse.Namespace) -> int:
 def _play(plcs: Sequence[SimulatedPlc], line: Line, script: Script,
           options: argparse.Namespace) -> int:
     """Let the PLCs answer on a line until it is time to end; return the exit status."""
-    try:
-        # A port that is lost is waited for; one that was never there is a mistake.
-        if isinstance(line, SerialLine):
-            line.open_now()
-    except OSError as error:
-        print(f'simulator: {reason_of(line.name, error)}', file=sys.stderr)
-        return EXIT_FAULT
     link = _make_thread(plcs, line, options)
     names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
     _say(f'stations {names} on {line.name}, {options.check}')
@@ -438,7 +179,7 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
         if options.full_duplex == str(plc.station):
             return [plc]
     known = ', '.join(str(plc.station) for plc in plcs)
-    raise CommandError(f'--full-duplex: name a station ({known})')
+    raise ValueError(f'--full-duplex: name a station ({known})')
 
 
 def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
@@ -513,11 +254,25 @@ def _scheduled(text: str) -> tuple[float, str]:
 
 
 def _make_line(options: argparse.Namespace) -> Line:
-    if options.tcp is not None:
-        return TcpLine(options.tcp)
-    if options.port is not None:
-        return SerialLine(options.port, Network(baud=options.baud))
+    """Return the line; OSError says which one cannot be had."""
+    try:
+        if options.tcp is not None:
+            return TcpLine(*_host_and_port(options.tcp))
+        if options.port is not None:
+            return SerialLine(options.port, Network(baud=options.baud))
+    except OSError as error:
+        raise OSError(reason_of(options.port or f'--tcp "{options.tcp}"', error)) from None
     return PtyLine(options.pty)
+
+
+def _host_and_port(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(':')
+    number = whole_number(port)
+    with suppress(UnicodeError):
+        host = host.encode('idna').decode()
+        if number is not None and 0 <= number <= 65535:
+            return host or '127.0.0.1', number
+    raise ValueError(f'--tcp "{text}" should be HOST:PORT')
 
 
 def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> Machine:
@@ -540,7 +295,7 @@ def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
             ended.set()
         elif line.strip():
             try:
-                _say(execute(line, plcs, options.full_duplex is not None))
+                _say(execute(line, plcs, options.full_duplex is not None, _say))
             except CommandError as error:
                 _say(str(error))
             link.wake()

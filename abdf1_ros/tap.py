@@ -25,8 +25,8 @@ import time
 
 from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.driver.network import Network
+from abdf1_ros.lines import Line, PtyLine, SerialLine
 from abdf1_ros.port import Port
-from abdf1_ros.simulator import PtyLine, SerialLine
 
 _PTY = 'pty'
 
@@ -132,17 +132,20 @@ class Tap:
             yield item._replace(time=round((item.time or 0.0) - self._begun, 6))
 
     def _open(self, name: str, stack: ExitStack) -> Port:
-        line: PtyLine | SerialLine = SerialLine(name, self._network)
-        if is_pty(name):
-            line = PtyLine(name.partition(':')[2] or None)
+        line = self._line(name)
         stack.callback(line.close)
-        try:
-            port = line.open()
-        except OSError as error:
-            raise OSError(f'{name}: {error.strerror or error}') from error
+        port = line.open()
         stack.callback(port.close)
         self.names.append(line.name)
         return port
+
+    def _line(self, name: str) -> Line:
+        if is_pty(name):
+            return PtyLine(name.partition(':')[2] or None)
+        try:
+            return SerialLine(name, self._network)
+        except OSError as error:
+            raise OSError(f'{name}: {error.strerror or error}') from error
 
     def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _Reader:
         return _Reader(port, direction, onward, self._heard, self._wake_reader)

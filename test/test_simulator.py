@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The simulator: its commands, and the process on a pseudo-terminal and on TCP."""
+"""The simulator as a process on a pseudo-terminal and on TCP, and its options."""
 
 from __future__ import annotations
 
@@ -28,16 +28,9 @@ import termios
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
-from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import decode_identity
-from abdf1_ros.simulated_plc import Faults, SimulatedPlc
-from abdf1_ros.simulator import CommandError, execute, main, PtyLine
+from abdf1_ros.simulator import main
 import pytest
 from support.commands import call
-from support.driver_bench import simulated_plc
 from support.ptys import PATIENCE, read_exactly
 
 DATA = """\
@@ -51,94 +44,6 @@ PLC5_REPLY = '05 01 4f 00 10 02 95 09 42 34 12 fe ff'
 SLC_READ = '02 05 0f 00 10 02 a2 04 07 89 00 00'
 SLC_REPLY = '05 02 4f 00 10 02 34 12 fe ff'
 CASES = [(1, PLC5_READ, PLC5_REPLY), (2, SLC_READ, SLC_REPLY)]
-
-
-@pytest.fixture
-def plcs() -> list[SimulatedPlc]:
-    return [simulated_plc(station, 'SLC', lambda: 0.0, ('N7:0', 1)) for station in (1, 12)]
-
-
-@pytest.mark.parametrize('line, faults, text', [
-    ('silent 12', Faults(silent=True), 'station 12: silent'),
-    ('full 12', Faults(full=True), 'station 12: full'),
-    ('  slow   12  3 \n', Faults(slow=3), 'station 12: slow 3'),
-    ('delay 12 50', Faults(delay=0.05), 'station 12: delay 50'),
-    ('noise 12 0.01', Faults(noise=0.01), 'station 12: noise 0.01'),
-    ('error 12 50', Faults(status=(0x50,)), 'station 12: error 50'),
-    ('error 12 F0 0b', Faults(status=(0xF0, 0x0B)), 'station 12: error F0 0b'),
-    ('normal 12', Faults(), 'station 12: normal')])
-def test_command(plcs: list[SimulatedPlc], line: str, faults: Faults, text: str) -> None:
-    plcs[1].faults = Faults(silent=True, slow=9)
-    assert execute(line, plcs) == text
-    assert plcs[1].faults == faults
-    assert plcs[0].faults == Faults()
-
-
-def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
-    plcs[1].faults = faults = Faults(slow=9)
-    plcs[1].counters.messages_sent, plcs[1].counters.chars_received = 3, 70
-    name, _, counts = execute('counters 12', plcs).partition(': ')
-    assert name == 'station 12'
-    told = dict(word.split('=') for word in counts.split())
-    assert {key: int(value) for key, value in told.items()} == plcs[1].counters.by_mnemonic()
-    assert told['CNT_MSG_PACKETS_SENT'] == '3'
-    assert plcs[1].faults is faults
-
-
-@pytest.mark.parametrize('line, text', [
-    ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
-    ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is no command'),
-    ('silent 1 2', '"silent 1 2" is no command'), ('full 1 2', '"full 1 2" is no command'),
-    ('counters 1 2', '"counters 1 2" is no command'),
-    ('slow 1', '"slow 1" is no command'),
-    *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
-      for text in ('few', '-3', '1.5', '1_0', '\u0661')),
-    ('delay 1', '"delay 1" is no command'),
-    *((f'delay 1 {text}', f'delay 1 {text}: "{text}" should be ms from 0 to 3600000')
-      for text in ('long', '-5', 'nan', '1e9', '1_0')),
-    *((f'noise 1 {text}', f'noise 1 {text}: "{text}" should be a share from 0 to 1')
-      for text in ('much', '-0.1', '1.1', 'nan')),
-    *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal, as in 0B')
-      for text in ('zz', '5', '500000', '\u0661\u0661')),
-    ('error 1', '"error 1" is no command'), ('normal 1 x', '"normal 1 x" is no command')])
-def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
-    plcs[0].faults = before = Faults(slow=2)
-    with pytest.raises(CommandError) as caught:
-        execute(line, plcs)
-    assert str(caught.value).startswith(text)
-    assert plcs[0].faults is before
-
-
-@pytest.mark.parametrize('line', ['hush 1', 'silent 3'])
-def test_bad_command_is_told_the_commands_and_no_more(
-        plcs: list[SimulatedPlc], line: str) -> None:
-    with pytest.raises(CommandError) as caught:
-        execute(line, plcs)
-    lines = str(caught.value).split('\n')
-    assert lines[1] == 'commands, on standard input or with --at:'
-    assert lines[-1].split() == ['quit', 'end', 'the', 'simulator']
-
-
-@pytest.mark.parametrize('setting', Setting)
-def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
-    plcs[1].faults = before = Faults(slow=9)
-    assert execute(f'mode 12 {setting.value}', plcs) == f'station 12: mode {setting.value}'
-    assert plcs[1].processor.setting is setting
-    assert plcs[0].processor.setting is Setting.REMOTE
-    assert plcs[1].faults is before  # a mode is no fault of the line
-    status = plcs[1].serve(Packet(12, 5, 0x06, 0, 1, STATUS_REQUEST)).data
-    assert decode_identity(status) == decode_identity(
-        EmulatedProcessor(PlcType.SLC, setting).encode())
-
-
-@pytest.mark.parametrize('line, text', [
-    ('mode 12', '"mode 12" is no command'), ('mode 12 run now', '"mode 12 run now" is no'),
-    ('mode 12 stop', 'mode 12 stop: the modes are run, program, remote, test, fault')])
-def test_bad_mode(plcs: list[SimulatedPlc], line: str, text: str) -> None:
-    with pytest.raises(CommandError) as caught:
-        execute(line, plcs)
-    assert str(caught.value).startswith(text)
-    assert plcs[1].processor.setting is Setting.REMOTE
 
 
 @pytest.fixture
@@ -265,8 +170,9 @@ def test_on_a_pty_until_a_signal(
     assert not name.is_symlink()
 
 
-def test_on_tcp_until_quit_one_client_after_the_other(start: Start) -> None:
-    simulator = start('--tcp', '127.0.0.1:0')
+@pytest.mark.parametrize('address', ['127.0.0.1:0', ':0'])
+def test_on_tcp_until_quit_one_client_after_the_other(start: Start, address: str) -> None:
+    simulator = start('--tcp', address)
     where = simulator.line().removesuffix(', CRC').rpartition(':')[2]
     for tns in ('10 02', '11 02'):
         with socket.create_connection(('127.0.0.1', int(where)), PATIENCE) as client:
@@ -372,7 +278,8 @@ def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None
     assert said.startswith(f'simulator: --tcp "{where}": Address already in use')
 
 
-@pytest.mark.parametrize('where', ['127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b'])
+@pytest.mark.parametrize('where', [
+    '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80'])
 def test_bad_tcp_port(capsys: pytest.CaptureFixture[str], data: Path, where: str) -> None:
     assert _refused(capsys, '--data', str(data), '--tcp', where) == \
         f'simulator: --tcp "{where}" should be HOST:PORT\n'
@@ -415,15 +322,6 @@ def test_two_simulators_do_not_share_a_name(
     assert not os.path.lexists(name)
 
 
-def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
-    name = tmp_path / 'plc'
-    line = PtyLine(str(name))
-    name.unlink()
-    name.symlink_to('/dev/ttyUSB0')
-    line.close()
-    assert os.readlink(name) == '/dev/ttyUSB0'
-
-
 def test_folder_of_a_pty_that_is_missing(
         capsys: pytest.CaptureFixture[str], data: Path) -> None:
     assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc', status=1) == \
@@ -437,17 +335,6 @@ def test_port_that_is_not_there_is_an_error_at_once(
     assert (said.status, said.out) == (1, '')
     assert said.err.startswith('simulator: ')
     assert name in said.err
-
-
-def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
-    name = tmp_path / 'plc'
-    name.symlink_to('/dev/pts/does-not-exist')
-    line = PtyLine(str(name))
-    try:
-        assert os.readlink(name).startswith('/dev/pts/')
-        assert name.exists()
-    finally:
-        line.close()
 
 
 @pytest.mark.parametrize('option', [

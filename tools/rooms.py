@@ -71,9 +71,12 @@ ROOMS = (
     Room(('sniffer',), 'traffic told to people', ('errors', 'capture', 'df1', 'pccc')),
     Room(('monitor_view.py',), 'the state of a running node as lines of text', ('text',)),
     Room(('port.py',), 'opens a port, runs a link in its thread'),
+    Room(('lines.py',), 'lines that we make or open ourselves: pseudo-terminal, listening TCP '
+                        'port, serial port'),
     Room(('trace.py', 'tap.py'), 'recording and listening on ports'),
     Room(('node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
-    Room(('simulator.py', 'simulated_plc.py'), 'PLCs on a port, to test against'),
+    Room(('simulator.py', 'simulator_commands.py', 'simulated_plc.py'),
+         'PLCs on a line, to test against'),
     Room(('commissioning', 'plc.py'), 'single questions to PLCs: the command `plc`'),
     Room(('sniff.py', 'check.py'), 'the commands of these names'),
     Room(('monitor.py', 'monitor_node.py'), 'the command `monitor`'),

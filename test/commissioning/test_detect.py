@@ -28,9 +28,9 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver import network as network_module
 from abdf1_ros.driver.network import Network
+from abdf1_ros.lines import PtyLine
 from abdf1_ros.port import LinkThread
 from abdf1_ros.simulated_plc import SimulatedPlc
-from abdf1_ros.simulator import PtyLine
 import pytest
 from support.driver_bench import simulated_plc
 from support.ptys import Pty

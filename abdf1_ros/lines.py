@@ -1,0 +1,171 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lines that we make or open ourselves: pseudo-terminal, listening TCP port, serial port."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+import socket
+import tty
+from typing import Protocol
+
+from abdf1_ros.driver.network import Network
+from abdf1_ros.port import DescriptorPort, open_port, Port
+
+WAITING = 'waiting for a client'
+
+_PTYS = '/dev/pts/'
+
+
+class Line(Protocol):
+    """
+    What a link opens as its port, and opens again when it was lost.
+
+    ``name`` is what others call it. Making one raises OSError where it cannot be had.
+    """
+
+    name: str
+
+    def open(self) -> Port:  # noqa: A003
+        """Return the port; OSError while there is none."""
+
+    def close(self) -> None:
+        """Take the line away; what ``open`` has returned is the caller's to close."""
+
+
+class PtyLine:
+    """
+    A pseudo-terminal; ``link`` is a name for its other end.
+
+    A link that an earlier run has left is replaced; OSError where anything else has the name.
+    """
+
+    def __init__(self, link: str | None) -> None:
+        self._link = Path(link) if link else None
+        if self._link:
+            # Before we have a terminal: it may get the number that an old link leads to.
+            _remove_left_over(self._link)
+        self._ours, self._theirs = os.openpty()
+        # Open at both ends all the time, or a read fails whenever nobody is connected.
+        tty.setraw(self._theirs)
+        self._target = os.ttyname(self._theirs)
+        self.name = link or self._target
+        if self._link:
+            # So others see that the link is in use. A client's lock is a flock, another kind.
+            fcntl.lockf(self._theirs, fcntl.LOCK_EX)
+            try:
+                _make_link(self._link, self._target)
+            except OSError:
+                self.close()
+                raise
+
+    def open(self) -> Port:  # noqa: A003
+        """Return our end."""
+        descriptor = os.dup(self._ours)
+        return DescriptorPort(descriptor, lambda: os.close(descriptor))
+
+    def close(self) -> None:
+        """Take the line and its name away."""
+        if self._link and _target_of(self._link) == self._target:
+            self._link.unlink()
+        os.close(self._ours)
+        os.close(self._theirs)
+
+
+def _remove_left_over(link: Path) -> None:
+    """Remove what an earlier run has left; OSError where that still runs."""
+    target = _target_of(link)
+    if target.startswith(_PTYS):
+        if _is_in_use(target):
+            raise OSError(f'{link} is in use by another simulator or sniff')
+        link.unlink()
+
+
+def _make_link(link: Path, target: str) -> None:
+    """Let ``link`` lead to a pseudo-terminal; OSError says why it cannot."""
+    try:
+        link.symlink_to(target)
+    except FileExistsError:
+        raise OSError(f'{link} is there already, and no link that a simulator has left; '
+                      'give another name') from None
+    except OSError as error:
+        raise OSError(f'{link} cannot be made: {error.strerror}') from None
+
+
+def _target_of(link: Path) -> str:
+    """Return where a symbolic link leads, empty where there is none."""
+    try:
+        return os.readlink(link)
+    except OSError:
+        return ''
+
+
+def _is_in_use(target: str) -> bool:
+    """Tell whether another process has made and still has a pseudo-terminal."""
+    try:
+        descriptor = os.open(target, os.O_RDWR | os.O_NOCTTY)
+    except OSError:
+        return False
+    try:
+        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+class TcpLine:
+    """A listening TCP port, any that is free for 0; one client at a time is the line."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._listener = socket.create_server((host, port))
+        self._listener.settimeout(0.2)
+        self.name = 'socket://{}:{}'.format(*self._listener.getsockname()[:2])
+
+    def open(self) -> Port:  # noqa: A003
+        """Return the connection of a client; OSError while there is none."""
+        try:
+            client, _ = self._listener.accept()
+        except TimeoutError:
+            raise OSError(WAITING) from None
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return DescriptorPort(client.fileno(), client.close)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._listener.close()
+
+
+class SerialLine:
+    """A serial port, or anything that pyserial opens."""
+
+    def __init__(self, name: str, network: Network) -> None:
+        self.name = name
+        self._network = network
+        # At once: a port that is lost is waited for, one that was never there is a mistake.
+        self._first: Port | None = open_port(network, name)
+
+    def open(self) -> Port:  # noqa: A003
+        """Return the port; from the second time on it is opened anew."""
+        port, self._first = self._first, None
+        return port or open_port(self._network, self.name)
+
+    def close(self) -> None:
+        """Close the port if nobody has taken it."""
+        if self._first is not None:
+            self._first.close()

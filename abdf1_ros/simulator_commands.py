@@ -1,0 +1,142 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands that the simulator takes while it runs: faults, modes, counters, messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import re
+
+from abdf1_ros.driver.network import Network
+from abdf1_ros.numerals import decimal_number, whole_number
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.simulated_plc import Faults, numbers, SimulatedPlc
+
+COMMANDS = """\
+commands, on standard input or with --at:
+  silent STATION              it stops answering
+  full STATION                it has no room for commands
+  slow STATION POLLS          so many polls get EOT before each reply
+  delay STATION MS            polls get EOT until so many ms after each command
+  noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
+  error STATION STS [EXT]     every reply says this error (hexadecimal)
+  normal STATION              it works again
+  mode STATION MODE           its processor is in mode run, program, remote (run), test, or
+                              has a fault
+  counters STATION            say what its port has counted
+  msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
+  quit                        end the simulator
+"""
+
+_LONGEST = 3_600_000  # ms
+
+# Where a simulated PLC sends its messages: the default Station of a net CSV.
+_BRIDGE_STATION = Network().station
+
+
+class CommandError(Exception):
+    """A line that is no command; the text says what would be right."""
+
+
+def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False,
+            report: Callable[[str], None] = lambda text: None) -> str:
+    """
+    Carry out a command line, all but "quit"; return what has been done, or raise CommandError.
+
+    ``report`` is told later what has become of a message.
+    """
+    verb, *words = line.split()
+    plc, arguments = _station(words, plcs)
+    if verb == 'msg' and is_full_duplex and len(arguments) > 1:
+        return _send(plc, arguments[0], arguments[1:], report)
+    if verb == 'mode' and len(arguments) == 1:
+        return _set_mode(plc, arguments[0])
+    if verb == 'counters' and not arguments:
+        counts = plc.counters.by_mnemonic().items()
+        return f'station {plc.station}: {" ".join(f"{name}={count}" for name, count in counts)}'
+    plc.faults = _faults(line, verb, arguments, is_full_duplex)
+    return f'station {plc.station}: {" ".join([verb, *arguments])}'
+
+
+def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) -> Faults:
+    faults = Faults()
+    try:
+        if verb == 'silent' and not arguments:
+            faults.silent = True
+        elif verb == 'full' and not arguments:
+            faults.full = True
+        elif verb == 'slow' and len(arguments) == 1 and not is_full_duplex:
+            faults.slow = _polls(arguments[0])
+        elif verb == 'delay' and len(arguments) == 1 and not is_full_duplex:
+            faults.delay = _decimal(arguments[0], 'ms', _LONGEST) / 1000
+        elif verb == 'noise' and len(arguments) == 1:
+            faults.noise = _decimal(arguments[0], 'a share', 1)
+        elif verb == 'error' and len(arguments) in (1, 2):
+            faults.status = tuple(map(_byte, arguments))
+        elif verb != 'normal' or arguments:
+            raise CommandError(f'"{line.strip()}" is no command\n{COMMANDS.rstrip()}')
+    except ValueError as error:
+        raise CommandError(f'{line.strip()}: {error}') from None
+    return faults
+
+
+def _polls(text: str) -> int:
+    value = whole_number(text)
+    if value is None or value < 0:
+        raise ValueError(f'"{text}" should be a whole number from 0')
+    return value
+
+
+def _decimal(text: str, what: str, high: float) -> float:
+    value = decimal_number(text)
+    if value is None or not 0 <= value <= high:
+        raise ValueError(f'"{text}" should be {what} from 0 to {high:.0f}')
+    return value
+
+
+def _byte(text: str) -> int:
+    if not re.fullmatch('[0-9A-Fa-f]{2}', text):
+        raise ValueError(f'"{text}" should be a byte in hexadecimal, as in 0B')
+    return int(text, 16)
+
+
+def _set_mode(plc: SimulatedPlc, text: str) -> str:
+    try:
+        plc.processor.setting = Setting(text)
+    except ValueError:
+        known = ', '.join(setting.value for setting in Setting)
+        raise CommandError(f'mode {plc.station} {text}: the modes are {known}') from None
+    return f'station {plc.station}: mode {text}'
+
+
+def _send(plc: SimulatedPlc, address: str, values: Sequence[str],
+          report: Callable[[str], None]) -> str:
+    try:
+        place = Address.parse(address, plc.table.plc_type)
+        plc.send(place, numbers(values), _BRIDGE_STATION,
+                 lambda outcome: report(f'station {plc.station}: msg {place} {outcome}'))
+    except ValueError as error:
+        raise CommandError(f'msg {address}: {error}') from None
+    return f'station {plc.station}: msg {place} {" ".join(values)}'
+
+
+def _station(arguments: list[str],
+             plcs: Sequence[SimulatedPlc]) -> tuple[SimulatedPlc, list[str]]:
+    for plc in plcs:
+        if arguments and arguments[0] == str(plc.station):
+            return plc, arguments[1:]
+    known = ', '.join(str(plc.station) for plc in plcs)
+    raise CommandError(f'name a station ({known})\n{COMMANDS.rstrip()}')

@@ -1,0 +1,161 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lines that are made or opened here: their names, who gets them, and what they leave behind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+import os
+from pathlib import Path
+import socket
+import subprocess
+import sys
+
+from abdf1_ros.driver.network import Network
+from abdf1_ros.lines import PtyLine, SerialLine, TcpLine, WAITING
+from abdf1_ros.port import Port
+import pytest
+from support.ptys import PATIENCE, Pty, read_exactly
+
+
+@pytest.fixture
+def wake() -> Iterator[int]:
+    """Give a descriptor that nobody writes to."""
+    reader, writer = os.pipe()
+    yield reader
+    os.close(reader)
+    os.close(writer)
+
+
+def exchange(port: Port, other: int, wake: int) -> None:
+    """Say something in both directions, every byte that a terminal might change."""
+    every = bytes(range(256))
+    port.write(every)
+    assert read_exactly(other, 256) == every
+    os.write(other, every[::-1])
+    heard = b''
+    while len(heard) < 256 and (data := port.read(PATIENCE, wake)):
+        heard += data
+    assert heard == every[::-1]
+
+
+def test_pseudo_terminal_one_client_after_the_other(tmp_path: Path, wake: int) -> None:
+    name = str(tmp_path / 'plc')
+    with closing(PtyLine(name)) as line:
+        assert line.name == name
+        for _ in range(2):
+            client = os.open(name, os.O_RDWR | os.O_NOCTTY)
+            with closing(line.open()) as port:
+                exchange(port, client, wake)
+            os.close(client)
+    assert not os.path.lexists(name)
+
+
+def test_pseudo_terminal_without_a_link() -> None:
+    with closing(PtyLine(None)) as line:
+        assert Path(line.name).is_char_device()
+
+
+def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
+    name = tmp_path / 'plc'
+    name.symlink_to('/dev/pts/does-not-exist')
+    line = PtyLine(str(name))
+    try:
+        assert os.readlink(name).startswith('/dev/pts/')
+        assert name.exists()
+    finally:
+        line.close()
+
+
+def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
+    name = tmp_path / 'plc'
+    line = PtyLine(str(name))
+    name.unlink()
+    name.symlink_to('/dev/ttyUSB0')
+    line.close()
+    assert os.readlink(name) == '/dev/ttyUSB0'
+
+
+@pytest.mark.parametrize('link, text', [
+    ('taken', 'taken is there already'), ('none/plc', 'none/plc cannot be made: No such file')])
+def test_name_that_cannot_be_had_leaves_no_terminal_open(
+        tmp_path: Path, link: str, text: str) -> None:
+    (tmp_path / 'taken').touch()
+    before = os.listdir('/dev/fd')
+    with pytest.raises(OSError, match=text):
+        PtyLine(str(tmp_path / link))
+    assert os.listdir('/dev/fd') == before
+    assert os.listdir(tmp_path) == ['taken']
+
+
+def test_name_that_another_process_has(tmp_path: Path) -> None:
+    name = str(tmp_path / 'plc')
+    code = 'import sys; from abdf1_ros.lines import PtyLine; PtyLine(sys.argv[1])'
+    with closing(PtyLine(name)):
+        before = os.readlink(name)
+        other = subprocess.run([sys.executable, '-c', code, name], text=True,
+                               stderr=subprocess.PIPE, timeout=PATIENCE, check=False)
+        assert f'OSError: {name} is in use by another simulator or sniff' in other.stderr
+        assert os.readlink(name) == before
+
+
+def test_tcp_one_client_after_the_other(wake: int) -> None:
+    with closing(TcpLine('127.0.0.1', 0)) as line:
+        scheme, _, address = line.name.partition('://')
+        host, _, number = address.partition(':')
+        assert (scheme, host) == ('socket', '127.0.0.1')
+        with pytest.raises(OSError, match=WAITING):
+            line.open()
+        for _ in range(2):
+            with socket.create_connection((host, int(number)), PATIENCE) as client, \
+                    closing(line.open()) as port:
+                exchange(port, client.fileno(), wake)
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection((host, int(number)), PATIENCE)
+
+
+def test_tcp_port_in_use() -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server, \
+            pytest.raises(OSError, match='Address already in use'):
+        TcpLine('127.0.0.1', server.getsockname()[1])
+
+
+def test_serial_port_is_opened_at_once_and_again_when_it_was_lost(
+        tmp_path: Path, wake: int) -> None:
+    with closing(Pty(tmp_path / 'port')) as pty, \
+            closing(SerialLine(str(pty.name), Network())) as line:
+        assert line.name == str(pty.name)
+        for _ in range(2):
+            with closing(line.open()) as port:
+                exchange(port, pty.fileno(), wake)
+                with pytest.raises(OSError, match='Errno 11'):  # it is open already
+                    line.open()
+        pty.close()
+        with pytest.raises(OSError, match='No such file'):
+            line.open()
+
+
+def test_serial_port_that_nobody_has_taken_is_closed(tmp_path: Path) -> None:
+    with closing(Pty(tmp_path / 'port')) as pty:
+        lines = []  # kept, so that nobody but close() closes them
+        for _ in range(2):
+            lines.append(SerialLine(str(pty.name), Network()))
+            lines[-1].close()
+
+
+def test_serial_port_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match='No such file'):
+        SerialLine(str(tmp_path / 'none'), Network())

@@ -1,0 +1,147 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands that the simulator takes while it runs."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import LinkError
+from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import decode_identity
+from abdf1_ros.simulated_plc import Faults, SimulatedPlc
+from abdf1_ros.simulator_commands import CommandError, execute
+import pytest
+from support.driver_bench import simulated_plc
+
+
+@pytest.fixture
+def plcs() -> list[SimulatedPlc]:
+    return [simulated_plc(station, 'SLC', lambda: 0.0, ('N7:0', 1)) for station in (1, 12)]
+
+
+@pytest.mark.parametrize('line, faults, text', [
+    ('silent 12', Faults(silent=True), 'station 12: silent'),
+    ('full 12', Faults(full=True), 'station 12: full'),
+    ('  slow   12  3 \n', Faults(slow=3), 'station 12: slow 3'),
+    ('delay 12 50', Faults(delay=0.05), 'station 12: delay 50'),
+    ('noise 12 0.01', Faults(noise=0.01), 'station 12: noise 0.01'),
+    ('error 12 50', Faults(status=(0x50,)), 'station 12: error 50'),
+    ('error 12 F0 0b', Faults(status=(0xF0, 0x0B)), 'station 12: error F0 0b'),
+    ('normal 12', Faults(), 'station 12: normal')])
+def test_command(plcs: list[SimulatedPlc], line: str, faults: Faults, text: str) -> None:
+    plcs[1].faults = Faults(silent=True, slow=9)
+    assert execute(line, plcs) == text
+    assert plcs[1].faults == faults
+    assert plcs[0].faults == Faults()
+
+
+def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
+    plcs[1].faults = faults = Faults(slow=9)
+    plcs[1].counters.messages_sent, plcs[1].counters.chars_received = 3, 70
+    name, _, counts = execute('counters 12', plcs).partition(': ')
+    assert name == 'station 12'
+    told = dict(word.split('=') for word in counts.split())
+    assert {key: int(value) for key, value in told.items()} == plcs[1].counters.by_mnemonic()
+    assert told['CNT_MSG_PACKETS_SENT'] == '3'
+    assert plcs[1].faults is faults
+
+
+@pytest.mark.parametrize('line, text', [
+    ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
+    ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is no command'),
+    ('silent 1 2', '"silent 1 2" is no command'), ('full 1 2', '"full 1 2" is no command'),
+    ('counters 1 2', '"counters 1 2" is no command'),
+    ('slow 1', '"slow 1" is no command'),
+    *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
+      for text in ('few', '-3', '1.5', '1_0', '\u0661')),
+    ('delay 1', '"delay 1" is no command'),
+    *((f'delay 1 {text}', f'delay 1 {text}: "{text}" should be ms from 0 to 3600000')
+      for text in ('long', '-5', 'nan', '1e9', '1_0')),
+    *((f'noise 1 {text}', f'noise 1 {text}: "{text}" should be a share from 0 to 1')
+      for text in ('much', '-0.1', '1.1', 'nan')),
+    *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal, as in 0B')
+      for text in ('zz', '5', '500000', '\u0661\u0661')),
+    ('error 1', '"error 1" is no command'), ('normal 1 x', '"normal 1 x" is no command')])
+def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
+    plcs[0].faults = before = Faults(slow=2)
+    with pytest.raises(CommandError) as caught:
+        execute(line, plcs)
+    assert str(caught.value).startswith(text)
+    assert plcs[0].faults is before
+
+
+@pytest.mark.parametrize('line', ['hush 1', 'silent 3'])
+def test_bad_command_is_told_the_commands_and_no_more(
+        plcs: list[SimulatedPlc], line: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        execute(line, plcs)
+    lines = str(caught.value).split('\n')
+    assert lines[1] == 'commands, on standard input or with --at:'
+    assert lines[-1].split() == ['quit', 'end', 'the', 'simulator']
+
+
+@pytest.mark.parametrize('setting', Setting)
+def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
+    plcs[1].faults = before = Faults(slow=9)
+    assert execute(f'mode 12 {setting.value}', plcs) == f'station 12: mode {setting.value}'
+    assert plcs[1].processor.setting is setting
+    assert plcs[0].processor.setting is Setting.REMOTE
+    assert plcs[1].faults is before  # a mode is no fault of the line
+    status = plcs[1].serve(Packet(12, 5, 0x06, 0, 1, STATUS_REQUEST)).data
+    assert decode_identity(status) == decode_identity(
+        EmulatedProcessor(PlcType.SLC, setting).encode())
+
+
+@pytest.mark.parametrize('line, text', [
+    ('mode 12', '"mode 12" is no command'), ('mode 12 run now', '"mode 12 run now" is no'),
+    ('mode 12 stop', 'mode 12 stop: the modes are run, program, remote, test, fault')])
+def test_bad_mode(plcs: list[SimulatedPlc], line: str, text: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        execute(line, plcs)
+    assert str(caught.value).startswith(text)
+    assert plcs[1].processor.setting is Setting.REMOTE
+
+
+def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> None:
+    told: list[str] = []
+    text = execute('msg 12 N7:0 5 -6', plcs, True, told.append)
+    assert text == 'station 12: msg N7:0 5 -6'
+    assert told == []
+    sending = plcs[1].outbox.pop()
+    assert (sending.command.dst, sending.command.src) == (5, 12)
+    sending.fail(error := LinkError())
+    assert told == [f'station 12: msg N7:0 {error}']
+    assert not plcs[0].outbox
+
+
+@pytest.mark.parametrize('line, text', [
+    ('msg 12 N7:0', '"msg 12 N7:0" is no command'),
+    ('msg 12 Q7:0 5', 'msg Q7:0: SLC has no Q files'),
+    ('msg 12 N7:0 x', 'msg N7:0: "x" should be a number'),
+    ('slow 12 3', '"slow 12 3" is no command'), ('delay 12 3', '"delay 12 3" is no command')])
+def test_bad_command_on_a_full_duplex_line(
+        plcs: list[SimulatedPlc], line: str, text: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        execute(line, plcs, True)
+    assert str(caught.value).startswith(text)
+    assert not plcs[1].outbox
+
+
+def test_message_needs_a_full_duplex_line(plcs: list[SimulatedPlc]) -> None:
+    with pytest.raises(CommandError, match='"msg 12 N7:0 5" is no command'):
+        execute('msg 12 N7:0 5', plcs)
+    assert not plcs[1].outbox
