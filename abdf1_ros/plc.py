@@ -217,27 +217,27 @@ def _status(options: argparse.Namespace) -> int:
 
 def _ping(options: argparse.Namespace) -> int:
     times: list[float] = []
-    sent = 0
+    failures = 0
     with Session(network_of(options)) as session:
         try:
             for _ in range(options.count):
-                sent += 1
                 try:
                     times.append(presence.ping(session, options.station))
                 except PortLost:
                     raise
                 except Abdf1Error as error:
+                    failures += 1
                     _failed(session, options.station, error)
                 else:
                     print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
         except KeyboardInterrupt:
-            sent -= 1  # the one that was under way
-    text = f'{sent} sent, {len(times)} answered'
+            pass  # the one that was under way does not count
+    text = f'{failures + len(times)} sent, {len(times)} answered'
     if times:
         text += (f'; shortest {min(times) * 1000:.1f}, mean '
                  f'{sum(times) / len(times) * 1000:.1f}, longest {max(times) * 1000:.1f} ms')
     print(text)
-    return 0 if len(times) == sent and times else EXIT_FAILED
+    return 0 if times and not failures else EXIT_FAILED
 
 
 def _scan(options: argparse.Namespace) -> int:
