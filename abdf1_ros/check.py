@@ -25,7 +25,6 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 import json
-import re
 import sys
 from typing import Any
 
@@ -36,7 +35,7 @@ from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import load_network, Network
 from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.report import last_address, make_report, Remark, Report
-from abdf1_ros.driver.served import served_problems
+from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.numerals import decimal_number
 from abdf1_ros.terminal import colour, drop_output, GREEN, prepare_output, RED, table, YELLOW
@@ -47,7 +46,6 @@ EXIT_INTERRUPTED = 130
 
 _LONGEST = 86_400_000
 _SHOWN_TAGS = 8  # in the table; JSON has them all
-_WHERE = re.compile(r'(?P<file>.*?)(:(?P<line>\d+)(:(?P<cell>\d+))?)?( \((?P<column>\w+)\))?')
 _EPILOG = """\
 exit status: 0 when both files are good, also with warnings; 2 for errors;
              130 when interrupted by Ctrl-C
@@ -81,7 +79,7 @@ def examine(net_file: str, map_file: str) -> Findings:
     except ConfigurationError as error:
         found.problems += error.problems
     if found.network is not None:
-        for mapping, problem in served_problems(found.mappings, found.network, map_file):
+        for mapping, problem in line_problems(found.mappings, found.network, map_file):
             found.mappings.remove(mapping)
             found.problems.append(problem)
     return found
@@ -213,13 +211,8 @@ def _json(found: Findings, report: Report | None) -> str:
 
 
 def _problem(problem: Problem) -> dict[str, Any]:
-    match = _WHERE.fullmatch(problem.where)
-    place: dict[str, Any] = match.groupdict() if match else {'file': problem.where}
-    line, cell = place.get('line'), place.get('cell')
     return {
-        'file': place['file'], 'line': int(line) if line else None,
-        'cell': int(cell) if cell else None, 'column': place.get('column'),
-        'number': problem.message.number if problem.message else None,
+        **asdict(problem.place), 'number': problem.message.number if problem.message else None,
         'mnemonic': problem.message.name if problem.message else None, 'text': str(problem)}
 
 

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from abdf1_ros.messages import Message
@@ -62,6 +63,18 @@ class WrongCommandCode(LinkError):
     message = Message.ERR_BAD_FUNCTION_CODE
 
 
+class LineReset(LinkError):
+    """The master has made its slaves drop what they had to send (2511)."""
+
+    message = Message.ERR_RCVD_NAK_SYMBOL
+
+
+class NeverTaken(LinkError):
+    """The master has not acknowledged a message (2519); the argument is the limit of retries."""
+
+    message = Message.NTC_NAK_LIMIT_EXCEEDED
+
+
 class PortLost(LinkError):
     """The port failed or was closed while the transaction ran; the argument says how."""
 
@@ -83,20 +96,39 @@ class RemoteError(Abdf1Error):
         self.ext_sts = ext_sts
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """
+    Where in a file something stands; lines, and the cells of a line, are counted from 1.
+
+    ``file`` may also be the name of something else that a user gives: a parameter, an option.
+    """
+
+    file: str
+    line: int | None = None
+    cell: int | None = None
+    column: str | None = None
+
+    def __str__(self) -> str:
+        """Return "file:line:cell (column)", without what is not known."""
+        numbers = ''.join(f':{number}' for number in (self.line, self.cell) if number)
+        return f'{self.file}{numbers}' + (f' ({self.column})' if self.column else '')
+
+
 class Problem(Abdf1Error):
     """
     One fault in a file or parameter that a user wrote.
 
-    ``where`` is "file:line:column" (or the parameter's name), ``text`` what is wrong and what
-    would be right, ``message`` its numbered entry, or None where the specification has none.
-    What it shows is one visible line, whatever stands in the file.
+    ``place`` is where it stands, ``text`` what is wrong and what would be right, ``message`` its
+    numbered entry, or None where the specification has none. What it shows is one visible line,
+    whatever stands in the file.
     """
 
-    def __init__(self, where: str, text: str, message: Message | None = None,
+    def __init__(self, where: Place | str, text: str, message: Message | None = None,
                  args: tuple[Any, ...] = ()) -> None:
         head = f'{message.line(*args)}; ' if message else ''
         super().__init__(printable(f'{where}: {head}{text}'))
-        self.where = where
+        self.place = where if isinstance(where, Place) else Place(where)
         self.text = text
         self.message = message
 

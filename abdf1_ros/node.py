@@ -41,7 +41,7 @@ from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import ConfigurationError, FormatError
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.node_diagnostics import Diagnostics
+from abdf1_ros.node_diagnostics import Diagnostics, NamesakeWatch
 from abdf1_ros.node_health import LinkCounterService
 from abdf1_ros.node_log import EventLog, LineLog
 from abdf1_ros.node_messages import (
@@ -101,6 +101,11 @@ _LEVEL_CHECK_PERIOD = 0.1
 # How long the end waits for its last diagnostics to arrive, where a subscriber is stuck.
 _LAST_WORDS = Duration(seconds=0.5)
 
+_MOST_NAMES = 5  # in a line of the log
+
+# What rclpy's errors about the directory of the logs begin with.
+_LOG_FAILURES = 'failed to initialize logging', 'Failed opening file'
+
 _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
     Outcome.SUPERSEDED: DiagnosticStatus.WARN}
@@ -125,6 +130,10 @@ class BridgeNode(Node):
             self.get_logger().error(f'{problem} (row left out)')
         if not configuration.mappings:
             self.get_logger().warning('the map has no usable row: nothing is read or written')
+        if configuration.ignored:
+            self.get_logger().warning(
+                'parameters without effect, as the map comes from its file alone: '
+                + _few(configuration.ignored))
         self._log = EventLog(self.get_logger(), time.monotonic)
         self._lines = LineLog(self.get_logger(), time.monotonic)
         self._read_publishers: dict[str, Any] = {}
@@ -140,6 +149,9 @@ class BridgeNode(Node):
         self._diagnostics = Diagnostics(self.get_name(), self.driver, configuration.port)
         self._diagnostics_period = configuration.parameters.diagnostics_period
         self._write_timeout = configuration.parameters.write_timeout
+        # Every node has this service, and nobody gives it another name.
+        service = f'{self.get_fully_qualified_name()}/get_parameters'
+        self._namesakes = NamesakeWatch(lambda: self.count_services(service))
         self._next_diagnostics = 0.0
         self._levels: list[bytes] = []
         self.create_service(Trigger, '~/reset_counters', self._reset_counters)
@@ -274,7 +286,9 @@ class BridgeNode(Node):
     def happened(self, event: Event) -> None:
         """Log a numbered event and remember it for the diagnostics."""
         self._diagnostics.happened(event, time.monotonic())
-        if event.message is not Message.ERR_INACTIVE_STATION:  # logged when the state changes
+        is_change = event.message is Message.ERR_INACTIVE_STATION \
+            and event.station in self.driver.stations
+        if not is_change:  # that is logged by station_changed
             self._log.add(event)
 
     def station_changed(self, station: Station) -> None:
@@ -306,10 +320,22 @@ class BridgeNode(Node):
     def _check_diagnostics(self) -> None:
         now = time.monotonic()
         self._link_counters.check(now)
+        if self._namesakes.look(now):
+            self._namesake_came_or_went(self._namesakes.has_found)
         levels = self._diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self._publish_diagnostics(now)
+
+    def _namesake_came_or_went(self, is_there: bool) -> None:
+        self._diagnostics.has_namesake = is_there
+        name = self.get_fully_qualified_name()
+        if is_there:
+            self._lines.warning(
+                'the name', f'another node is called {name} too: both publish and take the same '
+                            'topics; give one another name, as in -r __node:=line_2')
+        else:
+            self._lines.info('the name', f'no other node is called {name} any more')
 
     def _publish_diagnostics(self, now: float) -> None:
         self._next_diagnostics = now + self._diagnostics_period
@@ -348,9 +374,7 @@ def main(args: Sequence[str] | None = None) -> int:
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
     except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
-        # rclpy's own words for arguments and names that it does not take
-        text = printable(' '.join(str(error).split()))
-        print(f'{NODE_NAME}: bad arguments: {text}', file=sys.stderr)
+        print(f'{NODE_NAME}: {_refusal(str(error))}', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
     try:
@@ -361,6 +385,20 @@ def main(args: Sequence[str] | None = None) -> int:
     node.destroy_node()
     rclpy.try_shutdown()
     return EXIT_FAULT if failed else 0
+
+
+def _few(names: Sequence[str]) -> str:
+    """Return names as text, the first of them where there are many."""
+    more = f' and {len(names) - _MOST_NAMES} more' if len(names) > _MOST_NAMES else ''
+    return printable(', '.join(names[:_MOST_NAMES])) + more
+
+
+def _refusal(text: str) -> str:
+    """Return rclpy's own words for what it does not take, and what to look at."""
+    text = printable(' '.join(text.split()))
+    if text.startswith(_LOG_FAILURES):
+        return f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
+    return f'bad arguments: {text}'
 
 
 def _parse(args: Sequence[str]) -> None:

@@ -42,6 +42,12 @@ _WRITE_MEMORY = 10.0
 # A master that has not polled us for so long (s) is worth a warning.
 _LONGEST_UNPOLLED = 5.0
 
+# A node that was killed is seen for up to 20 s more, the lease of its DDS participant. In so many
+# looks in a row, a second apart, another node of our name is no earlier run of this one.
+_LOOKS_FOR_NAMESAKES = 30
+
+_FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
+
 _FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
     Freshness.STALE: ERROR, Freshness.FAILED: ERROR}
@@ -64,9 +70,14 @@ class Section:
 
 
 class Diagnostics:
-    """All statuses of one node, named ``<node>: <section>``."""
+    """
+    All statuses of one node, named ``<node>: <section>``.
+
+    ``has_namesake`` is to be set when another node has its name.
+    """
 
     def __init__(self, node_name: str, driver: Driver, port: str) -> None:
+        self.has_namesake = False
         self._driver = driver
         self._port = port
         self._link: LinkThread | None = None
@@ -124,6 +135,12 @@ class Diagnostics:
                     for key, value in section.values(now).items()])
 
     def _judge_link(self, now: float) -> Verdict:
+        level, text = self._judge_line(now)
+        if self.has_namesake:
+            return max(level, WARN), f'{text}; another node is called {self._node_name} too'
+        return level, text
+
+    def _judge_line(self, now: float) -> Verdict:
         state = self._link.state if self._link else None
         if state is None or not state.is_open:
             return ERROR, state.text if state else 'not started yet'
@@ -223,6 +240,29 @@ class Diagnostics:
             if point.freshness(now) is not Freshness.FRESH}
 
 
+class NamesakeWatch:
+    """
+    Find out when another node has our name, so that topics and services of both are one.
+
+    ``count`` tells how many nodes of the name there are; ours is one of them.
+    """
+
+    def __init__(self, count: Callable[[], int]) -> None:
+        self.has_found = False
+        self._count = count
+        self._looks = 0
+        self._next_look = 0.0
+
+    def look(self, now: float) -> bool:
+        """Look once a second; return whether ``has_found`` has changed."""
+        if now < self._next_look:
+            return False
+        self._next_look = now + 1.0
+        self._looks = self._looks + 1 if self._count() > 1 else 0
+        before, self.has_found = self.has_found, self._looks >= _LOOKS_FOR_NAMESAKES
+        return self.has_found != before
+
+
 class WriteLog:
     """
     Counts of writes by how they ended.
@@ -253,7 +293,7 @@ class WriteLog:
     def values(self) -> dict[str, str]:
         """Return the counts and the last failure."""
         counts = self._counts
-        failed = counts[Outcome.FAILED] + counts[Outcome.NOT_SENT]
+        failed = sum(counts[outcome] for outcome in _FAILURES)
         last = self._last_failure
         return {
             'accepted': str(counts.total() - counts[Outcome.REFUSED]),

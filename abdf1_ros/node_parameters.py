@@ -26,13 +26,14 @@ from abdf1_ros.driver.columns import MAP_COLUMNS
 from abdf1_ros.driver.map_file import load_mappings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
-from abdf1_ros.driver.served import served_problems
+from abdf1_ros.driver.served import line_problems
 from abdf1_ros.driver.station_lists import parse_stations
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 
 def _parameter(default: bool | float | str, description: str, low: float | None = None,
@@ -95,12 +96,19 @@ class Parameters:
         10.0, 'MB that the capture takes on the disk at most', 0.01, 10_000.0)
 
 
+Cell = tuple[str, str, str]
+"""Of the map: name of its parameter, value, description of its column."""
+
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """All that the node needs to know; ``map_problems`` are those of rows left out."""
+    """
+    All that the node needs to know.
+
+    ``map_problems`` are those of rows left out, ``ignored`` names overrides without an effect.
+    """
 
     parameters: Parameters
     network: Network
@@ -108,6 +116,7 @@ class Configuration:
     mappings: list[Mapping]
     map_problems: list[Problem]
     polling: PollingSettings | None = None
+    ignored: list[str] = field(default_factory=list)
 
 
 def configure(node: Node) -> Configuration:
@@ -129,7 +138,7 @@ def configure(node: Node) -> Configuration:
     map_file = parameters.map_file or str(config_file('map.csv'))
     try:
         mappings, map_problems = load_mappings(map_file)
-        for mapping, problem in served_problems(mappings, network, map_file):
+        for mapping, problem in line_problems(mappings, network, map_file):
             mappings.remove(mapping)
             map_problems.append(problem)
     except ConfigurationError as error:
@@ -145,9 +154,11 @@ def configure(node: Node) -> Configuration:
             problems += error.problems
     if problems:
         raise ConfigurationError(problems)
+    cells = _map_cells(mappings)
     if parameters.expose_map_parameters:
-        _declare_map(node, mappings)
-    return Configuration(parameters, network, port, mappings, map_problems, polling)
+        _declare_map(node, cells)
+    return Configuration(parameters, network, port, mappings, map_problems, polling,
+                         _ignored_overrides(node, cells))
 
 
 def _unknown_overrides(node: Node) -> list[Problem]:
@@ -156,17 +167,30 @@ def _unknown_overrides(node: Node) -> list[Problem]:
 
     rclpy drops them silently. Others may belong to other nodes of a shared parameter file, so
     only those are found whose names begin or look like ours. ``map.*`` may come back from a
-    dump of our parameters; it has no effect.
+    dump of our parameters, see ``_ignored_overrides``.
     """
     known = [entry.name for entry in fields(Parameters)]
     known += [entry.parameter for entry in FIELDS.values()]
     problems = []
-    for name in getattr(node, '_parameter_overrides', ()):
+    for name in _overrides(node):
         close = difflib.get_close_matches(name, known, 1, 0.75)
         if name not in known and (close or name.startswith('net.')):
             hint = f'did you mean {close[0]}?' if close else 'net.* are its columns'
             problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     return problems
+
+
+def _ignored_overrides(node: Node, cells: list[Cell]) -> list[str]:
+    """Return the names of overrides ``map.*`` that say something else than the map."""
+    given = {name: _text(parameter.value) for name, parameter in _overrides(node).items()
+             if name.startswith('map.')}
+    repeated = {name for name, value, _ in cells if given.get(name) == value}
+    return sorted(given.keys() - repeated)
+
+
+def _overrides(node: Node) -> dict[str, Parameter]:
+    """Return all that the user has given; rclpy has no public way to ask for it."""
+    return getattr(node, '_parameter_overrides', {})
 
 
 def _polling(parameters: Parameters, mappings: list[Mapping],
@@ -253,9 +277,14 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def _declare_map(node: Node, mappings: list[Mapping]) -> None:
+def _map_cells(mappings: list[Mapping]) -> list[Cell]:
+    return [(f'map.{mapping.name.replace("/", ".")}.{column.name.lower()}',
+             mapping.cell(column.name), column.description)
+            for mapping in mappings for column in MAP_COLUMNS]
+
+
+def _declare_map(node: Node, cells: list[Cell]) -> None:
     # rclpy writes the parameter's name into the descriptor, so each has one of its own.
-    node.declare_parameters('map', [
-        (f'{mapping.name.replace("/", ".")}.{column.name.lower()}', mapping.cell(column.name),
-         ParameterDescriptor(description=column.description, read_only=True))
-        for mapping in mappings for column in MAP_COLUMNS], ignore_override=True)
+    node.declare_parameters('', [
+        (name, value, ParameterDescriptor(description=description, read_only=True))
+        for name, value, description in cells], ignore_override=True)

@@ -34,7 +34,7 @@ import socket
 import termios
 import threading
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.driver.network import Network
@@ -61,6 +61,10 @@ _SILENCE_LIMIT = 5
 
 _MAX_FAULTS = 3
 _FAULT_WINDOW = 60.0
+
+# In words of ours, where those of the operating system tell too little.
+_BUSY = 'another program has it open'
+_REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is no serial port'}
 
 _PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
 
@@ -194,13 +198,8 @@ def open_port(network: Network, name: str | None = None, options: PortOptions = 
             url, baudrate=network.baud, bytesize=network.data_bits,
             parity=_PARITIES[network.parity], stopbits=network.stop_bits,
             rtscts=network.handshake == 'Yes', timeout=_GLANCE, exclusive=True)
-    except serial.SerialException as error:
-        reason = error.__context__
-        if isinstance(reason, termios.error) and reason.args[0] == errno.ENOTTY:
-            raise OSError(errno.ENOTTY, 'this is no serial port') from error
-        raise
-    except (ValueError, termios.error) as error:  # the second: not every device has parity
-        raise OSError(*error.args) from error
+    except (OSError, ValueError, termios.error) as error:  # the last: not every device has parity
+        raise OSError(*_plain(error)) from error
     if isinstance(port, serial.Serial):
         _set_options(port, options, tell)
     connection = getattr(port, '_socket', None)
@@ -210,6 +209,13 @@ def open_port(network: Network, name: str | None = None, options: PortOptions = 
         return DescriptorPort(port.fileno(), port.close)
     except (OSError, AttributeError):
         return SerialPort(port)
+
+
+def _plain(error: Exception) -> tuple[Any, ...]:
+    """Return what the operating system has said, without the words that pyserial puts around."""
+    said = error.__context__ if isinstance(error, serial.SerialException) else error
+    args = said.args if isinstance(said, OSError | termios.error) else error.args
+    return (args[0], _REASONS.get(args[0], args[1])) if len(args) > 1 else args
 
 
 def _set_options(port: serial.Serial, options: PortOptions, tell: Callable[[str], None]) -> None:
@@ -339,12 +345,16 @@ class LinkThread(threading.Thread):
     def _serve(self, port: Port) -> None:
         machine, clock = self._machine, self._clock
         machine.send_at_once = port.write
+        # Only there do bytes come at the speed of the line; others may be faster than it is set.
+        is_terminal = isinstance(port, DescriptorPort) and os.isatty(port.fileno())
         machine.start(clock())
         while not self._stopping:
             data = machine.data_to_send()
             if data:
                 port.write(data)
             self._while_sending()
+            if is_terminal and (spare_time := machine.spare_time):
+                self._pause(spare_time)
             deadline = machine.deadline
             timeout = None if deadline is None else max(0.0, deadline - clock())
             data = port.read(timeout, self._wake_reader)

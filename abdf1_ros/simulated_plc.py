@@ -106,6 +106,7 @@ class Sending:
     def __init__(self, command: Packet, report: Callable[[str], None]) -> None:
         self.command = command
         self.sent = False
+        self.reply_size = 0
         self._report = report
 
     def reply(self, packet: Packet) -> None:

@@ -42,7 +42,7 @@ from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.network import BAUD_RATES, Network
+from abdf1_ros.driver.network import BAUD_RATES, make_network, Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.lines import Line, PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.numerals import decimal_number, whole_number
@@ -259,10 +259,17 @@ def _make_line(options: argparse.Namespace) -> Line:
         if options.tcp is not None:
             return TcpLine(*_host_and_port(options.tcp))
         if options.port is not None:
-            return SerialLine(options.port, Network(baud=options.baud))
+            return SerialLine(options.port, _network(options))
     except OSError as error:
         raise OSError(reason_of(options.port or f'--tcp "{options.tcp}"', error)) from None
     return PtyLine(options.pty)
+
+
+def _network(options: argparse.Namespace) -> Network:
+    """Return how the port is set; ConfigurationError for a URL that no port can have."""
+    network = Network(baud=options.baud)
+    return make_network({'com_port': (options.port, '--port')}, network) \
+        if '://' in options.port else network
 
 
 def _host_and_port(text: str) -> tuple[str, int]:

@@ -162,11 +162,11 @@ def test_missing_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
                                              capsys: pytest.CaptureFixture[str]) -> None:
-    row = '"a\x1b[2J\nerror: x",Read,N7:0,5,PLC5,2,10'
+    row = '"a\x1b[2J\u2028error: x",Read,N7:0,5,PLC5,2,10'
     assert check(files, GOOD_NET, (row,)) == 0
     out = capsys.readouterr().out
     assert '\x1b' not in out
-    assert '\nerror' not in out
+    assert '\u2028' not in out
 
 
 @pytest.mark.parametrize('option', ['--default-period', '--response-time'])

@@ -22,6 +22,7 @@ from abdf1_ros.errors import (
     ConfigurationError,
     FormatError,
     LinkError,
+    Place,
     PortLost,
     Problem,
     RemoteError,
@@ -66,17 +67,30 @@ def test_remote_error_keeps_the_codes() -> None:
     assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
 
 
+@pytest.mark.parametrize(('place', 'text'), [
+    (Place('net.csv', 2, 1, 'Station'), 'net.csv:2:1 (Station)'),
+    (Place('net.csv', 2, None, 'Station'), 'net.csv:2 (Station)'),
+    (Place('net.csv', 2, 1), 'net.csv:2:1'), (Place('net.csv', 2), 'net.csv:2'),
+    (Place('a (b):3'), 'a (b):3')])
+def test_place_in_words(place: Place, text: str) -> None:
+    assert str(place) == text
+    assert str(Problem(place, 'this')) == f'{text}: this'
+
+
 def test_problem_shows_place_number_and_advice() -> None:
-    problem = Problem('net.csv:2:1', 'write 0 to 254', Message.CRT_BAD_STATION_ID, ('x', 255))
+    place = Place('net.csv', 2, 1)
+    problem = Problem(place, 'write 0 to 254', Message.CRT_BAD_STATION_ID, ('x', 255))
     assert str(problem) == (
         'net.csv:2:1: 2552 CRT_BAD_STATION_ID: Invalid station number (x) must be less than '
         '255; write 0 to 254')
-    assert (problem.where, problem.text) == ('net.csv:2:1', 'write 0 to 254')
+    assert (problem.place, problem.text) == (place, 'write 0 to 254')
     assert problem.message is Message.CRT_BAD_STATION_ID
 
 
 def test_problem_without_number_shows_place_and_advice() -> None:
-    assert str(Problem('net.csv:2:9', 'write 9600')) == 'net.csv:2:9: write 9600'
+    problem = Problem('parameter net.baud', 'write 9600')
+    assert str(problem) == 'parameter net.baud: write 9600'
+    assert problem.place == Place('parameter net.baud')
 
 
 def test_problem_is_one_line_whatever_the_file_holds() -> None:

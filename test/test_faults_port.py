@@ -63,8 +63,8 @@ def test_port_is_busy(observer: Observer, tmp_path: Path) -> None:
     simulator = files.start_simulator()
     other = open_port(Network(com_port=str(files.port)))
     with rigged(observer, files, str(files.port), simulator) as rig:
-        rig.node.wait_for('[ERROR]', 'cannot open the port: Could not exclusively lock port')
-        rig.status('link', ERROR, 'cannot open the port: Could not exclusively lock port')
+        rig.node.wait_for('[ERROR]', 'cannot open the port: another program has it open')
+        rig.status('link', ERROR, 'cannot open the port: another program has it open')
         assert rig.write(4.0) == REFUSED
         assert not rig.speeds
         other.close()

@@ -94,7 +94,7 @@ def test_slave_is_killed_and_returns(line: Line) -> None:
 
 
 @pytest.mark.parametrize('way, result', [
-    ('to_node', TOO_OLD), ('to_plc', UNKNOWN + NO_REPLY)], ids=['not-to-slave', 'not-to-master'])
+    ('to_node', TOO_OLD), ('to_plc', UNKNOWN + '2519 ')], ids=['not-to-slave', 'not-to-master'])
 def test_only_one_direction_works(line: Line, way: str, result: str) -> None:
     setattr(line.box, way, False)
     lose_slave(line)

@@ -30,6 +30,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.port import PortState
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
+from rclpy.node import Node
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt8MultiArray
 from support.ros import (
     details,
@@ -328,7 +329,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
 
 def test_tag_cannot_forge_lines_or_statuses(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
-    tag, shown = 'lamp\n[FATAL] all is lost\x1b[2J', r'lamp\n[FATAL] all is lost\x1b[2J'
+    tag, shown = 'lamp\x0b[FATAL] all is lost\x1b[2J', r'lamp\x0b[FATAL] all is lost\x1b[2J'
     bench = make_bench(f'"{tag}",ReadWrite,N99:0,1,PLC5,1,recipe')
     status = until_status(bench.diagnostics, 'mappings', ERROR)
     assert shown in details(status)
@@ -417,6 +418,23 @@ def test_argument_outside_of_ros_arguments(
         main(['node', *arguments])
     assert ending.value.code == 2
     assert 'parameters follow --ros-args' in capsys.readouterr().err
+
+
+def test_namesake_is_told_and_forgotten(
+        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.node_diagnostics._LOOKS_FOR_NAMESAKES', 1)
+    bench = make_bench(SPEED)
+    until_status(bench.diagnostics, 'link', OK)
+    namesake = Node('abdf1', context=observer.context, use_global_arguments=False)
+    status = until_status(bench.diagnostics, 'link', WARN)
+    assert status.message.endswith('; another node is called abdf1 too')
+    namesake.destroy_node()
+    bench.diagnostics.clear()
+    until_status(bench.diagnostics, 'link', OK)
+    told = ''.join(capfd.readouterr())
+    assert '[abdf1]: another node is called /abdf1 too' in told
+    assert 'no other node is called /abdf1 any more' in told
 
 
 def test_map_without_a_row_is_told(

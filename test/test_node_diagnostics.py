@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 import time
@@ -32,7 +32,7 @@ from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.driver.values import Values
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.node_diagnostics import Diagnostics, WriteLog
+from abdf1_ros.node_diagnostics import Diagnostics, NamesakeWatch, WriteLog
 from abdf1_ros.port import LinkThread, PortState
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -148,6 +148,31 @@ def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
     bench.driver.stations.heard(1, NOW)
     bench.driver.stations.heard(2, NOW)
     assert bench.says('link')[0] == OK
+
+
+def test_link_of_a_node_with_a_namesake(bench: Bench) -> None:
+    bench.diagnostics.has_namesake = True
+    assert bench.says('link') == (WARN, 'WARN: port open, 0 of 2 stations have answered; '
+                                        'another node is called line_a too')
+    bench.set_port(False, 'gone')
+    assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called line_a too')
+
+
+def changes_of(counts: Sequence[int]) -> list[tuple[int, bool]]:
+    """Return when a watch that counts these nodes, one a second, changes its mind."""
+    rest = iter(counts)
+    watch = NamesakeWatch(lambda: next(rest))
+    return [(now, watch.has_found) for now in range(len(counts))
+            if any([watch.look(now), watch.look(now + 0.9)])]
+
+
+def test_namesake_is_found_when_it_stays() -> None:
+    assert changes_of([1] * 5 + [2] * 40 + [1] * 5) == [(34, True), (45, False)]
+    assert changes_of([3] * 30) == [(29, True)]
+
+
+def test_earlier_run_that_was_killed_is_no_namesake() -> None:
+    assert changes_of([2] * 25 + [1] + [2] * 25 + [0] + [2] * 29) == []
 
 
 def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:
@@ -342,6 +367,7 @@ OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
     (Outcome.REFUSED, {'refused': '1'}),
     (Outcome.NOT_SENT, {'accepted': '1', 'failed': '1'}),
     (Outcome.FAILED, {'accepted': '1', 'failed': '1'}),
+    (Outcome.PARTLY, {'accepted': '1', 'failed': '1'}),
     (Outcome.UNKNOWN, {'accepted': '1', 'unknown': '1'})]
 
 

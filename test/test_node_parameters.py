@@ -174,6 +174,8 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
     ('port', 'ttyUSB0', 'Com_Port = "ttyUSB0" should be a number from 1, a device path such as '
      '/dev/ttyUSB0, or a URL such as socket://host:port'),
+    ('port', 'sokket://plc:4001', 'Com_Port = "sokket://plc:4001" should be a number from 1, a '
+     'device path such as /dev/ttyUSB0, or a URL such as socket://host:port'),
     ('net.station', 255,
      '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
      'Station = "255" should be a whole number from 0 to 254'),
@@ -243,8 +245,21 @@ def test_mappings_can_be_kept_out_of_the_parameters(
 
 def test_mappings_are_in_their_file_alone(make_node: Nodes, files: dict[str, str]) -> None:
     node = make_node(files | {'map.recipe.max': '5'})
-    assert configure(node).mappings[0].maximum == 999
+    configuration = configure(node)
+    assert configuration.mappings[0].maximum == 999
     assert node.get_parameter('map.recipe.max').value == '999'
+    assert configuration.ignored == ['map.recipe.max']
+
+
+@pytest.mark.parametrize('is_exposed', [True, False])
+def test_overrides_of_the_map_are_ignored_unless_they_repeat_it(
+        make_node: Nodes, files: dict[str, str], is_exposed: bool) -> None:
+    given = {'map.line.door.address': 'I:017/12', 'map.line.door.station': 1,  # of a dump
+             'map.line.door.length': 2, 'map.recipe.maximum': '999', 'map.gate.max': '',
+             'map.': 1, 'mapper.rate': 3}
+    node = make_node({**files, **given, 'expose_map_parameters': is_exposed})
+    assert configure(node).ignored == [
+        'map.', 'map.gate.max', 'map.line.door.length', 'map.recipe.maximum']
 
 
 def test_parameter_file(make_node: Nodes, files: dict[str, str], tmp_path: Path) -> None:

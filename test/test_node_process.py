@@ -81,12 +81,13 @@ def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> No
         'net.handshake:=Yes', 'net.com_port:=99', 'stale_after:=5', 'diagnostics_period:=2',
         'map.recipe.max:=5')
     with Process('node', *arguments, '-r', '__node:=overrides') as node:
-        node.wait_for('[ERROR] ', '/dev/ttyS98: cannot open the port: ')
+        node.wait_for('[ERROR] ', '/dev/ttyS98: cannot open the port: No such file or directory')
         baud, period, stale_after, limit = get_parameters(
             observer, 'net.baud', 'diagnostics_period', 'stale_after', 'map.recipe.max',
             node='/overrides')
         assert (baud, period, stale_after) == (19200, 2, 5)
         assert limit == '999'  # the map is in its file alone
+        node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
         (endpoint,) = observer.node.get_publishers_info_by_topic('/overrides/read/heartbeat')
         assert endpoint.qos_profile.deadline.nanoseconds == pytest.approx(
             1e9 * stale_time_of_the_heartbeat(files, 19200, stale_after), rel=1e-6)
@@ -242,6 +243,16 @@ def test_malformed_arguments_end_with_one_clear_line() -> None:
     assert "Couldn't parse parameter override rule: '-p port'." in line
 
 
+@pytest.mark.parametrize('directory', ['/proc/none', '/proc'])
+def test_unusable_log_directory_is_named(
+        directory: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('ROS_LOG_DIR', directory)
+    (line,) = refused_start()
+    assert directory in line
+    assert line.endswith('; set ROS_LOG_DIR to a directory that this user may write to')
+    assert 'arguments' not in line
+
+
 def test_connects_when_the_port_appears(observer: Observer, files: Files) -> None:
     diagnostics = observer.diagnostics(files.port)
     with Process('node', *files.args()) as node:
@@ -267,7 +278,7 @@ def test_second_node_waits_for_the_port_and_takes_over(
             Process('node', *files.args(), '-r', '__node:=first') as first:
         first.wait_for(f'{files.port}: open')
         with Process('node', *files.args(), '-r', '__node:=second') as second:
-            second.wait_for('[ERROR]', 'cannot open the port: Could not exclusively lock port')
+            second.wait_for('[ERROR]', 'cannot open the port: another program has it open')
             assert not speeds
             first.end(signal.SIGTERM)
             assert values_in(speeds.first()) == [1200, -800]

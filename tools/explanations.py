@@ -169,7 +169,8 @@ COUNTERS: dict[str, str] = {
     'error_messages_received': "PLCs refuse commands: the mappings' status names tag and STS.",
     'nak_retries': 'A few a day are noise. A steady share of CNT_MSG_PACKETS_SENT is a bad '
                    'line or a short Timeout.',
-    'nak_limit_exceeded': 'As often as a station went silent (2519).',
+    'nak_limit_exceeded': 'As often as a station went silent (2519). Mode Slave: the master never '
+                          'acknowledged.',
     'enq_retries': 'As CNT_NAK_RETRIES, for polls; in full duplex for lost ACKs.',
     'enq_limit_exceeded': 'As often as a station went silent at a poll (2520).',
     'command_timeouts': 'See 2508.',
@@ -190,14 +191,14 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.WRITTEN: 'The PLC has confirmed it. Bits of an SLC without masked write (5/01, 5/02, '
                      'ML1000) are written `by reading the word and writing it back`, in three '
                      'commands; what the program changes in that word in between is lost.',
-    Outcome.BROADCAST: 'Station 255.',
+    Outcome.BROADCAST: 'Station 255. It counts as accepted, and as nothing else.',
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
                      'open: nothing was sent. The reason stands behind it.',
     Outcome.NOT_SENT: 'Station inactive, or it waited longer than `write_timeout`.',
     Outcome.FAILED: "The PLC's own error stands behind it, as STS and in words.",
-    Outcome.PARTLY: 'A write of several packets failed between them. It is read back, as the '
-                    'next one is.',
+    Outcome.PARTLY: 'A write of several packets failed between them. Where a reply is missing, it '
+                    'is read back, as the next one is.',
     Outcome.UNKNOWN: 'Sent, but no reply came, or a node on the way has lost it. Behind it stands '
                      'what the next read has found, within `write_timeout`: `read back: the PLC '
                      'holds the value`, `... another value`, or why nothing was read.',

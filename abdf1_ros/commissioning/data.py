@@ -25,7 +25,7 @@ import re
 from abdf1_ros.commissioning.session import Session
 from abdf1_ros.driver.csv_table import Row
 from abdf1_ros.driver.forecast import line_model
-from abdf1_ros.driver.map_row import read_mapping
+from abdf1_ros.driver.map_row import Fault, RowReader
 from abdf1_ros.driver.mapping import Command, Mapping
 from abdf1_ros.driver.planner import Planner
 from abdf1_ros.driver.points import Outcome, Write
@@ -56,26 +56,27 @@ def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Map
     Raises ConfigurationError with every fault, each by the argument that it is in.
     """
     row = Row('', item, item, {'Tag': f'address_{item}', 'Address': address, **cells}, {})
-    try:
-        return read_mapping(row)
-    except ConfigurationError as error:
-        raise ConfigurationError(
-            [_in_arguments(problem, row) for problem in error.problems]) from None
+    reader = RowReader(row)
+    mapping = reader.read()
+    if mapping is None:
+        raise ConfigurationError([_in_arguments(fault, row) for fault in reader.faults])
+    return mapping
 
 
-def _in_arguments(problem: Problem, row: Row) -> Problem:
-    """Return a problem of a row in the words of the command line."""
-    column = next((name for name in _ARGUMENTS if row.where(name) == problem.where), '')
-    argument, text = _ARGUMENTS.get(column, 'options'), problem.text
-    text = text.removeprefix(f'Item: {row.item}, ').removeprefix(f'{column} = ')
-    text = text.replace('leave the cell empty', f'leave {argument} out')
-    if column == 'Length':
-        if problem.message is not None:  # the numbered text alone says what is too long
-            text = f'{row.get(column)} elements do not fit at {row.get("Address")}; {text}'
+def _in_arguments(fault: Fault, row: Row) -> Problem:
+    """Return a fault of a row in the words of the command line."""
+    argument, text = _ARGUMENTS.get(fault.column, fault.column), fault.text
+    if fault.value is not None:
+        text = f'"{fault.value}" {text}'
+    if fault.is_superfluous:
+        text += f'; leave {argument} out'
+    if fault.column == 'Length':
+        if fault.message is not None:  # the numbered text alone says what is too long
+            text = f'{row.get("Length")} elements do not fit at {row.get("Address")}; {text}'
         if row.get('Command') != Command.READ.value:  # there it is how many values are given
             argument = 'VALUE'
-    elif column == 'Address':
-        argument += f' "{row.get(column)}"'
+    elif fault.column == 'Address':
+        argument += f' "{row.get("Address")}"'
     return Problem(argument, text)
 
 

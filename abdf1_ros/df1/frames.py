@@ -53,6 +53,8 @@ class Code(IntEnum):
     NAK = 0x15
 
 
+_CODES = frozenset(Code)
+
 DLE = bytes((Code.DLE,))
 STX = bytes((Code.DLE, Code.STX))
 ETX = bytes((Code.DLE, Code.ETX))
@@ -108,9 +110,14 @@ _CONTROLS = {pair: Control(Code(pair[1])) for pair in (ACK, NAK, EOT, ENQ)}
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A pair DLE x that is no symbol of the protocol; ``byte`` is x."""
+    """A pair DLE x that is no symbol, or none that means anything here; ``byte`` is x."""
 
     byte: int
+
+    @property
+    def is_misplaced(self) -> bool:
+        """Tell whether it is a symbol elsewhere (S0, message 2514)."""
+        return self.byte in _CODES
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +188,11 @@ class FrameDecoder:
         self.noise = 0
         self.in_message = False
         self.begun = 0
+
+    @property
+    def link_data(self) -> bytearray:
+        """Return the link data of the message that is coming in, as far as it has come."""
+        return self._data
 
     def reset(self) -> None:
         """Forget everything heard so far."""

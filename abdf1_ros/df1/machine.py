@@ -26,7 +26,7 @@ driving loop (a thread with a port, or a test with a virtual line) does this::
     machine.start(now)
     while ...:
         port.write(machine.data_to_send())
-        data = port.read(until=machine.deadline)
+        data = port.read(until=machine.deadline)  # but not before machine.spare_time is over
         machine.receive_data(data, now) if data else machine.handle_timeout(now)
 """
 
@@ -40,6 +40,7 @@ from typing import NamedTuple
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, FrameDecoder, Symbol
+from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 
 
 class Step(NamedTuple):
@@ -59,6 +60,9 @@ class Step(NamedTuple):
 
 # What an operating system or a device server may hold bytes of a frame back (s).
 _HELD_BACK = 0.1
+
+# Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
+_LAST_CHARACTERS = 16
 
 KEEP = -1.0
 LISTEN_ON = Step(b'', KEEP)
@@ -90,6 +94,9 @@ class Machine:
     A frame after which nothing is waited for, such as the ACK of a reply, is handed to
     ``send_at_once`` where that is set, so that it is on the line while the reply is made use of.
     All others come from ``data_to_send``.
+
+    ``reply_size`` is the bytes behind the header of the reply that is waited for, if it tells no
+    error; 0 where that is not known.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -100,6 +107,7 @@ class Machine:
         self.now = 0.0
         self.deadline: float | None = None
         self.send_at_once: Callable[[bytes], None] | None = None
+        self.reply_size = 0
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
@@ -120,6 +128,21 @@ class Machine:
     def char_time(self) -> float:
         """Return the seconds that a character takes on the line."""
         return self._timing.char_time
+
+    @property
+    def spare_time(self) -> float:
+        """
+        Return for how long (s) nothing that comes can matter: a reply is coming in, and is long.
+
+        To read it in one go spares most of the wakings that its bytes cost, a few at a time.
+        """
+        if not self.reply_size or not self.decoder.in_message:
+            return 0.0
+        data = self.decoder.link_data
+        if not begins_good_reply(data):
+            return 0.0
+        missing = HEADER_SIZE + self.reply_size - len(data) - _LAST_CHARACTERS
+        return max(missing, 0) * self._timing.char_time
 
     def start(self, now: float) -> None:
         """Begin the procedure from its beginning."""

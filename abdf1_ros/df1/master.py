@@ -31,6 +31,8 @@ A transaction therefore ends within (NAK_Retries + 1) x Timeout for delivery, Cm
 polling, and (ENQ_Retries + 1) x Timeout for the last poll. The retries of a phase are never
 cut short by Cmd_Timeout: with S0's defaults (both 1000 ms) no retry would ever happen. Nor is
 it up as long as messages come that were queued before the reply, but for a few of them only.
+
+Messages between slaves that are to be passed on take turns with transactions of our own.
 """
 
 from __future__ import annotations
@@ -68,20 +70,20 @@ class HalfDuplexMaster:
         """Carry out the tasks of ``source``, one after the other, for ever."""
         self._line.forget_forwards()
         while True:
+            # In turns: slaves that never stop talking must not keep us from asking.
             if self._line.has_forwards():
                 yield from self._forward()
-                continue
             now = self._machine.now
             task = source.next_task(now)
-            if task is None:
+            if task is not None:
+                yield from self._carry_out(task)
+            elif not self._line.has_forwards():
                 due = source.next_due()
                 yield Step(None, None if due is None else max(due - now, 0.0))
-            else:
-                yield from self._carry_out(task)
 
     def _carry_out(self, task: Task) -> Talk:
         try:
-            reply = yield from self.exchange(task.command)
+            reply = yield from self.exchange(task.command, reply_size=task.reply_size)
         except (StationInactive, CommandTimeout, WrongCommandCode) as error:
             task.sent = self.command_sent
             task.fail(error)
@@ -91,15 +93,15 @@ class HalfDuplexMaster:
         else:
             task.reply(reply)
 
-    def exchange(self, command: Packet,
-                 station: int | None = None) -> Generator[Step, Symbol | None, Packet]:
+    def exchange(self, command: Packet, station: int | None = None,
+                 reply_size: int = 0) -> Generator[Step, Symbol | None, Packet]:
         """
         Send ``command`` and return the reply to it.
 
         ``station`` is the address on this line; it differs from the command's DST only behind
-        a gateway (M 3-7). While this runs and after it, ``command_sent`` tells whether the
-        command has been on the line: without a reply its outcome is then unknown. A broadcast
-        has no reply; the one returned for it is our own.
+        a gateway (M 3-7). ``reply_size`` is that of a task. While this runs and after it,
+        ``command_sent`` tells whether the command has been on the line: without a reply its
+        outcome is then unknown. A broadcast has no reply; the one returned for it is our own.
 
         Raises StationInactive, CommandTimeout or WrongCommandCode.
         """
@@ -113,10 +115,12 @@ class HalfDuplexMaster:
         if number == BROADCAST:
             return command.reply()
         try:
-            return (yield from self._collect(number, command, started))
+            reply = yield from self._collect(number, command, started, reply_size)
         except CommandTimeout:
             yield from self._give_up(number)
             raise
+        self._line.check_reply(number, reply, command)
+        return reply
 
     def _forward(self) -> Talk:
         """Pass one message on; poll for the reply when it is a command (M 3-8)."""
@@ -125,21 +129,20 @@ class HalfDuplexMaster:
             return
         try:
             reply = yield from self._collect(packet.dst, packet, self._machine.now)
-        except (StationInactive, CommandTimeout, WrongCommandCode):
+        except (StationInactive, CommandTimeout):
             return  # the sender has a time limit of its own
         self._line.take_unwanted(packet.dst, reply)
 
-    def _collect(self, number: int, command: Packet,
-                 started: float) -> Generator[Step, Symbol | None, Packet]:
+    def _collect(self, number: int, command: Packet, started: float,
+                 reply_size: int = 0) -> Generator[Step, Symbol | None, Packet]:
         """Poll until the reply to ``command`` is here (S0, "Network Reads"; M 3-13..3-15)."""
         pause, passed_over = 0.0, 0
         while True:
-            answer = yield from self._line.poll_with_retries(number, pause)
+            answer = yield from self._line.poll_with_retries(number, pause, reply_size)
             packet = None
             if isinstance(answer, Frame):
                 packet = yield from self._line.receive(number, answer)
             if packet is not None and packet.answers(command):
-                self._line.check_reply(number, packet, command)
                 return packet
             if packet is not None:
                 self._line.take_unwanted(number, packet)

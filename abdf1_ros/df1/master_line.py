@@ -163,11 +163,15 @@ class MasterLine:
             if packet is not None:
                 self.take_unwanted(number, packet)
 
-    def poll_with_retries(self, number: int,
-                          pause: float) -> Generator[Step, Symbol | None, Control | Frame]:
-        """Poll until EOT or a good message; a station that gives neither becomes inactive."""
+    def poll_with_retries(self, number: int, pause: float, reply_size: int = 0
+                          ) -> Generator[Step, Symbol | None, Control | Frame]:
+        """
+        Poll until EOT or a good message; a station that gives neither becomes inactive.
+
+        ``reply_size`` is that of the task whose reply is expected.
+        """
         for retry in range(1, self.settings.enq_retries + 2):
-            answer = yield from self.poll(number, pause)
+            answer = yield from self.poll(number, pause, reply_size)
             if is_good(answer):
                 return answer
             pause = 0.0
@@ -186,9 +190,10 @@ class MasterLine:
         self.note(Message.NTC_EOT_STX_EXPECTED, self._last_code, station=number)
         return Message.NTC_EOT_STX_EXPECTED
 
-    def poll(self, number: int,
-              pause: float = 0.0) -> Generator[Step, Symbol | None, Symbol | None]:
+    def poll(self, number: int, pause: float = 0.0,
+             reply_size: int = 0) -> Generator[Step, Symbol | None, Symbol | None]:
         """Poll once; return EOT, a frame good or bad, or None for silence."""
+        self.machine.reply_size = reply_size
         self.counters.polls_sent += 1
         answer = yield from self._ask(frames.poll_frame(number), number, _POLL_ANSWERS, pause)
         if is_good(answer):
@@ -215,7 +220,8 @@ class MasterLine:
                     return symbol
             elif isinstance(symbol, Unknown):
                 self._last_code = symbol.byte
-                self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
+                if not symbol.is_misplaced:
+                    self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
             elif isinstance(symbol, Frame) and symbol.station is None:
                 self._last_code = Code.STX
                 return symbol
@@ -240,8 +246,8 @@ class MasterLine:
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
         station = self.stations[number]
-        is_command_to_forward = not packet.is_reply and self._is_to_forward(packet)
-        if is_command_to_forward and self.is_full and not station.repeats(packet):
+        is_to_keep = not packet.is_reply and self.settings.accept_slave_messages
+        if is_to_keep and self.is_full and not station.repeats(packet):
             return None  # not acknowledged: the slave keeps it; replies make room and go on
         self.counters.acks_sent += 1
         yield Step(frames.ACK, 0)

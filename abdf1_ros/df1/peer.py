@@ -189,7 +189,9 @@ class FullDuplexPeer:
             if response is Code.NAK:
                 naks += 1
                 self._note(Message.NTC_RCVD_NAK_SYMBOL, station=station)
-                if is_probe or naks > self._settings.nak_retries:
+                if is_probe:
+                    break
+                if naks > self._settings.nak_retries:
                     self._counters.nak_limit_exceeded += 1
                     self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries,
                                station=station)
@@ -201,7 +203,9 @@ class FullDuplexPeer:
                 sending = message
             else:
                 enqs += 1
-                if is_probe or enqs > self._settings.enq_retries:
+                if is_probe:
+                    break
+                if enqs > self._settings.enq_retries:
                     self._counters.enq_limit_exceeded += 1
                     self._note(Message.NTC_ENQ_LIMIT_EXCEEDED, self._settings.enq_retries,
                                station=station)
@@ -220,6 +224,7 @@ class FullDuplexPeer:
     def _response(self, sending: bytes,
                   is_answered: Callable[[], bool]) -> Generator[Step, Symbol | None, Code | None]:
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
+        self._machine.decoder.last_byte = 0
         symbol = yield Step(sending, self._timeout)
         while symbol is not None:
             if symbol in (Control(Code.ACK), Control(Code.NAK)):
@@ -255,7 +260,7 @@ class FullDuplexPeer:
             self._count_response(symbol.code)
             return b''
         self._last_response = frames.NAK
-        if isinstance(symbol, Unknown):
+        if isinstance(symbol, Unknown) and not symbol.is_misplaced:
             self._note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=None)
         return self._respond(frames.NAK) if is_aborted else b''
 

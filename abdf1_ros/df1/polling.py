@@ -163,9 +163,10 @@ class StandardPollingMaster:
         self._listed = frozenset((*polling.priority, *polling.normal))
         self._line.polled = self._listed
         stations.add(self._listed - {settings.station})
-        # Stations that were passed a command and not polled since. There is no second one for
-        # them, or several senders would soon fill a sink that a poll empties by one message.
-        self._given: set[int] = set()
+        # Stations that were passed a command and have not replied, and until when (clock value in
+        # s) they may. There is no second one for them, or several senders would soon fill a sink
+        # that a poll empties by one message, and our own commands would find no room in it.
+        self._given: dict[int, float] = {}
         self._next_inactive_poll = 0.0
         self._last_probed: _PollList | None = None
 
@@ -252,7 +253,9 @@ class StandardPollingMaster:
         begun = self._machine.now
         while self._stations[number].active:
             try:
-                answer = yield from self._line.poll_with_retries(number, 0.0)
+                entry = self._outstanding.get(number)
+                answer = yield from self._line.poll_with_retries(
+                    number, 0.0, entry.task.reply_size if entry else 0)
             except StationInactive as error:
                 self._end(number, error)
                 return
@@ -270,10 +273,11 @@ class StandardPollingMaster:
 
     def _answered(self, number: int, answer: Control | Frame) -> Talk:
         """Take what a station has answered to a poll."""
-        self._given.discard(number)
         packet = None
         if isinstance(answer, Frame):
             packet = yield from self._line.receive(number, answer)
+        if packet is not None and packet.is_reply and packet.dst != self._settings.station:
+            self._given.pop(number, None)
         entry = self._outstanding.get(number)
         if packet is not None and entry is not None and packet.answers(entry.task.command):
             del self._outstanding[number]
@@ -306,11 +310,12 @@ class StandardPollingMaster:
 
     def _send_commands(self, source: TaskSource) -> Talk:
         """Send messages to be passed on, and commands to stations that owe us no reply."""
-        self._given = {number for number in self._given if self._is_active(number)}
+        self._given = {number: until for number, until in self._given.items()
+                       if self._is_active(number) and self._machine.now < until}
         while self._line.has_forwards(self._given):
             packet = yield from self._line.forward(self._given)
             if packet is not None and not packet.is_reply and packet.dst in self._listed:
-                self._given.add(packet.dst)
+                self._given[packet.dst] = self._machine.now + self._settings.cmd_timeout
         for number in list(self._outstanding):
             if not self._stations[number].active:  # it did not take what was passed on
                 self._end(number, StationInactive(number))

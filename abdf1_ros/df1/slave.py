@@ -31,9 +31,11 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
-from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol
+from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.errors import LineReset, LinkError, NeverTaken
+from abdf1_ros.messages import Event, Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +68,8 @@ class Initiator(Protocol):
     def delivered(self, command: Packet) -> None:
         """Take note that the master has acknowledged a command."""
 
-    def undelivered(self, command: Packet) -> None:
-        """Take note that a command was given up, or dropped by the reset of the line."""
+    def undelivered(self, command: Packet, error: LinkError) -> None:
+        """Take note that a command was given up, and why."""
 
     def replied(self, reply: Packet) -> None:
         """Take a reply that the master has passed on to us."""
@@ -87,13 +89,15 @@ class HalfDuplexSlave:
 
     ``serve`` executes a command and returns its reply. It is called after the command has been
     accepted, once for each command, never for a repetition. ``initiator`` has commands of its
-    own to send, if there are any.
+    own to send, if there are any; ``report`` gets what is wrong with messages for us.
     """
 
     def __init__(self, settings: SlaveSettings, serve: Callable[[Packet], Packet],
-                 counters: Counters | None = None, initiator: Initiator | None = None) -> None:
+                 counters: Counters | None = None, initiator: Initiator | None = None,
+                 report: Callable[[Event], None] = lambda event: None) -> None:
         self.counters = counters or Counters()
         self._initiator = initiator
+        self._report = report
         self._settings = settings
         self._serve = serve
         self._queue: deque[Packet] = deque()
@@ -113,12 +117,21 @@ class HalfDuplexSlave:
         if symbol == Control(Code.ACK) and just_sent:
             # An ACK names no station: it is ours only straight after our own message.
             self.counters.acks_received += 1
-            self._release(is_delivered=True)
+            self._release()
         elif symbol == Control(Code.NAK):
             self.counters.naks_received += 1
-            self._release(is_delivered=False)
+            self._report(Event(Message.NTC_RCVD_NAK_SYMBOL))
+            self._release(LineReset())
             self._queue.clear()  # the reset of the whole line (M 2-7, 3-11)
+        elif isinstance(symbol, Unknown) and not symbol.is_misplaced:
+            self._report(Event(Message.NTC_INVALID_SYMBOL, (symbol.byte,)))
         return b''
+
+    def reset(self) -> None:
+        """Begin again, with nothing to send and nothing heard."""
+        self._held, self._last_key = None, None
+        self._just_sent, self._sent_reply = False, True
+        self._queue.clear()
 
     def withdraw(self) -> None:
         """Do not send a command of our own again; whoever calls this has ended it."""
@@ -131,27 +144,28 @@ class HalfDuplexSlave:
         return held is not None and frame.station is None and frame.fault is None \
             and frame.data == held.packet.encode()
 
-    def _release(self, is_delivered: bool) -> None:
+    def _release(self, error: LinkError | None = None) -> None:
         """Let go of the held message; a command's sender is told how it went (KF2 4-31)."""
         held, self._held = self._held, None
         if held is None or held.packet.is_reply or self._initiator is None:
             return
-        if is_delivered:
+        if error is None:
             self._initiator.delivered(held.packet)
         else:
-            self._initiator.undelivered(held.packet)
+            self._initiator.undelivered(held.packet, error)
 
     def _received(self, frame: Frame) -> bytes:
         """Take a master's frame (KF2 4-31)."""
         if frame.station not in (self._settings.station, BROADCAST):
             return b''
         if frame.fault is not None:
-            count_fault(frame, self._settings.checksum, self.counters)
+            self._report(count_fault(frame, self._settings.checksum, self.counters))
             return b''
         packet = Packet.decode(frame.data)
         self.counters.messages_received += 1
         if packet.duplicate_key == self._last_key and self._settings.duplicate_detection:
             self.counters.duplicate_messages += 1
+            self._report(Event(Message.NTC_DUPLICATE_MSG_RCVD, (packet.src,), packet.src))
             return self._ack(frame)
         wants_reply = frame.station != BROADCAST and not packet.is_reply
         if wants_reply and len(self._queue) >= self._settings.queue_size:
@@ -185,7 +199,8 @@ class HalfDuplexSlave:
         self.counters.polls_received += 1
         if self._held is not None and self._held.sent > self._settings.retries:
             self.counters.nak_limit_exceeded += 1
-            self._release(is_delivered=False)
+            self._report(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (self._settings.retries,)))
+            self._release(NeverTaken(self._settings.retries))
         if self._initiator is not None:
             self._initiator.polled()
         if self._held is None:

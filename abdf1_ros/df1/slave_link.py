@@ -31,7 +31,7 @@ from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandTimeout, WrongCommandCode
+from abdf1_ros.errors import CommandTimeout, LinkError, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
 # How often (s) a slave looks what has become overdue.
@@ -66,22 +66,19 @@ class SlaveLink:
                  serve: Callable[[Packet], Packet], *, cmd_timeout: float, poll_timeout: float,
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self._machine = machine
-        self._settings = settings
         self._stations = stations
-        self._serve = serve
         self._cmd_timeout = cmd_timeout
         self._poll_timeout = poll_timeout
         self._report = report
-        self._slave: HalfDuplexSlave | None = None
+        self._slave = HalfDuplexSlave(settings, serve, machine.counters, self, report)
         self._source: TaskSource | None = None
         self._outstanding: _Outstanding | None = None
         self.last_poll = 0.0
 
     def run(self, source: TaskSource) -> Procedure:
         """Answer the master for ever."""
-        slave = HalfDuplexSlave(self._settings, self._serve, self._machine.counters, self)
-        self._slave, self._source = slave, source
-        self._outstanding = None
+        self._slave.reset()
+        self._source, self._outstanding = source, None
         self.last_poll = self._machine.now
         next_look = self._machine.now + _TICK
         while True:
@@ -91,7 +88,7 @@ class SlaveLink:
                 self._look_after(source)
                 next_look = self._machine.now + _TICK
                 continue
-            answer = slave.handle(symbol)
+            answer = self._slave.handle(symbol)
             if answer:
                 yield Step(answer, 0)
 
@@ -126,11 +123,11 @@ class SlaveLink:
         entry.is_delivered = True
         entry.deadline = self._machine.now + self._cmd_timeout
 
-    def undelivered(self, command: Packet) -> None:
+    def undelivered(self, command: Packet, error: LinkError) -> None:
         """Fail the command that the master did not take."""
-        self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.retries,
-                   station=command.dst)
-        self._fail()
+        entry, self._outstanding = self._outstanding, None
+        if entry is not None:
+            entry.task.fail(error)
 
     def replied(self, reply: Packet) -> None:
         """Take a reply; one that fits nothing is stale."""
@@ -140,7 +137,8 @@ class SlaveLink:
             self._report(wrong_message(reply, reply.src))
             return
         self._outstanding = None
-        self._stations.heard(reply.src, self._machine.now)
+        if reply.sts == 0 or reply.sts & 0xF0:  # else a node on the way has sent it (M 8-2)
+            self._stations.heard(reply.src, self._machine.now)
         try:
             check_reply(reply, entry.task.command, self._stations[reply.src],
                         self._machine.counters, self._report)
@@ -156,7 +154,7 @@ class SlaveLink:
         entry = self._outstanding
         is_overdue = entry is not None and now >= entry.deadline
         is_alone = 0 < self._poll_timeout <= now - self.last_poll
-        if (is_overdue or is_alone) and self._slave is not None:
+        if is_overdue or is_alone:
             self._slave.withdraw()
             self._fail()
         if not is_alone:
@@ -173,8 +171,5 @@ class SlaveLink:
             return
         number = entry.task.command.dst
         self._machine.counters.command_timeouts += 1
-        self._note(Message.ERR_COMMAND_TIMEOUT, station=number)
+        self._report(Event(Message.ERR_COMMAND_TIMEOUT, (), number))
         entry.task.fail(CommandTimeout())
-
-    def _note(self, message: Message, *args: int, station: int) -> None:
-        self._report(Event(message, args, station))

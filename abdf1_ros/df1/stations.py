@@ -94,6 +94,10 @@ class ActiveStationList:
         """Iterate over the stations by number."""
         return iter(self._stations.values())
 
+    def __contains__(self, number: object) -> bool:
+        """Tell whether a station is in the list."""
+        return number in self._stations
+
     def __getitem__(self, number: int) -> Station:
         """Return the record of a station (0-254), of the list or not."""
         station = self._stations.get(number)

@@ -28,11 +28,13 @@ class Task(Protocol):
     One command on its way, and whoever waits for its reply.
 
     The link sets ``sent`` when the command has been on the line: without a reply its outcome
-    is then unknown. It ends the command by calling ``reply`` or ``fail``, once.
+    is then unknown. It ends the command by calling ``reply`` or ``fail``, once. ``reply_size``
+    is the bytes behind the header of a good reply, 0 where that is not known.
     """
 
     command: Packet
     sent: bool
+    reply_size: int
 
     def reply(self, packet: Packet) -> None:
         """Take the reply."""

@@ -17,27 +17,38 @@ CSV files as spreadsheets write them.
 
 Accepted: UTF-8 with or without byte order mark, any line ends, comma, semicolon or tab between
 cells, quoted cells, blank lines, empty cells and columns at the end, column names in any
-letter case, spaces around values, and lines starting with # as comments.
+letter case, spaces around values, and lines starting with # as comments. A first line such as
+sep=; only tells a spreadsheet what stands between cells, and is left out.
+
+A cell ends on the line it begins on. No column needs more, and a quote that somebody forgot to
+close would otherwise take in the rows up to the next quote, and nobody would miss them.
 """
 
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import difflib
 import io
 from pathlib import Path
+import re
 
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.errors import ConfigurationError, Place, Problem
 
-_DELIMITERS = ',;\t'
-# A last line that no file has, as comments are taken out; only an open quote swallows it.
-_END = '#'
+_DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
+_BLANK = ''.join(_DELIMITERS) + ' \r\n'
+_SEPARATOR_LINE = re.compile(r'"?sep=\W*', re.IGNORECASE)
 
 # Far more than a file with a row for every word of a PLC has.
 _LARGEST = 10_000_000
+# csv.reader takes no more in one cell.
+_LONGEST_LINE = 131_072
+# The beginning of a cell is enough to find it.
+_SHOWN = 100
+# How much a wrong name is like the column that may be meant, from 0 to 1.
+_ALIKE = 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +65,18 @@ class Row:
     cells: dict[str, str]
     columns: dict[str, int]
 
-    def where(self, column: str) -> str:
-        """Return "file:line:cell (column)", cells counted from 1; no cell where there is none."""
-        cell = self.columns.get(column)
-        return f'{self.file}:{self.line}' + ('' if cell is None else f':{cell}') + f' ({column})'
+    def where(self, column: str) -> Place:
+        """Return the place of a cell, without its number where the file has no such column."""
+        return Place(self.file, self.line, self.columns.get(column), column)
 
     def get(self, column: str) -> str:
         """Return a cell, empty where the file has no such column."""
         return self.cells.get(column, '')
+
+
+def shown(cell: str) -> str:
+    """Return a cell as errors show it, a long one without its end."""
+    return cell if len(cell) <= _SHOWN else f'{cell[:_SHOWN]}...'
 
 
 def read_rows(path: str, known: Sequence[str]) -> list[Row]:
@@ -70,99 +85,121 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
 
     Raises ConfigurationError with every fault of the file as a whole.
     """
-    lines = _read_lines(path)
     try:
-        return _parse(path, lines, known)
-    except csv.Error as error:
-        raise ConfigurationError([Problem(path, f'not a CSV file: {error}')]) from None
-
-
-def _read_lines(path: str) -> list[str]:
-    try:
-        # A pipe into which nobody writes would hold us up for ever.
-        if Path(path).is_fifo():
-            raise ConfigurationError([Problem(path, 'is a pipe, not a file')])
-        with Path(path).open('rb') as file:
-            raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
-    except OSError as error:
-        raise ConfigurationError(
-            [Problem(path, f'cannot be read: {error.strerror or error}')]) from None
-    if len(raw) > _LARGEST:
-        raise ConfigurationError([Problem(
-            path, f'larger than {_LARGEST // 1_000_000} MB; is it a CSV file?')])
-    try:
-        text = raw.decode()
-    except UnicodeDecodeError as error:
-        before = raw[:error.start].replace(b'\r\n', b'\n').replace(b'\r', b'\n')
-        line = before.count(b'\n') + 1
-        column = len(before) - before.rfind(b'\n')
-        raise ConfigurationError([Problem(
-            f'{path}:{line}:{column}',
-            f'byte 0x{raw[error.start]:02X} is not UTF-8; save the file as "CSV UTF-8"')
-        ]) from None
-    return list(io.StringIO(text, newline=''))  # str.splitlines knows more ends than CSV
-
-
-def _parse(path: str, lines: list[str], known: Sequence[str]) -> list[Row]:
-    # Comments become blank lines, so that the reader's line numbers stay right.
-    content = ['\n' if line.lstrip().startswith('#') else line for line in lines]
-    header = next((line for line in content if line.strip(f'{_DELIMITERS} \r\n')), None)
-    if header is None:
-        raise ConfigurationError([Problem(
-            f'{path}:1', f'the file is empty; its first row names columns: {", ".join(known)}')])
-    delimiter = max(_DELIMITERS, key=header.count)
-    columns: dict[str, int] | None = None
+        (first, header), *others = _read_lines(path, known)
+        delimiter = max(_DELIMITERS, key=header.count)
+        names = _cells(Place(path, first), header, delimiter)
+    except Problem as problem:
+        raise ConfigurationError([problem]) from None
+    columns = _columns(Place(path, first), names, known)
     rows: list[Row] = []
     problems: list[Problem] = []
-    for line, cells in _records(path, content, delimiter):
-        if columns is None:
-            columns = _header(path, line, cells, known, problems)
+    for line, text in others:
+        place = Place(path, line)
+        try:
+            cells = _cells(place, text, delimiter)
+            _check_cells(place, cells, columns, delimiter)
+        except Problem as problem:
+            problems.append(problem)
             continue
-        row = Row(path, len(rows) + 1, line, {}, columns)
-        row.cells.update({name: cells[number - 1] for name, number in columns.items()
-                          if number <= len(cells)})
-        rows.append(row)
-        for number in range(1, len(cells) + 1):
-            if cells[number - 1] and number not in columns.values() and not problems:
-                problems.append(Problem(
-                    f'{path}:{line}:{number}', f'"{cells[number - 1]}" stands in no column; '
-                    'quote a cell that contains the delimiter'))
+        if any(cells):
+            content = {name: cells[number - 1] for name, number in columns.items()
+                       if number <= len(cells)}
+            rows.append(Row(path, len(rows) + 1, line, content, columns))
     if problems:
         raise ConfigurationError(problems)
     return rows
 
 
-def _records(path: str, lines: list[str],
-             delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the line each record begins on and its stripped cells, blank records left out."""
-    reader = csv.reader([*lines, _END], delimiter=delimiter, skipinitialspace=True)
-    line = 1
-    for record in reader:
-        if reader.line_num > len(lines) and record != [_END]:
-            raise ConfigurationError([Problem(
-                f'{path}:{line}', 'a quote in this row never ends')])
-        cells = [cell.strip() for cell in record]
-        if any(cells) and record != [_END]:
-            yield line, cells
-        line = reader.line_num + 1
+def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
+    """Return the lines that may be rows, the header at least, each with its number."""
+    # str.splitlines knows more ends than CSV.
+    lines = enumerate(io.StringIO(_read_text(path), newline=''), 1)
+    found = [(number, line) for number, line in lines
+             if line.strip(_BLANK) and not line.lstrip().startswith('#')
+             and not (number == 1 and _SEPARATOR_LINE.fullmatch(line))]
+    if not found:
+        raise Problem(Place(path, 1), 'the file is empty; its first row names columns: '
+                                      f'{", ".join(known)}')
+    return found
 
 
-def _header(path: str, line: int, cells: list[str], known: Sequence[str],
-            problems: list[Problem]) -> dict[str, int]:
-    """Return the cell number of each column, noting unknown and repeated names."""
+def _read_text(path: str) -> str:
+    try:
+        # A pipe into which nobody writes would hold us up for ever.
+        if Path(path).is_fifo():
+            raise Problem(path, 'is a pipe, not a file')
+        with Path(path).open('rb') as file:
+            raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
+    except OSError as error:
+        raise Problem(path, f'cannot be read: {error.strerror or error}') from None
+    if len(raw) > _LARGEST:
+        raise Problem(path, f'larger than {_LARGEST // 1_000_000} MB; is it a CSV file?')
+    try:
+        text = raw.decode()
+        bad = raw.find(0)  # as in UTF-16 without a byte order mark
+    except UnicodeDecodeError as error:
+        bad = error.start
+    if bad < 0:
+        return text
+    before = raw[:bad].replace(b'\r\n', b'\n').replace(b'\r', b'\n')
+    number = len(before) - before.rfind(b'\n')
+    raise Problem(Place(path, before.count(b'\n') + 1),
+                  f'byte {number} of this line, 0x{raw[bad]:02X}, is no text in UTF-8; save the '
+                  'file as "CSV UTF-8"')
+
+
+def _cells(place: Place, line: str, delimiter: str) -> list[str]:
+    """Return the stripped cells of a line; raise Problem where it cannot be divided."""
+    if len(line) > _LONGEST_LINE:
+        raise Problem(place, f'this line has {len(line)} characters, at most {_LONGEST_LINE} go')
+    # Only an open quote makes it go on to a second line.
+    reader = csv.reader([line, ''], delimiter=delimiter, skipinitialspace=True)
+    cells = next(reader)
+    if reader.line_num > 1:
+        raise Problem(replace(place, cell=len(cells)),
+                      'the quote that opens this cell is not closed on this line')
+    return [cell.strip() for cell in cells]
+
+
+def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, int]:
+    """Return the cell number of each column; ConfigurationError for unknown and repeated names."""
     spelling = {name.lower(): name for name in known}
+    meant = [spelling.get(name.lower()) for name in names]
+    if not any(meant):
+        raise ConfigurationError([Problem(
+            place, 'no column is named here; the first row names them, with comma, semicolon or '
+                   f'tab between: {", ".join(known)}')])
+    free = [name.lower() for name in known if name not in meant]
+    listing = f'; known: {", ".join(known)}'
     columns: dict[str, int] = {}
-    for number, cell in enumerate(cells, 1):
-        where = f'{path}:{line}:{number}'
-        name = spelling.get(cell.lower())
-        if not cell:
+    problems: list[Problem] = []
+    for number, (name, column) in enumerate(zip(names, meant, strict=True), 1):
+        where = replace(place, cell=number)
+        if not name:
             continue
-        if name is None:
-            close = difflib.get_close_matches(cell.lower(), spelling, 1)
-            hint = f'did you mean {spelling[close[0]]}?' if close else f'known: {", ".join(known)}'
-            problems.append(Problem(where, f'unknown column "{cell}"; {hint}'))
-        elif name in columns:
-            problems.append(Problem(where, f'column {name} stands twice'))
+        if column is None:
+            close = difflib.get_close_matches(name.lower(), free, 1, _ALIKE)
+            hint = f'; did you mean {spelling[close[0]]}?' if close else listing
+            problems.append(Problem(where, f'unknown column "{shown(name)}"{hint}'))
+            listing = listing if close else ''  # once is enough
+        elif column in columns:
+            problems.append(Problem(
+                where, f'column {column} stands twice, first in cell {columns[column]}'))
         else:
-            columns[name] = number
+            columns[column] = number
+    if problems:
+        raise ConfigurationError(problems)
     return columns
+
+
+def _check_cells(place: Place, cells: list[str], columns: dict[str, int],
+                 delimiter: str) -> None:
+    """Raise Problem where the cells of a row do not lie under the columns."""
+    if len(cells) == 1 < len(columns) and any(sign in cells[0] for sign in _DELIMITERS):
+        raise Problem(place, 'this row is one cell; its cells need a '
+                             f'{_DELIMITERS[delimiter]} between them, outside of quotes')
+    for number, cell in enumerate(cells, 1):
+        if cell and number not in columns.values():
+            raise Problem(replace(place, cell=number), f'"{shown(cell)}" stands in no column; '
+                                                       'quote a cell that contains the delimiter')

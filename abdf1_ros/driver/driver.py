@@ -29,7 +29,7 @@ from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.forecast import intervals, line_model, longest_wait, scan_time
@@ -43,7 +43,7 @@ from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.refusals import Change, Refusals
-from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler
+from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler, waited_too_long
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.driver.values import Values
@@ -95,7 +95,7 @@ class Driver:
         self._listener = listener
         self._served = self._make_served()
         self.link = make_link(network, settings, self.machine, self.stations,
-                              self._served.serve, listener.happened)
+                              self._serve, listener.happened)
         planner = Planner(line_model(network), settings.default_period)
         self._refusals = Refusals(planner)
         blocks = planner.plan(mappings)
@@ -211,7 +211,9 @@ class Driver:
         if check is not None:
             return self._tasks.start(check.station, self.health.steps(check))
         job = self._scheduler.next_read(now, busy)
-        return None if job is None else self._tasks.start(job.station, self._read_steps(job, now))
+        if job is None:
+            return None
+        return self._tasks.start(job.station, self._read_steps(job, now), job.reply_size)
 
     def next_due(self) -> float | None:
         """Return when there is something to do next (clock value in s), None for never."""
@@ -221,8 +223,7 @@ class Driver:
 
     def expire(self, now: float) -> None:
         """Do what needs no line: store what we serve, end what has waited too long for it."""
-        while self._to_serve:
-            self._store(self._to_serve.popleft())
+        self._store_waiting(now)
         self._scheduler.expire(now)
         self._read_backs.expire(now)
 
@@ -234,10 +235,22 @@ class Driver:
             self.health.went_away(station.number)
         self._listener.station_changed(station)
 
-    def _store(self, write: Write) -> None:
-        """Put values where the other end reads them."""
-        self._served.store(write.mapping, write.raw)
-        self._listener.written(write.result(Outcome.WRITTEN, '', self.machine.now))
+    def _store_waiting(self, now: float) -> None:
+        """Put values where the other end reads them, but none that has become too old."""
+        timeout = self._settings.write_timeout
+        while self._to_serve:
+            write = self._to_serve.popleft()
+            if now - write.requested > timeout:
+                result = write.result(Outcome.NOT_SENT, waited_too_long(timeout), now)
+            else:
+                self._served.store(write.mapping, write.raw)
+                result = write.result(Outcome.WRITTEN, '', now)
+            self._listener.written(result)
+
+    def _serve(self, command: Packet) -> Packet:
+        """Execute a command of the other end, on what has been asked for before it."""
+        self._store_waiting(self.machine.now)
+        return self._served.serve(command)
 
     def _serve_written(self, mapping: Mapping, words: bytes) -> None:
         """Hand on what the other end has written to words of ours."""
@@ -245,7 +258,7 @@ class Driver:
 
     def _run(self) -> Procedure:
         """Work as long as there is a port."""
-        self._scheduler.drop_writes('requested while the port was not open', self.machine.now)
+        self._drop_writes('requested while the port was not open')
         self._scheduler.begin(self.machine.now)
         self.health.begin(self.machine.now)
         self.is_online = True
@@ -268,12 +281,16 @@ class Driver:
         for mapping, point in self.points.items():
             if mapping.polls:
                 point.fail(str(error))
-        self._scheduler.drop_writes(str(error), self.machine.now)
+        self._drop_writes(str(error))
         self._read_backs.end(self.machine.now)
+
+    def _drop_writes(self, reason: str) -> None:
+        """End all writes that wait."""
+        now = self.machine.now
+        self._scheduler.drop_writes(reason, now)
         while self._to_serve:
             write = self._to_serve.popleft()
-            self._listener.written(
-                write.result(Outcome.NOT_SENT, str(error), self.machine.now))
+            self._listener.written(write.result(Outcome.NOT_SENT, reason, now))
 
     def _read_steps(self, job: ReadJob, now: float) -> Steps:
         """Read one packet of a job."""

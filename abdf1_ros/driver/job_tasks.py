@@ -51,9 +51,9 @@ class JobTasks:
         self._tasks: set[JobTask] = set()
         self._waiting: deque[JobTask] = deque()
 
-    def start(self, station: int, steps: Steps) -> JobTask:
-        """Return the task of a new job, with its first command."""
-        task = JobTask(self, station, steps)
+    def start(self, station: int, steps: Steps, reply_size: int = 0) -> JobTask:
+        """Return the task of a new job, with its first command, whose reply has that size."""
+        task = JobTask(self, station, steps, reply_size)
         self._tasks.add(task)
         return task
 
@@ -96,8 +96,9 @@ class JobTasks:
 class JobTask:
     """A job as the link sees it."""
 
-    def __init__(self, tasks: JobTasks, station: int, steps: Steps) -> None:
+    def __init__(self, tasks: JobTasks, station: int, steps: Steps, reply_size: int) -> None:
         self.sent = False
+        self.reply_size = reply_size
         self.station = station
         self._tasks = tasks
         self._steps = steps
@@ -124,6 +125,6 @@ class JobTask:
         except Exception:  # a bug has ended the job
             self._tasks.advanced(self, is_done=True)
             raise
-        self.sent = False
+        self.sent, self.reply_size = False, 0
         self.command = self._tasks.new_command(self.station, request)
         self._tasks.advanced(self, is_done=False)

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.columns import COLUMNS
-from abdf1_ros.driver.csv_table import read_rows, Row
-from abdf1_ros.driver.map_row import RowReader
+from abdf1_ros.driver.csv_table import read_rows, shown
+from abdf1_ros.driver.map_row import Fault, RowReader
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.file_types import PlcType
@@ -38,11 +38,10 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
     for row in read_rows(path, COLUMNS):
         reader = RowReader(row)
         mapping = reader.read()
-        if mapping is not None:
-            reader.problems += clashes.add(mapping, row)
-            if not reader.problems:
-                mappings.append(mapping)
-        problems += reader.problems
+        faults = reader.faults if mapping is None else clashes.add(mapping)
+        if mapping is not None and not faults:
+            mappings.append(mapping)
+        problems += [fault.in_file(row) for fault in faults]
     return mappings, problems
 
 
@@ -54,7 +53,7 @@ def _processor(mapping: Mapping) -> Processor | None:
 
 
 class _Clashes:
-    """Find what cannot stand beside the rows before it; each problem names both rows."""
+    """Find what cannot stand beside the rows before it; each fault names both rows."""
 
     def __init__(self) -> None:
         self._names: dict[str, Mapping] = {}
@@ -62,20 +61,23 @@ class _Clashes:
         self._writers: dict[str, Mapping] = {}
         self._slcs: dict[int, Mapping] = {}
 
-    def add(self, mapping: Mapping, row: Row) -> list[Problem]:
+    def add(self, mapping: Mapping) -> list[Fault]:
         """Return the clashes of ``mapping``; without any, it counts for the rows after it."""
-        problems: list[Problem] = []
+        faults: list[Fault] = []
 
         def clash(column: str, other: Mapping, text: str) -> None:
-            problems.append(Problem(
-                row.where(column), f'Item: {mapping.item}, {text} of item {other.item} '
-                                   f'(line {other.line}, tag "{other.tag}")'))
+            faults.append(Fault(column, f'{text} of item {other.item} (line {other.line}, tag '
+                                        f'"{shown(other.tag)}")'))
 
         if other := self._names.get(mapping.name):
-            clash('Tag', other, f'tag "{mapping.tag}" becomes "{mapping.name}", the name')
-        if mapping.reads and (other := self._readers.get(mapping.topic)):
+            same = 'is already the tag' if mapping.tag == other.tag \
+                else f'becomes "{mapping.name}", the name'
+            clash('Tag', other, f'tag "{shown(mapping.tag)}" {same}')
+        # A topic that has its name from the tag gets another with it.
+        is_named = not faults or mapping.topic != mapping.name
+        if is_named and mapping.reads and (other := self._readers.get(mapping.topic)):
             clash('Topic', other, f'read topic "{mapping.topic}" is the topic')
-        if mapping.writes and (other := self._writers.get(mapping.topic)) \
+        if is_named and mapping.writes and (other := self._writers.get(mapping.topic)) \
                 and (other.message_type, other.length) != (mapping.message_type, mapping.length):
             clash('Topic', other, f'write topic "{mapping.topic}" needs the message type '
                                   f'({other.message_type.value}) and Length ({other.length})')
@@ -83,7 +85,7 @@ class _Clashes:
         if here and other and (there := _processor(other)) and there is not here:
             clash('Processor', other, f'Processor of station {mapping.station} is {here.value} '
                                       f'here, but {there.value} in the row')
-        if not problems:
+        if not faults:
             self._names[mapping.name] = mapping
             if here:
                 self._slcs.setdefault(mapping.station, mapping)
@@ -91,4 +93,4 @@ class _Clashes:
                 self._readers[mapping.topic] = mapping
             if mapping.writes:
                 self._writers[mapping.topic] = mapping
-        return problems
+        return faults

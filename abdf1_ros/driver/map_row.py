@@ -16,19 +16,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 import math
 from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.columns import MAP_COLUMNS
-from abdf1_ros.driver.csv_table import Row
+from abdf1_ros.driver.csv_table import Row, shown
 from abdf1_ros.driver.mapping import Command, Mapping, Publish
 from abdf1_ros.driver.names import MAX_LENGTH, sanitise
 from abdf1_ros.driver.scaling import Scaling
 from abdf1_ros.driver.structures import type_fault, write_fault
 from abdf1_ros.driver.values import types_of, ValueType, WordOrder
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numerals import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access, accesses_of
@@ -45,28 +46,49 @@ _PLC_TYPE_NAMES = tuple(entry.value for entry in PlcType)
 _Choice = TypeVar('_Choice', bound=Enum)
 
 
-def read_mapping(row: Row) -> Mapping:
-    """Check one row by itself; raise ConfigurationError with every fault of it."""
-    reader = RowReader(row)
-    mapping = reader.read()
-    if mapping is None:
-        raise ConfigurationError(reader.problems)
-    return mapping
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """
+    What is wrong with a row, in parts, as a row may come from a file or a command line.
+
+    ``text`` says it, or goes on after the ``value`` in ``column``: "should be one of Low, High".
+    With ``is_superfluous`` there should be no value at all. ``args`` fill the numbered
+    ``message``, except for the item.
+    """
+
+    column: str
+    text: str
+    message: Message | None = None
+    args: tuple[object, ...] = ()
+    value: str | None = None
+    is_superfluous: bool = False
+
+    def in_file(self, row: Row) -> Problem:
+        """Return the fault in the words of the map file that the row stands in."""
+        text = self.text
+        if self.value is not None:
+            text = f'{self.column} = "{shown(self.value)}" {text}'
+        if self.is_superfluous:
+            text += '; leave the cell empty'
+        where = row.where(self.column)
+        if self.message is None:
+            return Problem(where, f'Item: {row.item}, {text}')
+        return Problem(where, text, self.message, (row.item, *self.args))
 
 
 class RowReader:
-    """Check one row by itself, collecting every fault of it in ``problems``."""
+    """Check one row by itself, collecting every fault of it in ``faults``."""
 
     def __init__(self, row: Row) -> None:
         self._row = row
-        self.problems: list[Problem] = []
+        self.faults: list[Fault] = []
 
     def read(self) -> Mapping | None:
         """Return the mapping, or None when the row has faults."""
         for column in _NEEDED:
             if not self._row.get(column):
                 self._fault(column, f'{column} is missing')
-        if self.problems:
+        if self.faults:
             return None
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
@@ -87,7 +109,7 @@ class RowReader:
         access = self._access(plc_type, command) if plc_type else None
         address = self._address(plc_type, access) if plc_type else None
         processor = self._processor(plc_type, command, address) if plc_type else None
-        if (self.problems or not name or not topic or not command or not publish
+        if (self.faults or not name or not topic or not command or not publish
                 or not plc_type or not address or not word_order or station is None
                 or length is None):
             return None
@@ -96,19 +118,20 @@ class RowReader:
             station, plc_type, length, value_type or _natural_type(address), topic,
             period, publish, minimum, maximum, word_order, scaling, access, processor)
         self._check(mapping)
-        return None if self.problems else mapping
+        return None if self.faults else mapping
 
     def _fault(self, column: str, text: str, message: Message | None = None,
-               *args: object) -> None:
-        full = (self._row.item, *args) if message else ()
-        head = f'Item: {self._row.item}, ' if message is None else ''
-        self.problems.append(
-            Problem(self._row.where(column), f'{head}{text}', message, full))
+               *args: object, is_superfluous: bool = False) -> None:
+        self.faults.append(Fault(column, text, message, args, is_superfluous=is_superfluous))
+
+    def _bad_value(self, column: str, text: str, message: Message | None = None,
+                   *args: object) -> None:
+        self.faults.append(Fault(column, text, message, args, value=self._row.get(column)))
 
     def _name(self, column: str, text: str) -> str:
         name = sanitise(text)
         if not name:
-            self._fault(column, f'{column} = "{text}" has no letter, digit or underscore')
+            self._bad_value(column, 'has no letter, digit or underscore')
         elif len(name) > MAX_LENGTH:
             self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
         return name
@@ -122,7 +145,7 @@ class RowReader:
             if entry.value.lower() == text.lower():
                 return entry
         right = ', '.join(entry.value for entry in kind)
-        self._fault(column, f'{column} = "{text}" should be one of {right}')
+        self._bad_value(column, f'should be one of {right}')
         return None
 
     def _number(self, column: str, low: int, high: int, default: int | None,
@@ -133,8 +156,8 @@ class RowReader:
         value = whole_number(text)
         if value is not None and low <= value <= high:
             return value
-        right = f'{column} = "{text}" should be a whole number from {low} to {high}'
-        self._fault(column, right, message, text, *args)
+        self._bad_value(column, f'should be a whole number from {low} to {high}', message,
+                        shown(text), *args)
         return None
 
     def _decimal(self, column: str, default: float) -> float:
@@ -143,9 +166,9 @@ class RowReader:
             return default
         value = decimal_number(text.replace(',', '.'))
         if right := two_readings(text):
-            self._fault(column, f'{column} = "{text}" could be two numbers; write {right}')
+            self._bad_value(column, f'could be two numbers; write {right}')
         elif value is None:
-            self._fault(column, f'{column} = "{text}" should be a number')
+            self._bad_value(column, 'should be a number')
         return default if value is None else value
 
     def _scaling(self) -> Scaling | None:
@@ -160,8 +183,8 @@ class RowReader:
         text = self._row.get('PLC_Type')
         kind = next((entry for entry in PlcType if entry.value == text.upper()), None)
         if kind is None:
-            self._fault('PLC_Type', 'a MicroLogix is SLC', Message.ERR_BAD_PLC_TYPE, text,
-                        *_PLC_TYPE_NAMES)
+            self._fault('PLC_Type', 'a MicroLogix is SLC', Message.ERR_BAD_PLC_TYPE,
+                        shown(text), *_PLC_TYPE_NAMES)
         return kind
 
     def _access(self, plc_type: PlcType, command: Command | None) -> Access | None:
@@ -172,10 +195,9 @@ class RowReader:
         access = next((way for way in ways if way.value.lower() == text.lower()), None)
         if access is None:
             right = ', '.join(way.value for way in ways)
-            self._fault('Access', f'Access = "{text}" of a {plc_type.value} should be one of '
-                                  f'{right}')
+            self._bad_value('Access', f'of a {plc_type.value} should be one of {right}')
         elif command is Command.SERVE:
-            self._fault('Access', 'a Serve row answers every access; leave the cell empty')
+            self._fault('Access', 'a Serve row answers every access', is_superfluous=True)
         return access
 
     def _processor(self, plc_type: PlcType, command: Command | None,
@@ -183,8 +205,8 @@ class RowReader:
         if not self._row.get('Processor'):
             return None
         if plc_type is not PlcType.SLC or command is Command.SERVE:
-            self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write; '
-                                     'leave the cell empty')
+            self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write',
+                        is_superfluous=True)
             return None
         processor = self._choice('Processor', Processor, None)
         if processor and address and not processor.has_file(address.file, address.file_type):
@@ -197,21 +219,24 @@ class RowReader:
         try:
             return Address.parse(text, plc_type, access)
         except AddressSyntaxError as error:
-            self._fault('Address', str(error), Message.ERR_ADDRESS_SYNTAX, text)
+            self._fault('Address', str(error), Message.ERR_ADDRESS_SYNTAX, shown(text))
         except AddressRangeError as error:
-            self._fault('Address', str(error), Message.ERR_ADDRESS_RANGE, text,
-                        self._row.get('Length') or 1)
+            self._fault('Address', str(error), Message.ERR_ADDRESS_RANGE, shown(text),
+                        shown(self._row.get('Length')) or 1)
         return None
 
     def _check(self, mapping: Mapping) -> None:
         """Check what concerns more than one column."""
         self._check_type(mapping)
-        if self.problems:
+        if self.faults:
             return
         self._check_values(mapping)
         self._check_extent(mapping)
-        if mapping.writes and not self.problems:
+        if mapping.writes and not self.faults:
             self._check_write(mapping)
+        for column in ('Min', 'Max'):
+            if mapping.type is ValueType.STRING and self._row.get(column):
+                self._fault(column, f'a string has no {column}', is_superfluous=True)
         if mapping.minimum > mapping.maximum:
             self._fault('Min', 'Min is greater than Max')
 

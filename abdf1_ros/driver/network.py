@@ -24,8 +24,8 @@ from urllib.parse import urlsplit
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.driver.csv_table import read_rows
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.driver.csv_table import read_rows, shown
+from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numerals import whole_number
 
@@ -35,6 +35,8 @@ POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 _DEVICE_SERVERS = ('socket', 'rfc2217')
+# What pyserial opens besides; there is no PLC behind its loop://.
+_SCHEMES = (*_DEVICE_SERVERS, 'alt', 'cp2110', 'hwgrep', 'spy')
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +63,11 @@ class NetField:
         """Return the name of the node's parameter."""
         return f'net.{self.column.lower()}'
 
-    def parse(self, text: str, where: str) -> int | str:
+    def parse(self, text: str, where: Place | str) -> int | str:
         """Return the value of a cell; raise Problem when it is not allowed."""
         value = self._number(text) if isinstance(self.default, int) else self._choice(text)
         if value is None:
-            args = (text, *self.message_args)
+            args = (shown(text), *self.message_args)
             raise Problem(where, self.advice(text), self.message, args if self.message else ())
         return value
 
@@ -75,7 +77,7 @@ class NetField:
             right = f'one of {", ".join(map(str, self.choices))}'
         else:
             right = f'a whole number from {self.low} to {self.high}'
-        return f'{self.column} = "{text}" should be {right}'
+        return f'{self.column} = "{shown(text)}" should be {right}'
 
     def _number(self, text: str) -> int | None:
         value = whole_number(text)
@@ -175,7 +177,7 @@ def load_network(path: str) -> Network:
     """
     rows = read_rows(path, [entry.column for entry in FIELDS.values()])
     if len(rows) != 1:
-        where = f'{path}:{rows[1].line}' if rows else path
+        where = Place(path, rows[1].line if rows else None)
         raise ConfigurationError([Problem(
             where, f'a net file has one data row, this one has {len(rows)}')])
     row = rows[0]
@@ -184,7 +186,7 @@ def load_network(path: str) -> Network:
     return make_network(cells)
 
 
-def make_network(values: MappingType[str, tuple[str, str]],
+def make_network(values: MappingType[str, tuple[str, Place | str]],
                  base: Network | None = None) -> Network:
     """
     Check ``values`` (by field name: text, and where it comes from) and make a network of them.
@@ -206,26 +208,26 @@ def make_network(values: MappingType[str, tuple[str, str]],
     return Network(**checked)
 
 
-def _check_mode(name: str, value: int | str, where: str) -> None:
+def _check_mode(name: str, value: int | str, where: Place | str) -> None:
     if name == 'mode' and value not in SUPPORTED_MODES:
         raise Problem(where, f'Mode = "{value}" is not available yet',
                       Message.CRT_UNSUPPORTED_MODE,
                       (MODES.index(str(value)), ', '.join(SUPPORTED_MODES)))
 
 
-def _check_port(name: str, value: int | str, where: str) -> None:
+def _check_port(name: str, value: int | str, where: Place | str) -> None:
     text = str(value)
     if name == 'com_port' and not (_is_url(text) or text.startswith('/') or (
             text.isdigit() and (whole_number(text) or 0) >= 1)):
-        raise Problem(where, f'Com_Port = "{text}" should be a number from 1, a device path '
-                             'such as /dev/ttyUSB0, or a URL such as socket://host:port')
+        raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
+                             'path such as /dev/ttyUSB0, or a URL such as socket://host:port')
 
 
 def _is_url(text: str) -> bool:
-    """Tell whether ``text`` is a URL, one of a device server with its host and port."""
+    """Tell whether ``text`` is a URL of pyserial, with host and port where it needs them."""
     try:
         url = urlsplit(text)
-        return '://' in text and (
+        return '://' in text and url.scheme in _SCHEMES and (
             url.scheme not in _DEVICE_SERVERS or bool(url.hostname and url.port))
     except ValueError:  # a port above 65535
         return False

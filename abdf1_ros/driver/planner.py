@@ -96,6 +96,11 @@ class Block:
         return [self.dialect.read(request.start, request.words, self.transfer)
                 for request in self.requests]
 
+    def reply_sizes(self) -> list[int]:
+        """Return the bytes behind the header of a good reply to each request."""
+        return [self.dialect.reply_size(request.start, request.words)
+                for request in self.requests]
+
 
 @dataclass(frozen=True, slots=True)
 class _Wish:

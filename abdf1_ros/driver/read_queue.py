@@ -60,6 +60,7 @@ class ReadJob:
         self.points = tuple(points)
         # Needed at every read, and always the same.
         self._commands = block.commands()
+        self._reply_sizes = block.reply_sizes()
         self.slices = [block.slice_of(point.mapping) for point in points]
         self.due = 0.0
         self.interval: float | None = None
@@ -74,6 +75,11 @@ class ReadJob:
     def station(self) -> int:
         """Return the station to read from."""
         return self.block.station
+
+    @property
+    def reply_size(self) -> int:
+        """Return the bytes behind the header of a good reply to the next command."""
+        return self._reply_sizes[len(self._packets)]
 
     @property
     def is_under_way(self) -> bool:

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Container, Iterable
+import itertools
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
@@ -37,6 +38,11 @@ from abdf1_ros.messages import Message
 MAX_WRITES_IN_A_ROW = 4
 MAX_WAITING_WRITES = 1000
 _LIVING_SHARE = 7  # times as long as for one probe
+
+
+def waited_too_long(seconds: float) -> str:
+    """Return why a write ends that has waited for more than so many seconds."""
+    return f'waited longer than {seconds:g} s for the line'
 
 
 class Scheduler:
@@ -146,19 +152,22 @@ class Scheduler:
             self._queue(self._inbox.popleft(), now)
         if not self._writes:
             return
-        while self._writes and now - self._writes[0].requested > self._write_timeout:
-            detail = f'waited longer than {self._write_timeout:g} s for the line'
-            self._report(self._writes.popleft().result(Outcome.NOT_SENT, detail, now))
-        for write in [write for write in self._writes if self._is_hopeless(write, now)]:
-            self._writes.remove(write)
-            detail = Message.ERR_INACTIVE_STATION.line(write.mapping.station)
-            self._report(write.result(Outcome.NOT_SENT, detail, now))
+        for write in list(self._writes):
+            detail = self._hindrance(write, now)
+            if detail:
+                self._writes.remove(write)
+                self._report(write.result(Outcome.NOT_SENT, detail, now))
 
-    def _is_hopeless(self, write: Write, now: float) -> bool:
-        """Tell whether a write has just found the station inactive, and others want the line."""
+    def _hindrance(self, write: Write, now: float) -> str:
+        """Return why a write is not to be sent any more, empty if it is."""
+        if now - write.requested > self._write_timeout:
+            return waited_too_long(self._write_timeout)
         station = write.mapping.station
-        return (station != BROADCAST and not self._stations[station].active
-                and now < self._next_write_probe)
+        # A write has just found it inactive, and others want the line.
+        if now < self._next_write_probe and station != BROADCAST \
+                and not self._stations[station].active:
+            return Message.ERR_INACTIVE_STATION.line(station)
+        return ''
 
     def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
         """Return the next read or probe of a station not in ``busy``, None for nothing due."""
@@ -239,11 +248,17 @@ class Scheduler:
             self._report(write.result(Outcome.NOT_SENT, detail, now))
 
     def _queue(self, write: Write, now: float) -> None:
-        if not write.is_pulse:
-            for other in [old for old in self._writes if old.mapping is write.mapping]:
-                self._writes.remove(other)
-                self._report(other.result(Outcome.SUPERSEDED, '', now))
-        self._writes.append(write)
+        at = len(self._writes)
+        older = [old for old in self._writes if old.mapping is write.mapping]
+        if older and not write.is_pulse:
+            at = self._writes.index(older[0])
+            self._writes.remove(older[0])
+            self._report(older[0].result(Outcome.SUPERSEDED, '', now))
+            # In its place, or a topic that never rests would wait behind all others for ever;
+            # but not before what was asked for in between of the same words.
+            if any(map(write.overlaps, itertools.islice(self._writes, at, None))):
+                at = len(self._writes)
+        self._writes.insert(at, write)
 
     def _take_probe(self, now: float) -> ReadJob | None:
         if not self._parked:

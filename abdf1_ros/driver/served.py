@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.values import ValueType
-from abdf1_ros.errors import Problem
+from abdf1_ros.errors import Place, Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.emulated import EmulatedProcessor
@@ -105,15 +105,19 @@ class Served:
         self._table.changed.clear()  # nobody has to be told of what we write ourselves
 
 
-def served_problems(mappings: Sequence[Mapping], network: Network,
-                    path: str) -> list[tuple[Mapping, Problem]]:
-    """Return the Serve rows that do not fit ``network`` or each other, each with its fault."""
+def line_problems(mappings: Sequence[Mapping], network: Network,
+                  path: str) -> list[tuple[Mapping, Problem]]:
+    """Return the rows that do not fit ``network``, or Serve rows before them, with their fault."""
     found: list[tuple[Mapping, Problem]] = []
     table = _MappedTable(PlcType(network.plc_type))
     for mapping in mappings:
-        text = _fault(mapping, network, table) if mapping.serves else None
+        text = None
+        if mapping.serves:
+            text = _fault(mapping, network, table)
+        elif mapping.station == BROADCAST and network.mode == 'Peer':
+            text = 'Station 255 is for a line with many stations, not for Mode Peer'
         if text is not None:
-            where = f'{path}:{mapping.line}'
+            where = Place(path, mapping.line)
             found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
     return found
 

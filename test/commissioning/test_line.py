@@ -65,7 +65,7 @@ def test_somebody_elses_line(tmp_path: Path) -> None:
 def test_every_wrong_option_is_told() -> None:
     with pytest.raises(ConfigurationError) as caught:
         line_of('--port', 'x', '--baud', '1', '--check', 'sum', '--own-station', '255')
-    assert [problem.where for problem in caught.value.problems] == [
+    assert [str(problem.place) for problem in caught.value.problems] == [
         '--port', '--baud', '--check', '--own-station']
 
 

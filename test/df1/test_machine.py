@@ -17,11 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, NAK, Symbol
 from abdf1_ros.df1.machine import KEEP, LineTiming, LISTEN_ON, Machine, Procedure, Step
+from abdf1_ros.df1.packet import Packet
 import pytest
 
 FRAME = b'0123456789'
@@ -225,6 +227,38 @@ def test_without_forgetting_all_symbols_are_delivered() -> None:
     assert bench.got == [SAID_ACK]
     bench.machine.handle_timeout(0.75)
     assert bench.got == [SAID_ACK, SAID_EOT]
+
+
+REPLY = Packet(1, 5, 0x0F, 0, 7).reply(bytes(94))  # with DLE STX, 102 bytes before DLE ETX
+
+
+@pytest.mark.parametrize(('size', 'characters'), [
+    (7, 0),  # of the header, a byte is missing
+    (8, 78), (28, 58), (85, 1), (86, 0), (101, 0)])
+def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
+        size: int, characters: int) -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    bench.machine.reply_size = 94
+    frame = message_frame(REPLY.encode(), Checksum.CRC)
+    bench.machine.receive_data(frame[:size], 0.5)
+    assert bench.machine.spare_time == pytest.approx(0.01 * characters)
+    bench.machine.receive_data(frame[size:], 2.0)
+    assert isinstance(bench.got[0], Frame)
+    assert bench.machine.spare_time == 0.0
+
+
+@pytest.mark.parametrize(('packet', 'reply_size'), [
+    (REPLY, 0),  # a size that nobody knows
+    (replace(REPLY, sts=0x10), 94),  # an error comes without data
+    (replace(REPLY, cmd=0x0F), 94)])  # a command of the station's own
+def test_any_other_message_is_heard_as_it_comes(packet: Packet, reply_size: int) -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    bench.machine.reply_size = reply_size
+    bench.machine.receive_data(message_frame(packet.encode(), Checksum.CRC)[:20], 0.5)
+    assert bench.machine.decoder.in_message
+    assert bench.machine.spare_time == 0.0
 
 
 def test_listen_on_keeps_the_deadline() -> None:

@@ -562,6 +562,13 @@ def test_bad_message_instead_of_an_ack_names_its_own_cause() -> None:
     assert script.numbers() == [(2513, 6), (2521, 1, 2513), (2523, SLAVE)]
 
 
+def test_symbol_that_is_misplaced_is_passed_over_untold() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, Answer(b'\x10\x03'), SAYS_ACK, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2523, SLAVE)]
+
+
 def test_invalid_symbol_is_told_and_passed_over() -> None:
     script = MasterScript(SETTINGS)
     assert script.run(COMMAND, SENT, Answer(b'\x10\x07'), SAYS_ACK, POLLED, Answer(b'\x10\xFE'),

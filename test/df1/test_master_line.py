@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import itertools
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import master_frame
@@ -30,7 +31,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
 import pytest
-from support.multidrop import MasterBench
+from support.multidrop import MasterBench, Slave
 from support.vectors import vector
 
 MASTER = 5
@@ -170,6 +171,18 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
 
 
 @BOTH
+def test_reply_with_another_command_code_is_passed_on_as_it_is(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    command = rig.message(7, 8)
+    wrong = replace(command.reply(), cmd=0x46)
+    rig[8].slave._serve = lambda packet: wrong if packet == command else packet.reply()
+    rig.start()
+    poll(rig, 7, 8, times=2)
+    assert rig[7].heard == [wrong]
+    assert {number for number, *_ in rig.master.numbers()} == {2523}
+
+
+@BOTH
 @pytest.mark.parametrize('known', [False, True])
 def test_originator_learns_that_the_destination_is_dead(standard: bool, known: bool) -> None:
     rig = bench(standard, 7, 8, dead=(8,))
@@ -245,12 +258,13 @@ def test_broadcast_does_not_enter_the_list_of_stations(standard: bool) -> None:
     assert [station.number for station in rig.master.stations] == [7]
 
 
-def test_no_ack_for_a_command_that_cannot_be_kept() -> None:
+@pytest.mark.parametrize('dst', [8, MASTER])
+def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     # Without the NAK, which would make the slave drop what it holds.
     rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False))
     rig[7].slave._settings = replace(rig[7].slave._settings, retries=200)
     for _ in range(MAX_FORWARDS + 1):
-        rig.message(7, 8)
+        rig.message(7, dst)
     rig[7].delay = 0.0
     rig.start()
     slave = rig[7].slave
@@ -269,7 +283,8 @@ def test_no_ack_for_a_command_that_cannot_be_kept() -> None:
     assert slave.counters.acks_received > MAX_FORWARDS
     assert slave._held is None
     rig.run(1.0)
-    assert len({packet.tns for packet in rig[8].served}) == MAX_FORWARDS + 1
+    served = rig.master.served if dst == MASTER else rig[dst].served
+    assert len({packet.tns for packet in served}) == MAX_FORWARDS + 1
 
 
 @BOTH
@@ -371,3 +386,44 @@ def test_replies_to_nothing_are_not_kept_without_end() -> None:
     assert len(rig.master.link._line._forwards) == MAX_KEPT
     assert rig.master.counts()['invalid_messages'] == received - MAX_KEPT
     assert (2510, 7, 8, MAX_KEPT) in rig.master.numbers()
+
+
+class Endless:
+    """The outbox of a slave that has ``limit`` commands out at once, for ever."""
+
+    def __init__(self, slave: Slave, others: tuple[int, ...], limit: int) -> None:
+        self._slave = slave
+        self._others = itertools.cycle(others)
+        self._limit = limit
+        self._tns = itertools.count()
+        self._open: set[int] = set()
+
+    def __bool__(self) -> bool:
+        self._open.difference_update(packet.tns for packet in self._slave.heard)
+        return len(self._open) < self._limit
+
+    def popleft(self) -> Packet:
+        """Return the next command."""
+        tns = next(self._tns)
+        self._open.add(tns)
+        return Packet(next(self._others), self._slave.number, 0x0F, 0, tns, b'\x67')
+
+
+@BOTH
+@pytest.mark.parametrize('limit', [1, 4])
+def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
+        standard: bool, limit: int) -> None:
+    numbers = (7, 8, 9)
+    rig = bench(standard, *numbers)
+    for number in numbers:
+        others = tuple(other for other in numbers if other != number)
+        rig[number].outbox = Endless(rig[number], others, limit)  # type: ignore[assignment]
+    rig.start()
+    errands = [rig.ask(number) for _ in range(50) for number in numbers]
+    rig.run(15.0)
+    ends = [errand.ended for errand in errands]
+    assert all(isinstance(errand.result, Packet) for errand in errands)
+    assert max(after - before for before, after in itertools.pairwise(sorted(ends))) < 0.3
+    assert rig.master.changes == []
+    assert {number for number, *_ in rig.master.numbers()} == {2523}
+    assert all(len(rig[number].served) > 50 for number in numbers)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from abdf1_ros.df1.packet import HEADER_SIZE, Packet
+from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE, Packet
 from abdf1_ros.errors import FormatError
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,3 +90,12 @@ def test_duplicate_key_tells_messages_apart_by_src_cmd_and_tns(change: dict[str,
 def test_duplicate_key_passes_over_dst_sts_and_data() -> None:
     other = replace(COMMAND, dst=99, sts=0x10, data=b'other')
     assert other.duplicate_key == COMMAND.duplicate_key
+
+
+@pytest.mark.parametrize(('packet', 'size', 'begins'), [
+    (COMMAND.reply(b'words'), 11, True), (COMMAND.reply(b'words'), 6, True),
+    (COMMAND.reply(b'words'), 5, False), (COMMAND.reply(b'words'), 0, False),
+    (COMMAND.reply(sts=0x10), 6, False), (COMMAND, 7, False)])
+def test_header_of_a_good_reply_is_known_before_its_end(
+        packet: Packet, size: int, begins: bool) -> None:
+    assert begins_good_reply(packet.encode()[:size]) is begins

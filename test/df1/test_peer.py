@@ -196,6 +196,16 @@ def test_anything_else_is_passed_over_while_the_timer_runs(noise: bytes) -> None
     assert peer.only(2515) == [(2515, noise[-1])]
 
 
+def test_what_was_heard_before_a_message_is_not_told_as_its_answer() -> None:
+    peer = bench()
+    assert peer.hear_packet(THEIRS)
+    peer.hear(ACK)
+    peer.begin(COMMAND)
+    peer.said()
+    peer.wait(TIMEOUT + 0.1)
+    assert peer.only(2515) == [(2515, 0)]
+
+
 def test_timer_runs_on_while_messages_and_enqs_come_in() -> None:
     peer = bench()
     peer.begin(COMMAND)
@@ -732,7 +742,7 @@ def test_other_control_between_messages_is_passed_over(control: bytes) -> None:
 
 def test_unknown_control_is_reported() -> None:
     peer = bench()
-    peer.hear(UNKNOWN)
+    peer.hear(ETX, b'\x10\x01', UNKNOWN)  # the first two are symbols, if not here
     assert peer.numbers() == [(2514, 0x0F)]
 
 
@@ -1033,6 +1043,7 @@ def test_silent_station_is_probed_with_one_try() -> None:
         assert isinstance(errand.result, StationInactive)
         assert errand.seconds <= 2 * TIMEOUT
     assert peer.changes == [(1, False)]
+    assert peer.counts()['enq_limit_exceeded'] == len(peer.only(2520)) == 1  # not of a probe
 
 
 def test_refusing_station_is_probed_with_one_try() -> None:
@@ -1043,6 +1054,7 @@ def test_refusing_station_is_probed_with_one_try() -> None:
     assert peer.hear(NAK) == b''
     assert peer.wait(TIMEOUT) == []
     assert isinstance(errand.result, StationInactive)
+    assert peer.only(2519) == []
 
 
 def test_station_comes_back_with_its_reply() -> None:

@@ -92,12 +92,12 @@ def test_held_command_is_sent_again_until_its_limit_and_then_returned_with_an_er
     assert [bench.poll() for _ in range(3)] == [bench.own(own(1))] * 3
     assert first.result is None
     assert bench.poll() == bench.own(own(2))
-    assert isinstance(first.result, CommandTimeout)
+    assert str(first.result) == '2519 NTC_NAK_LIMIT_EXCEEDED: NAK Retry Limit (2) exceeded'
     assert second.result is None
-    assert bench.numbers() == [(2519, 2), (2508,)]
+    assert bench.numbers() == [(2519, 2)]
     assert bench.counts() == {
         'polls_received': 4, 'messages_sent': 4, 'commands_sent': 2, 'nak_retries': 2,
-        'nak_limit_exceeded': 1, 'command_timeouts': 1}
+        'nak_limit_exceeded': 1}
 
 
 def test_nak_fails_the_command_that_is_held() -> None:
@@ -106,10 +106,32 @@ def test_nak_fails_the_command_that_is_held() -> None:
     bench.hear(bench.frame(FROM_MASTER))
     bench.poll()
     assert bench.hear(NAK) == b''
-    assert isinstance(first.result, CommandTimeout)
+    assert str(first.result) == '2511 ERR_RCVD_NAK_SYMBOL: Received NAK Symbol'
+    assert bench.numbers() == [(2517,)]
     assert bench.poll() == bench.own(own(2))  # the reply is gone with the reset
     assert second.result is None
-    assert bench.counts()['naks_received'] == 1
+    counts = bench.counts()
+    assert counts['naks_received'] == 1
+    assert not {'command_timeouts', 'nak_limit_exceeded'} & counts.keys()
+
+
+@pytest.mark.parametrize(('sts', 'heard'), [(0x00, True), (0x10, True), (0x12, True),
+                                            (0x02, False)])
+def test_error_of_a_node_on_the_way_is_no_answer_of_the_station(sts: int, heard: bool) -> None:
+    bench = SlaveBench(SETTINGS)
+    bench.add(own())
+    bench.stations.lost(OTHER, 0.0)
+    bench.poll()
+    bench.hear(ACK, bench.frame(own().reply(sts=sts)))
+    assert bench.stations[OTHER].active is heard
+
+
+def test_what_is_wrong_with_messages_for_us_is_told_by_number() -> None:
+    bench = SlaveBench(SETTINGS)
+    frame = bench.frame(FROM_MASTER)
+    damaged = frame[:-1] + bytes((frame[-1] ^ 1,))
+    bench.hear(damaged, frame, frame, b'\x10\x07', b'\x10\x03')
+    assert [number for number, *_ in bench.numbers()] == [2506, 2524, 2514]
 
 
 def test_nak_leaves_a_command_that_the_master_has_taken() -> None:

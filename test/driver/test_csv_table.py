@@ -20,7 +20,7 @@ import os
 from pathlib import Path
 
 from abdf1_ros.driver.csv_table import read_rows, Row
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.errors import ConfigurationError, Place
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -69,20 +69,30 @@ def problems_of(path: Path, content: str | bytes) -> list[str]:
     '# made by hand\nTag,Address,Length\n# one\na,N7:0,2\n  # two, with; signs\nb,N7:1,3\n#\n',
     '\ufeff# a comment first\nTag,Address,Length\na,N7:0,2\nb,N7:1,3\n',
     'Tag;Address;Length\n# commas, here,,,\na;N7:0;2\nb;N7:1;3\n',
+    'sep=;\nTag;Address;Length\na;N7:0;2\nb;N7:1;3\n',
+    '\ufeffSEP=,\r\nTag,Address,Length\r\na,N7:0,2\r\nb,N7:1,3\r\n',
+    'sep=\t\nTag\tAddress\tLength\na\tN7:0\t2\nb\tN7:1\t3\n',
+    '"sep=;"\nTag;Address;Length\na;N7:0;2\nb;N7:1;3\n',
+    'sep=;;;\nTag;Address;Length\na;N7:0;2\nb;N7:1;3\n',
 ])
 def test_same_table_in_any_form(path: Path, content: str) -> None:
     assert cells_of(path, content) == [['a', 'N7:0', '2'], ['b', 'N7:1', '3']]
 
 
-def test_quoted_cell_holds_delimiter_newline_and_quotes(path: Path) -> None:
-    content = 'Tag,Address\n"a, ""b""\nc",N7:0\nd,N7:1\n'
-    assert cells_of(path, content) == [['a, "b"\nc', 'N7:0', ''], ['d', 'N7:1', '']]
+def test_quoted_cell_holds_delimiter_and_quotes(path: Path) -> None:
+    content = 'Tag,Address\n"a, ""b""",N7:0\nd,N7:1\n'
+    assert cells_of(path, content) == [['a, "b"', 'N7:0', ''], ['d', 'N7:1', '']]
 
 
-def test_lines_and_items_are_counted_across_comments_blanks_and_long_cells(path: Path) -> None:
-    content = '\n# c\nTag,Address\n\n# c\na,1\n"b\nb",2\n\nc,3\n# c\nd,4\n'
+def test_lines_and_items_are_counted_across_comments_and_blanks(path: Path) -> None:
+    content = 'sep=,\n# c\nTag,Address\n\n# c\na,1\n"",""\nb,2\n\nc,3\n# c\nd,4\n'
     assert [(row.item, row.line) for row in rows_of(path, content)] == [
-        (1, 6), (2, 7), (3, 10), (4, 12)]
+        (1, 6), (2, 8), (3, 10), (4, 12)]
+
+
+def test_only_the_first_line_tells_the_separator(path: Path) -> None:
+    assert cells_of(path, 'Tag,Address\nsep=,1\n') == [['sep=', '1', '']]
+    assert cells_of(path, 'Tag;Address\nsep=;\n') == [['sep=', '', '']]
 
 
 def test_lines_are_counted_with_any_line_ends(path: Path) -> None:
@@ -99,9 +109,9 @@ def test_only_line_ends_end_a_line(path: Path, separator: str) -> None:
 
 def test_where_names_file_line_cell_and_column(path: Path) -> None:
     row, = rows_of(path, '# c\nLength,Tag\n1,a\n')
-    assert row.where('Tag') == f'{path}:3:2 (Tag)'
-    assert row.where('Length') == f'{path}:3:1 (Length)'
-    assert row.where('Address') == f'{path}:3 (Address)'
+    assert row.where('Tag') == Place(str(path), 3, 2, 'Tag')
+    assert row.where('Length') == Place(str(path), 3, 1, 'Length')
+    assert row.where('Address') == Place(str(path), 3, None, 'Address')
 
 
 def test_cells_that_are_missing_are_empty(path: Path) -> None:
@@ -118,21 +128,60 @@ def test_unknown_column_that_resembles_none_comes_with_all_names(path: Path) -> 
         'FILE:1:1: unknown column "Zq9"; known: Tag, Address, Length']
 
 
+def test_all_names_are_told_once(path: Path) -> None:
+    assert problems_of(path, 'Adress,Zq9,,Tag,Lenght,Wx8\n') == [
+        'FILE:1:1: unknown column "Adress"; did you mean Address?',
+        'FILE:1:2: unknown column "Zq9"; known: Tag, Address, Length',
+        'FILE:1:5: unknown column "Lenght"; did you mean Length?',
+        'FILE:1:6: unknown column "Wx8"']
+
+
+@pytest.mark.parametrize('name', ['Lengths', 'Note'])
+def test_column_that_is_there_is_not_suggested(path: Path, name: str) -> None:
+    assert problems_of(path, f'Tag,Length,{name}\n') == [
+        f'FILE:1:3: unknown column "{name}"; known: Tag, Address, Length']
+
+
 def test_every_fault_of_the_header_is_reported(path: Path) -> None:
     assert problems_of(path, 'Tag,tag,Lenght,TAG\na,b,c,d\n') == [
-        'FILE:1:2: column Tag stands twice',
+        'FILE:1:2: column Tag stands twice, first in cell 1',
         'FILE:1:3: unknown column "Lenght"; did you mean Length?',
-        'FILE:1:4: column Tag stands twice']
+        'FILE:1:4: column Tag stands twice, first in cell 1']
 
 
-@pytest.mark.parametrize('content, where', [
-    ('Tag,Address\na,N7:0,5\n', 'FILE:2:3'),
-    ('Tag,,Address\na,5,N7:0\n', 'FILE:2:2'),
-    ('Tag,Address\nb,N7:1\n# c\na,N7:0,,5\nc,N7:2,5\n', 'FILE:4:4'),
-])
-def test_cell_outside_the_columns(path: Path, content: str, where: str) -> None:
+@pytest.mark.parametrize('content', [
+    'a,N7:0,2\nb,N7:1,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
+    '<!DOCTYPE html>\n<html>\n', 'Tag Address Length\na N7:0 2\n'])
+def test_file_without_a_header_is_one_fault(path: Path, content: str) -> None:
     assert problems_of(path, content) == [
-        f'{where}: "5" stands in no column; quote a cell that contains the delimiter']
+        'FILE:1: no column is named here; the first row names them, with comma, semicolon or tab '
+        'between: Tag, Address, Length']
+
+
+@pytest.mark.parametrize('content, places', [
+    ('Tag,Address\na,N7:0,5\n', ['2:3']),
+    ('Tag,,Address\na,5,N7:0\n', ['2:2']),
+    ('Tag,Address\nb,N7:1\n# c\na,N7:0,,5,6\nc,N7:2,5\n', ['4:4', '5:3']),
+])
+def test_cell_outside_the_columns(path: Path, content: str, places: list[str]) -> None:
+    assert problems_of(path, content) == [
+        f'FILE:{place}: "5" stands in no column; quote a cell that contains the delimiter'
+        for place in places]
+
+
+@pytest.mark.parametrize('header, row, name', [
+    ('Tag,Address', 'a;N7:0', 'comma'), ('Tag,Address', '"a,N7:0"', 'comma'),
+    ('Tag;Address', 'a,N7:0', 'semicolon'), ('Tag\tAddress', 'a,N7:0', 'tab')])
+def test_row_that_is_not_divided_as_the_header(
+        path: Path, header: str, row: str, name: str) -> None:
+    text = f'this row is one cell; its cells need a {name} between them, outside of quotes'
+    assert problems_of(path, f'{header}\n{row}\n\n{row}\n') == [
+        f'FILE:2: {text}', f'FILE:4: {text}']
+
+
+def test_only_cell_of_a_row_and_of_a_file(path: Path) -> None:
+    assert cells_of(path, 'Tag,Address\na\n') == [['a', '', '']]
+    assert cells_of(path, 'Tag\na;b\n') == [['a;b', '', '']]
 
 
 def test_missing_file(path: Path) -> None:
@@ -154,10 +203,16 @@ def test_folder_in_place_of_a_file(tmp_path: Path) -> None:
     (b'Tag\r\rab\x80\r', '3:3', '80'),
     (b'\xef\xbb\xbfTag,Address\na,b\xfc\n', '2:4', 'FC'),
     (b'\xef\xbb\xbfT\xe4g\n', '1:2', 'E4'),
+    (b'Tag\nab\0\n', '2:3', '00'),
+    ('Tag,Address\na,N7:0\n'.encode('utf-16-le'), '1:2', '00'),
+    ('Tag,Address\na,N7:0\n'.encode('utf-16-be'), '1:1', '00'),
+    (b'\xff\xfe' + 'Tag,Address\na,N7:0\n'.encode('utf-16-le'), '1:1', 'FF'),
 ])
-def test_byte_that_is_not_utf8(path: Path, content: bytes, where: str, byte: str) -> None:
+def test_byte_that_is_no_text(path: Path, content: bytes, where: str, byte: str) -> None:
+    line, number = where.split(':')
     assert problems_of(path, content) == [
-        f'FILE:{where}: byte 0x{byte} is not UTF-8; save the file as "CSV UTF-8"']
+        f'FILE:{line}: byte {number} of this line, 0x{byte}, is no text in UTF-8; save the file '
+        'as "CSV UTF-8"']
 
 
 @pytest.mark.parametrize('content', [
@@ -171,24 +226,38 @@ def test_header_only_is_a_table_without_rows(path: Path) -> None:
     assert rows_of(path, 'Tag,Address\n\n# nothing yet\n') == []
 
 
-def test_nul_byte_is_no_crash(path: Path) -> None:
-    assert cells_of(path, b'Tag\na\0b\n') == [['a\0b', '', '']]
-
-
-@pytest.mark.parametrize('content, line', [
-    ('Tag,Address\na,1\n"b,2\nc,3\n', 3),
-    ('"Tag,Address\na,1\n', 1),
-    ('Tag,Address\na,"1', 2),
-    ('Tag,Address\na,"1\n# c\n', 2),
+@pytest.mark.parametrize('content, places', [
+    ('Tag,Address\na,1\n"b,2\nc,3\n', ['3:1']),
+    ('"Tag,Address\na,1\n', ['1:1']),
+    ('Tag,Address\na,"1', ['2:2']),
+    ('Tag,Address\na,"', ['2:2']),
+    ('Tag,Address\r\na,"1\r\n# c\r\n', ['2:2']),
+    ('Tag,Address\na, "1""\n', ['2:2']),
+    ('Tag,Address\n"a,1\nb,2\n"c,3\nd,4\n', ['2:1', '4:1']),
+    ('Tag,Address\n"a\nb",1\n', ['2:1']),
 ])
 def test_quote_that_is_not_closed_does_not_swallow_the_rows_behind_it(
-        path: Path, content: str, line: int) -> None:
-    assert problems_of(path, content) == [f'FILE:{line}: a quote in this row never ends']
+        path: Path, content: str, places: list[str]) -> None:
+    assert problems_of(path, content) == [
+        f'FILE:{place}: the quote that opens this cell is not closed on this line'
+        for place in places]
 
 
-def test_cell_that_is_much_too_long_is_refused(path: Path) -> None:
-    problem, = problems_of(path, 'Tag\n' + 'x' * 200_000 + '\n')
-    assert problem.startswith('FILE: not a CSV file: field larger than field limit')
+def test_line_that_is_much_too_long_is_refused(path: Path) -> None:
+    longest = 'x' * (131_072 - 1)
+    assert cells_of(path, f'Tag\n{longest}\n') == [[longest, '', '']]
+    assert problems_of(path, f'Tag\na\nx{longest}\n"x{longest}\n') == [
+        'FILE:3: this line has 131073 characters, at most 131072 go',
+        'FILE:4: this line has 131074 characters, at most 131072 go']
+
+
+def test_long_cell_is_shown_without_its_end(path: Path) -> None:
+    cell = 'x' * 101
+    assert problems_of(path, f'Tag\na,{cell}\nb,{cell[1:]}\n') == [
+        f'FILE:2:2: "{cell[1:]}..." stands in no column; quote a cell that contains the delimiter',
+        f'FILE:3:2: "{cell[1:]}" stands in no column; quote a cell that contains the delimiter']
+    assert problems_of(path, f'Tag,{cell}\n') == [
+        f'FILE:1:2: unknown column "{cell[1:]}..."; known: Tag, Address, Length']
 
 
 def test_endless_file_is_refused() -> None:

@@ -61,6 +61,26 @@ def test_many_blocks_of_several_stations(delay: float) -> None:
     assert bench.listener.changes == []
 
 
+@BOTH
+@pytest.mark.parametrize('plc', ['SLC', 'PLC5'])
+def test_long_reply_is_not_looked_at_while_it_cannot_be_complete(
+        polling: str, plc: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = make_mapping('N7:0', plc=plc, length=100)
+    bench = DriverBench([words], network=network(polling), chunk=8)
+    store(bench.plc(1, plc, ('N7:0', 100)), 'N7:0', list(range(100)))
+    sizes: list[int] = []
+    take = bench.driver.machine.receive_data
+
+    def receive_data(data: bytes, now: float) -> None:
+        sizes.append(len(data))
+        take(data, now)
+
+    monkeypatch.setattr(bench.driver.machine, 'receive_data', receive_data)
+    bench.run_until(lambda: bool(bench.listener.reads))
+    assert bench.listener.values(words) == [list(range(100))]
+    assert len([size for size in sizes if size == 8]) <= 4  # the reply has more than 200 bytes
+
+
 def test_read_that_takes_several_commands() -> None:
     long, other = make_mapping('N7:0', length=300), make_mapping('N7:0', station=2)
     bench = DriverBench([long, other], network=STANDARD)

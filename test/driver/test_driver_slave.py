@@ -239,3 +239,23 @@ def test_master_reads_and_resets_the_counters_that_we_show() -> None:
     assert (int.from_bytes(before[4:6], 'little'), reset) == (2, b'')  # messages received
     assert int.from_bytes(after[4:6], 'little') == 1  # the command that asks
     assert bench.driver.counters.messages_received == 4
+
+
+def test_served_value_is_stored_before_a_command_that_came_after_it() -> None:
+    words = serve_row('N7:50')
+    bench = Bench([words])
+    bench.run(0.1)
+    bench.driver.write(words, [5], bench.clock())  # nobody wakes the machine
+    assert bench.master_reads('N7:50', 1) == b'\5\0'
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+
+
+def test_served_value_that_has_become_too_old_is_not_stored() -> None:
+    words = serve_row('N7:50')
+    bench = Bench([words])
+    bench.write(words, [5])
+    bench.run(0.1)
+    bench.driver.write(words, [6], bench.clock() - 2.1)
+    assert bench.master_reads('N7:50', 1) == b'\5\0'
+    assert [str(result) for result in bench.listener.results] == [
+        'written', 'not written: not sent: waited longer than 2 s for the line']

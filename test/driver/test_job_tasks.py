@@ -56,6 +56,13 @@ def test_job_is_one_command_after_the_other() -> None:
     assert (tasks.transactions, tasks.waiting(())) == (2, None)
 
 
+def test_size_of_the_reply_is_that_of_the_first_command() -> None:
+    task = JobTasks(OURS, 0).start(1, Job().steps(), 20)
+    assert task.reply_size == 20
+    task.reply(task.command.reply(bytes(20)))
+    assert task.reply_size == 0
+
+
 def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
     job, tasks = Job(), JobTasks(OURS, 0)
     task = tasks.start(1, job.steps())

@@ -53,6 +53,17 @@ def test_same_tag_twice() -> None:
         ' tag "Tank.Level")']
 
 
+def test_very_same_tag_is_one_fault_that_names_both_lines() -> None:
+    for command in ('Read', 'ReadWrite', 'Write'):
+        assert faults(row(Tag='a', Command=command),
+                      row(Tag='a', Command=command, Length='2')) == [
+            '3:1 (Tag): Item: 2, tag "a" is already the tag of item 1 (line 2, tag "a")']
+
+
+def test_same_tag_and_same_topic_are_two_faults() -> None:
+    assert len(faults(row(Tag='a', Topic='t'), row(Tag='a', Topic='t'))) == 2
+
+
 def test_two_readers_of_one_topic() -> None:
     assert faults(row(Tag='a', Topic='x.y', Command='Read'), '# c',
                   row(Tag='b', Topic='x:y', Command='Read')) == [

@@ -136,6 +136,17 @@ def test_exact_text(column: str, text: str, expected: str) -> None:
     assert fault(**{column: text}) == expected
 
 
+@pytest.mark.parametrize('column, texts', [
+    ('Command', ['Command = "{}" should be one of Read']),
+    ('Station', ['Invalid station number ({}) must be less than 255; ', 'Station = "{}" should']),
+    ('PLC_Type', ['PLC Type ({}) should be one of PLC2']),
+    ('Address', ['Invalid Address Syntax ({}); write type'])])
+def test_long_cell_is_shown_without_its_end(column: str, texts: list[str]) -> None:
+    shown = fault(**{column: 'x' * 5000})
+    assert all(text.format('x' * 100 + '...') in shown for text in texts)
+    assert len(shown) < 500
+
+
 @pytest.mark.parametrize('column', ['Tag', 'Command', 'Address', 'Station', 'PLC_Type'])
 def test_needed_column(column: str) -> None:
     assert fault(**{column: ''}) == \
@@ -153,6 +164,11 @@ def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
 
 def test_decimal_comma_of_a_limit() -> None:
     assert one(Min='"-2,5"').minimum == -2.5
+
+
+def test_string_has_no_limits() -> None:
+    assert fault(Address='ST9:0', Type='string', Length='1', Max='4') == (
+        '2:12 (Max): Item: 1, a string has no Max; leave the cell empty')
 
 
 def test_minimum_above_the_maximum() -> None:

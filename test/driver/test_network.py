@@ -163,6 +163,13 @@ def test_exact_text(path: Path, column: str, text: str, expected: str) -> None:
     assert faults(path, column, text) == [f'FILE:2:1 ({column}): {expected}']
 
 
+@pytest.mark.parametrize('column', ['Station', 'Mode', 'Com_Port', 'Baud'])
+def test_long_cell_is_shown_without_its_end(path: Path, column: str) -> None:
+    fault, = faults(path, column, 'x' * 5000)
+    assert f'{column} = "{"x" * 100}..." should be ' in fault
+    assert len(fault) < 500
+
+
 @pytest.mark.parametrize('mode, number', [('Slave', 1), ('peer', 2)])
 def test_mode_that_this_version_does_not_have(
         path: Path, monkeypatch: pytest.MonkeyPatch, mode: str, number: int) -> None:
@@ -188,7 +195,7 @@ def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
     path.write_text(f'# a comment\n\n{header}\n\n1,999,x,y,-5\n', encoding='utf-8')
     with pytest.raises(ConfigurationError) as caught:
         load_network(str(path))
-    assert sorted(problem.where for problem in caught.value.problems) == [
+    assert sorted(str(problem.place) for problem in caught.value.problems) == [
         f'{path}:5:{cell} ({column})' for cell, column in enumerate(header.split(','), 1)]
 
 
@@ -203,14 +210,17 @@ def test_parameter_name_is_the_column_in_lower_case(
     ('/dev/ttyUSB0', '/dev/ttyUSB0'),
     ('/dev/serial/by-id/usb-FTDI_x-if00', '/dev/serial/by-id/usb-FTDI_x-if00'),
     ('socket://10.0.0.7:4001', 'socket://10.0.0.7:4001'),
-    ('rfc2217://host:2217', 'rfc2217://host:2217')])
+    ('rfc2217://host:2217', 'rfc2217://host:2217'),
+    ('RFC2217://host:2217', 'RFC2217://host:2217'),
+    ('hwgrep://0403:6001', 'hwgrep://0403:6001'), ('spy:///dev/ttyUSB0', 'spy:///dev/ttyUSB0')])
 def test_com_port(path: Path, text: str, port: str) -> None:
     assert load(path, 'Com_Port', text).port == port
 
 
 @pytest.mark.parametrize('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³',
                                   'socket://', 'socket://host', 'rfc2217://host:99999',
-                                  'socket://:4001'])
+                                  'socket://:4001', 'sokket://host:4001', 'loop://',
+                                  '://host:1'])
 def test_bad_com_port(path: Path, text: str) -> None:
     fault, = faults(path, 'Com_Port', text)
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')

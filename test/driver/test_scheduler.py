@@ -188,12 +188,34 @@ def test_waiting_writes_of_a_word_collapse_to_the_newest() -> None:
     bench = Bench()
     old, other, new = (bench.write(WORD, 1, 0.0), bench.write(OTHER, 2, 0.1),
                        bench.write(WORD, 3, 0.2))
-    assert [bench.next(0.5), bench.next(0.5), bench.next(0.5)] == [other, new, None]
+    assert [bench.next(0.5), bench.next(0.5), bench.next(0.5)] == [new, other, None]
     result, = bench.results
     assert (result.mapping, result.value, result.outcome, result.latency) == (
         WORD, '[1]', Outcome.SUPERSEDED, 0.5)
     assert str(result) == 'not written: superseded by a newer value'
     assert old is not new
+
+
+def test_newer_value_does_not_overtake_what_was_asked_for_meanwhile_of_the_same_words() -> None:
+    bench, both = Bench(), make_mapping('N7:5', 'Write', length=2)
+    bench.write(WORD, 1, 0.0)
+    between = Write(both, [2, 2], 0.1)
+    bench.scheduler.add_write(between)
+    new = bench.write(WORD, 3, 0.2)
+    assert [bench.next(0.5), bench.next(0.5)] == [between, new]
+
+
+def test_topics_that_never_rest_share_the_line() -> None:
+    bench = Bench()
+    mappings = [make_mapping(f'N7:{number}', 'Write') for number in range(3)]
+    sent = Counter[str]()
+    for turn in range(300):
+        for mapping in mappings[turn % 2:]:  # the first of them half as often
+            bench.write(mapping, turn, turn / 10)
+        write = bench.next_write(turn / 10)
+        assert write is not None
+        sent[str(write.mapping.address)] += 1
+    assert max(sent.values()) - min(sent.values()) <= 1
 
 
 def test_write_that_is_on_its_way_is_not_superseded() -> None:
@@ -234,6 +256,16 @@ def test_write_that_has_waited_too_long_is_not_sent() -> None:
     result, = bench.results
     assert str(result) == 'not written: not sent: waited longer than 2 s for the line'
     assert result.latency == 2.001
+
+
+def test_write_that_was_old_when_it_came_is_not_sent_late_behind_a_younger_one() -> None:
+    bench = Bench(write_timeout=2.0)
+    young = bench.write(WORD, 1, 1.0)
+    bench.write(OTHER, 2, 0.0)
+    assert bench.next(2.5) is young
+    assert bench.next(2.5) is None
+    assert [str(result.mapping.address) for result in bench.results] == ['N7:6']
+    assert bench.outcomes() == [Outcome.NOT_SENT]
 
 
 def test_write_is_sent_up_to_its_last_moment() -> None:

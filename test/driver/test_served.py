@@ -22,7 +22,7 @@ import tracemalloc
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
-from abdf1_ros.driver.served import Served, served_problems
+from abdf1_ros.driver.served import line_problems, Served
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialects import dialect_of
@@ -423,7 +423,7 @@ PEER = Network(mode='Peer')
 
 def texts(*mappings: Mapping, network: Network = PEER) -> list[str]:
     """Return the text of every problem."""
-    return [str(problem) for _, problem in served_problems(mappings, network, 'map.csv')]
+    return [str(problem) for _, problem in line_problems(mappings, network, 'map.csv')]
 
 
 def test_rows_that_fit() -> None:
@@ -464,9 +464,16 @@ def test_files_of_a_plc3_are_numbered_in_each_section() -> None:
     assert texts(row('N9:0', 'PLC3'), row('B9:0', 'PLC3'), network=network) == []
 
 
+def test_full_duplex_line_has_no_broadcast() -> None:
+    everybody = make_mapping('N7:0', 'Write', station=255)
+    assert texts(everybody) == [
+        'map.csv:2: Item: 1, Station 255 is for a line with many stations, not for Mode Peer']
+    assert texts(everybody, network=Network()) == []
+
+
 def test_problems_go_with_their_rows() -> None:
     good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
-    assert [mapping for mapping, _ in served_problems([good, bad], PEER, 'm')] == [bad]
+    assert [mapping for mapping, _ in line_problems([good, bad], PEER, 'm')] == [bad]
 
 
 def loaded(*rows: str) -> tuple[Sequence[Mapping], list[str]]:

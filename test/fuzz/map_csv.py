@@ -21,7 +21,7 @@ import re
 from abdf1_ros.driver.map_file import load_mappings
 from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.network import Network
-from abdf1_ros.driver.served import served_problems
+from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError
 from fuzz.files import path_of
 from support.driver_bench import DriverBench
@@ -38,7 +38,7 @@ def one_input(data: bytes) -> None:
         problems = error.problems
         assert problems
         mappings = []
-    bad = served_problems(mappings, Network(), 'map.csv')
+    bad = line_problems(mappings, Network(), 'map.csv')
     problems += [problem for _, problem in bad]
     assert all(str(problem).isprintable() for problem in problems)
     left_out = [mapping for mapping, _ in bad]

@@ -141,11 +141,12 @@ class DriverBench:
     The driver on one end of a line, stations on the other, whole frames at a time.
 
     ``far.hear`` and ``far.say`` stand in the line: they return what comes through of a frame.
+    ``chunk`` bytes are handed over together.
     """
 
     def __init__(self, mappings: Sequence[Mapping], *, network: Network | None = None,
                  settings: DriverSettings | None = None, start: bool = True,
-                 listener: Listener | None = None) -> None:
+                 listener: Listener | None = None, chunk: int = _WHOLE_FRAMES) -> None:
         self.network = network or Network(baud=115200, timeout=200)
         self.listener = Recorder(self.clock)
         self.driver = Driver(
@@ -153,7 +154,7 @@ class DriverBench:
         self._stations: list[LineStation] = []
         self.far = _FarEnd(self._stations, self.network)
         self.line = VirtualLine(
-            self.driver.machine, self.far, baud=self.network.baud, chunk=_WHOLE_FRAMES)
+            self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], None]]] = []
         self._count = itertools.count()
         self.far.start(0.0)

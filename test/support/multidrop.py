@@ -30,7 +30,7 @@ from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.errors import CommandTimeout
+from abdf1_ros.errors import CommandTimeout, LinkError
 from abdf1_ros.messages import Event
 from support.peers import Errand
 from support.virtual_line import char_time, VirtualLine
@@ -204,7 +204,7 @@ class Slave:
     def delivered(self, command: Packet) -> None:
         """Do nothing."""
 
-    def undelivered(self, command: Packet) -> None:
+    def undelivered(self, command: Packet, error: LinkError) -> None:
         """Keep what the master did not take."""
         self.failed.append(command)
 

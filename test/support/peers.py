@@ -38,6 +38,7 @@ class Errand:
     def __init__(self, command: Packet, clock: Callable[[], float]) -> None:
         self.command = command
         self.sent = False
+        self.reply_size = 0
         self.result: Packet | LinkError | None = None
         self.begun = clock()
         self.ended: float | None = None

@@ -17,7 +17,8 @@ A line in virtual time: machines, a baud rate and seeded noise.
 
 What one machine sends reaches all the others, byte by byte, a character's time apart; each
 direction is a wire of its own, so a half-duplex master with its slaves fits as well as two
-full-duplex peers. Nothing waits: the clock jumps to the next arrival or deadline.
+full-duplex peers. Nothing waits: the clock jumps to the next arrival or deadline. A machine that
+has time to spare hears nothing until it is over, and then all that has come.
 """
 
 from __future__ import annotations
@@ -92,6 +93,7 @@ class VirtualLine:
         self._chunk = chunk
         self._random = Random(seed)
         self._free = [0.0] * len(machines)  # when each sender's last byte has left
+        self._away = [0.0] * len(machines)  # until when
         self._arrivals: list[tuple[float, int, int, bytes]] = []
         self._count = 0
 
@@ -123,28 +125,46 @@ class VirtualLine:
         self.now = end
 
     def _next_time(self) -> float:
-        times = [machine.deadline for machine in self._machines if machine.deadline is not None]
+        times = self._deadlines()
         if self._arrivals:
             times.append(self._arrivals[0][0])
-        return max(self.now, min(times, default=float('inf')))
+        return max(self.now, min(times))
+
+    def _deadlines(self) -> list[float]:
+        """Return when each machine is to be told the time."""
+        return [float('inf') if machine.deadline is None else max(machine.deadline, until)
+                for machine, until in zip(self._machines, self._away, strict=True)]
 
     def _advance(self) -> bool:
         """Carry out the next event; return False when there is none."""
         arrival = self._arrivals[0][0] if self._arrivals else float('inf')
         first, deadline = -1, float('inf')
-        for index, machine in enumerate(self._machines):
-            if machine.deadline is not None and machine.deadline < deadline:
-                first, deadline = index, machine.deadline
+        for index, due in enumerate(self._deadlines()):
+            if due < deadline:
+                first, deadline = index, due
         if arrival <= deadline:
             if not self._arrivals:
                 return False
-            self.now, _, first, data = heapq.heappop(self._arrivals)
+            self.now, number, first, data = heapq.heappop(self._arrivals)
+            if self.now < self._away[first]:
+                heapq.heappush(self._arrivals, (self._away[first], number, first, data))
+                return True
+            if self.now == self._away[first]:
+                data += self._rest_for(first)
             self._machines[first].receive_data(data, self.now)
+            self._away[first] = self.now + self._machines[first].spare_time
         else:
             self.now = max(self.now, deadline)
             self._machines[first].handle_timeout(self.now)
         self._take(first)
         return True
+
+    def _rest_for(self, receiver: int) -> bytes:
+        """Return what else has come for a machine that was away."""
+        rest = b''
+        while self._arrivals and self._arrivals[0][0:3:2] == (self.now, receiver):
+            rest += heapq.heappop(self._arrivals)[3]
+        return rest
 
     def _take(self, sender: int) -> None:
         """Put on the wire what a machine has to send."""
