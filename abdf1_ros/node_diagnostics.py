@@ -235,9 +235,11 @@ class Diagnostics:
         points, found = self._driver.points.values(), self._freshness(now)
         values = {'total': str(len(points))}
         values |= {state.name.lower(): str(found.get(state, 0)) for state in Freshness}
-        return values | {
-            point.mapping.tag: _describe(point, now) for point in points
-            if point.freshness(now) is not Freshness.FRESH}
+        for point in points:
+            tag = point.mapping.tag
+            if point.freshness(now) is not Freshness.FRESH:
+                values[f'tag {tag}' if tag in values else tag] = _describe(point, now)
+        return values
 
 
 class NamesakeWatch:

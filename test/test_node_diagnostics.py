@@ -326,6 +326,12 @@ def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
     assert 'speed' not in values
 
 
+def test_tag_does_not_stand_in_for_a_count(make_bench: Callable[..., Bench]) -> None:
+    values = details(make_bench('total,Read,N7:0,1,PLC5,1000').status('mappings'))
+    assert values['total'] == '1'
+    assert values['tag total'] == 'waiting for the first read: N7:0 at station 1, never read'
+
+
 def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
     assert make_bench(ROWS[2]).says('mappings') == (OK, 'OK: no mapping reads')
 
