@@ -38,7 +38,7 @@ from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.node_messages import MESSAGES
 from abdf1_ros.numerals import decimal_number
 from abdf1_ros.paths import config_file
-from abdf1_ros.terminal import interruptible
+from abdf1_ros.terminal import ignore_further, interruptible
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -331,6 +331,7 @@ def _tell(demo: Demo, seconds: float) -> int:
         print(f'demo: {reason}', file=sys.stderr)
         return 1
     finally:
+        ignore_further()  # or a process of ours might stay
         demo.close()
     return 0
 

@@ -26,6 +26,7 @@ import argparse
 from collections import defaultdict, deque
 from collections.abc import Sequence
 import random
+import re
 import signal
 import sys
 import threading
@@ -88,7 +89,8 @@ examples:
   node --ros-args -p net_file:=net.csv -p map_file:=map.csv
   node --ros-args -p port:=/dev/ttyUSB0 -r __node:=line_1
 
-exit status: 0 after Ctrl-C or SIGTERM, 2 for faulty files or parameters, 1 after internal errors
+exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty files or parameters,
+1 after internal errors
 """
 
 # So many values of a reply are published while its ACK is on the line (two characters), the
@@ -101,10 +103,15 @@ _LEVEL_CHECK_PERIOD = 0.1
 # How long the end waits for its last diagnostics to arrive, where a subscriber is stuck.
 _LAST_WORDS = Duration(seconds=0.5)
 
+# Nothing that came before the end is still waiting when nothing comes for so long (s), and a
+# publisher that never rests is not waited for any longer than the other.
+_QUIET = 0.05
+_LAST_WRITES = 0.5
+
 _MOST_NAMES = 5  # in a line of the log
 
 # What rclpy's errors about the directory of the logs begin with.
-_LOG_FAILURES = 'failed to initialize logging', 'Failed opening file'
+_LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
 
 _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
@@ -352,7 +359,7 @@ class BridgeNode(Node):
 
 def main(args: Sequence[str] | None = None) -> int:
     """
-    Run the node until SIGINT or SIGTERM.
+    Run the node until SIGINT, SIGTERM or SIGHUP.
 
     Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors.
     """
@@ -364,6 +371,8 @@ def main(args: Sequence[str] | None = None) -> int:
     given = list(sys.argv if args is None else args)
     signal.signal(signal.SIGINT, end)
     signal.signal(signal.SIGTERM, end)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # not under nohup
+        signal.signal(signal.SIGHUP, end)
     try:
         _parse(remove_ros_args(given)[1:])
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
@@ -396,7 +405,7 @@ def _few(names: Sequence[str]) -> str:
 def _refusal(text: str) -> str:
     """Return rclpy's own words for what it does not take, and what to look at."""
     text = printable(' '.join(text.split()))
-    if text.startswith(_LOG_FAILURES):
+    if _LOG_FAILURES.match(text):
         return f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
     return f'bad arguments: {text}'
 
@@ -417,6 +426,13 @@ def _spin(node: BridgeNode, ended: threading.Event) -> None:
     node.start()
     while not ended.is_set() and not node.link.has_failed:
         executor.spin_once(timeout_sec=0.1)
+    node.link.stop()
+    # Writes that have come already are refused now; whoever waits for a result gets it.
+    give_up = time.monotonic() + _LAST_WRITES
+    is_idle = False
+    while not is_idle and (begun := time.monotonic()) < give_up:
+        executor.spin_once(timeout_sec=_QUIET)
+        is_idle = time.monotonic() - begun >= _QUIET
     executor.shutdown()
 
 

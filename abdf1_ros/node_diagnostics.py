@@ -81,8 +81,8 @@ class Diagnostics:
         self._driver = driver
         self._port = port
         self._link: LinkThread | None = None
-        self._last_error: tuple[Event, float] | None = None
-        self._last_events: dict[int | None, Event] = {}
+        self._last_error: _Moment | None = None
+        self._last_events: dict[int | None, _Moment] = {}
         self._writes = WriteLog()
         self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
         self._rate = _Rate()
@@ -91,7 +91,7 @@ class Diagnostics:
             Section('counters', port, self._judge_counters, lambda now: self._counters()),
             *(self._station_section(station, port) for station in driver.stations),
             Section('mappings', port, self._judge_mappings, self._mapping_values),
-            Section('writes', port, self._writes.judge, lambda now: self._writes.values()),
+            Section('writes', port, self._writes.judge, self._writes.values),
         ]
         self._node_name = node_name
 
@@ -103,7 +103,9 @@ class Diagnostics:
         """Remember the last numbered error, and the last thing unusual at each station."""
         if event.message is Message.NTC_REPLY_MSG_RCVD:
             return
-        self._last_events[event.station] = event
+        # That a station is inactive has its own keys; what it has become so by does not.
+        if event.message is not Message.ERR_INACTIVE_STATION:
+            self._last_events[event.station] = event, now
         if event.message.severity is not Severity.NOTICE:
             self._last_error = event, now
 
@@ -169,11 +171,8 @@ class Diagnostics:
             'expected scan time': _milliseconds(self._driver.expected_scan_time),
             **_periods(self._driver.points.values()),
             **_poll_scans(self._driver),
-            'last error': 'none',
+            'last error': _with_age(self._last_error, now),
         }
-        if self._last_error is not None:
-            event, when = self._last_error
-            values['last error'] = f'{event} ({now - when:.1f} s ago)'
         return values
 
     def _counters(self) -> dict[str, str]:
@@ -213,7 +212,7 @@ class Diagnostics:
             'replies': str(station.replies),
             'transactions without reply': str(station.failures),
             'error replies': str(station.remote_errors),
-            'last event': str(self._last_events.get(station.number, 'none')),
+            'last event': _with_age(self._last_events.get(station.number), now),
             **health_values(self._driver.health.known(station.number), now),
         }
 
@@ -240,6 +239,15 @@ class Diagnostics:
             if point.freshness(now) is not Freshness.FRESH:
                 values[f'tag {tag}' if tag in values else tag] = _describe(point, now)
         return values
+
+
+_Moment = tuple[Event | str, float]
+"""What has happened, and when (clock value in s)."""
+
+
+def _with_age(moment: _Moment | None, now: float) -> str:
+    """Return what has happened last, and how long ago."""
+    return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
 
 
 class NamesakeWatch:
@@ -292,11 +300,14 @@ class WriteLog:
             return WARN, f'{summary}; {result.mapping.tag} {result}'
         return OK, summary
 
-    def values(self) -> dict[str, str]:
+    def values(self, now: float) -> dict[str, str]:
         """Return the counts and the last failure."""
         counts = self._counts
         failed = sum(counts[outcome] for outcome in _FAILURES)
-        last = self._last_failure
+        last = None
+        if self._last_failure is not None:
+            result, when = self._last_failure
+            last = f'{result.mapping.tag} {result}', when
         return {
             'accepted': str(counts.total() - counts[Outcome.REFUSED]),
             'confirmed': str(counts[Outcome.WRITTEN]),
@@ -304,7 +315,7 @@ class WriteLog:
             'unknown': str(counts[Outcome.UNKNOWN]),
             'superseded': str(counts[Outcome.SUPERSEDED]),
             'refused': str(counts[Outcome.REFUSED]),
-            'last failure': f'{last[0].mapping.tag} {last[0]}' if last else 'none',
+            'last failure': _with_age(last, now),
         }
 
 

@@ -75,15 +75,16 @@ def interruptible() -> Iterator[None]:
     try:
         yield
     finally:
-        _ignore_further()
+        ignore_further()
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    _ignore_further()
+    ignore_further()
     raise KeyboardInterrupt
 
 
-def _ignore_further() -> None:
+def ignore_further() -> None:
+    """Let nothing interrupt what is done from now on: it is the end."""
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
 

@@ -279,11 +279,13 @@ def test_station_that_answers(bench: Bench) -> None:
 def test_station_that_is_silent(bench: Bench) -> None:
     bench.driver.stations.heard(2, NOW - 20)
     bench.driver.stations.lost(2, NOW - 12.3)
+    bench.diagnostics.happened(Event(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2), NOW - 12.3)
     bench.diagnostics.happened(Event(Message.ERR_INACTIVE_STATION, (2,), 2), NOW - 12.3)
     assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive since 12.3 s')
     values = details(bench.status('station 2'))
     assert (values['active'], values['last answer']) == ('no', '20.0 s ago')
-    assert values['last event'].startswith('2509 ERR_INACTIVE_STATION: Slave Station (2)')
+    assert values['last event'] == (  # what it has become inactive by
+        '2520 NTC_ENQ_LIMIT_EXCEEDED: ENQ Retry Limit (3) exceeded [station 2] (12.3 s ago)')
     assert bench.says('station 1')[0] == OK
 
 
@@ -383,11 +385,11 @@ def test_every_outcome_is_counted_in_its_place(
         bench: Bench, outcome: Outcome, expected: dict[str, Any]) -> None:
     log = WriteLog()
     log.add(result(bench, outcome, 'why'), NOW)
-    values = log.values()
+    values = log.values(NOW + 1)
     last = values.pop('last failure')
     assert {key: value for key, value in values.items() if value != '0'} == expected
     is_failure = outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED)
-    assert last == (f'level {outcome.value}: why' if is_failure else 'none')
+    assert last == (f'level {outcome.value}: why (1.0 s ago)' if is_failure else 'none')
     assert log.judge(NOW)[0] == (WARN if is_failure else OK)
 
 
@@ -404,4 +406,4 @@ def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
     assert bench.says('writes', NOW + 9.9) == (WARN, warning)
     assert bench.says('writes', NOW + 10) == (OK, 'OK: 2 of 3 writes confirmed')
     assert details(bench.status('writes', NOW + 10))['last failure'] == \
-        'level unknown whether written: no reply'
+        'level unknown whether written: no reply (10.0 s ago)'

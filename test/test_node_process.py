@@ -116,6 +116,29 @@ def test_ends_well_while_values_come_in(
     observer.forget(speeds)
 
 
+def test_every_write_that_has_come_has_its_result_at_the_end(
+        observer: Observer, files: Files) -> None:
+    results = observer.results('/last')
+    with files.start_simulator() as simulator, \
+            Process('node', *files.args(), '-r', '__node:=last') as node:
+        message = Float32MultiArray(data=[1.0, 2.0, 3.0])
+        publisher = observer.publisher(Float32MultiArray, '/last/write/levels')
+        publisher.publish(message)
+        results.first()
+        for _ in range(500):
+            publisher.publish(message)
+        node.end()
+        simulator.end()
+    observer.until(lambda: len(results) == 501, lambda: f'501 results, got {len(results)}')
+    observer.forget(results)
+
+
+def test_ends_with_its_terminal(files: Files) -> None:
+    with Process('node', *files.args()) as node:
+        node.wait_for('cannot open the port')
+        node.end(signal.SIGHUP)
+
+
 def test_ends_well_while_the_port_is_missing(files: Files) -> None:
     with Process('node', *files.args()) as one, Process('node', *files.args()) as two, \
             Process('node', *files.args()) as three:

@@ -256,7 +256,8 @@ class Health:
         """Drop what a station has said, and end the requests that it will not answer."""
         known = self.known(station)
         self._known[station] = StationHealth(
-            counters=known.counters, no_counters=known.no_counters)
+            processor=f'unknown ({reason})', counters=known.counters,
+            no_counters=known.no_counters)
         for check in [check for check in self._checks if check.station == station
                       and check.kind is Kind.COUNTERS and not math.isinf(check.due)]:
             self._take_counters(station, {}, reason)

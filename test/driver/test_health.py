@@ -143,7 +143,7 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench.run(1.0)
     plc.faults = Faults(silent=True)
     bench.run_until(lambda: (1, False) in bench.listener.changes)
-    assert bench.driver.health.known(1).processor == 'unknown (not asked yet)'
+    assert bench.driver.health.known(1).processor == 'unknown (the station does not answer)'
     plc.processor.setting = Setting.RUN
     bench.run(10.0)
     assert len(ears.times(STATUS)) == 1
