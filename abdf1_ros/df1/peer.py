@@ -316,6 +316,7 @@ class FullDuplexPeer:
         for key in overdue:
             entry = self._outstanding.pop(key)
             self._counters.command_timeouts += 1
+            self._stations[key[0]].overdue += 1
             self._note(Message.ERR_COMMAND_TIMEOUT, station=key[0])
             entry.task.fail(CommandTimeout())
 

@@ -251,7 +251,9 @@ class StandardPollingMaster:
             return
         yield from self._between_polls(source)
         begun = self._machine.now
-        while self._stations[number].active:
+        for answers in range(1, MOST_QUEUED + 1):
+            if not self._stations[number].active:
+                return
             try:
                 entry = self._outstanding.get(number)
                 answer = yield from self._line.poll_with_retries(
@@ -260,8 +262,9 @@ class StandardPollingMaster:
                 self._end(number, error)
                 return
             yield from self._answered(number, answer)
-            if isinstance(answer, Control) or not self._polling.multiple \
-                    or self._line.is_full:
+            is_more_wanted = isinstance(answer, Frame) and self._polling.multiple \
+                and not self._line.is_full and answers < MOST_QUEUED
+            if not is_more_wanted:
                 yield from self._pace(begun)
                 return
 

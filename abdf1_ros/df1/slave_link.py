@@ -171,5 +171,6 @@ class SlaveLink:
             return
         number = entry.task.command.dst
         self._machine.counters.command_timeouts += 1
+        self._stations[number].overdue += entry.is_delivered
         self._report(Event(Message.ERR_COMMAND_TIMEOUT, (), number))
         entry.task.fail(CommandTimeout())

@@ -90,6 +90,7 @@ class Driver:
             forget_on_send=network.mode == 'Master')
         self.is_online = False
         self._to_serve: deque[Write] = deque()
+        self._has_begun_write = False
         self._tasks = JobTasks(network.station, settings.first_tns)
         self._settings = settings
         self._listener = listener
@@ -199,14 +200,27 @@ class Driver:
         return ReadJob(block, [self.points[mapping] for mapping in block.mappings])
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return the next command: of a write, of a job that is under way, or of a new one."""
+        """Return the next command: of a write first, but after some in a row of anything else."""
         self.expire(now)
+        task = self._next_of_writes(now, busy) if self._scheduler.is_turn_of_writes else None
+        return task or self._next_other(now, busy) or self._next_of_writes(now, busy)
+
+    def _next_of_writes(self, now: float, busy: Container[int]) -> Task | None:
+        """Return the next command of a write: new ones, and those under way, in turns."""
         under_way = self._tasks.waiting(busy)
-        write = self._scheduler.next_write(now, under_way is not None, busy)
+        write = None
+        if under_way is None or not self._has_begun_write:
+            write = self._scheduler.next_write(now, busy)
+        self._has_begun_write = write is not None
         if write is not None:
             return self._tasks.start(write.mapping.station, self._write_steps(write))
-        if under_way is not None:
-            return self._tasks.take(under_way)
+        if under_way is None:
+            return None
+        self._scheduler.write_goes_on()
+        return self._tasks.take(under_way)
+
+    def _next_other(self, now: float, busy: Container[int]) -> Task | None:
+        """Return the next check or read."""
         check = self.health.next_check(now, busy)
         if check is not None:
             return self._tasks.start(check.station, self.health.steps(check))

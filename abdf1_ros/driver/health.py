@@ -165,7 +165,9 @@ class Health:
         if now < self._next_due or self._scheduler.is_read_due(self._last_start):
             return None
         for check in sorted(self._checks, key=lambda check: check.due):
-            if check.due <= now and check.station not in busy:
+            if check.due <= now and check.station in busy:
+                return None  # it is next: others in between would make it the turn of reads
+            if check.due <= now:
                 check.due = self._wanted_from(check, now)
                 if check.due <= now:
                     return self._start(check, now)

@@ -32,6 +32,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Sequence
 import heapq
 import itertools
+import math
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.forecast import PATIENCE, scan_time
@@ -50,9 +51,9 @@ class ReadJob:
 
     ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
     between its last two good reads and ``longest`` the greatest of these; an outage of the
-    station does not count. ``is_hastened`` tells that a write has changed what it shows.
-    ``started`` is when the read under way or the last one began. ``ticket`` is the queue's: the
-    entry that counts.
+    station does not count. ``is_hastened`` tells that a write has changed what it shows, the
+    last time at ``hastened``. ``started`` is when the read under way or the last one began.
+    ``ticket`` is the queue's: the entry that counts.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint]) -> None:
@@ -66,6 +67,7 @@ class ReadJob:
         self.interval: float | None = None
         self.longest: float | None = None
         self.is_hastened = False
+        self.hastened = -math.inf
         self.started = 0.0
         self.ticket = 0
         self._last_done: float | None = None
@@ -104,7 +106,7 @@ class ReadJob:
 
     def done(self, now: float) -> None:
         """Take note of a good read."""
-        self.is_hastened = False
+        self.is_hastened = self.started < self.hastened
         if self._last_done is not None:
             self.interval = now - self._last_done
             self.longest = max(self.interval, self.longest or 0.0)

@@ -15,8 +15,9 @@
 """
 The scheduler: which job has the line next.
 
-Writes go first, but after four in a row a read that is due has its turn; which read that is, and
-how they share a line that is too slow for them, is told in ``read_queue``. The reads of a
+Writes go first, but after four of their commands in a row a check, probe or read that is due has
+its turn; which read that is, and how they share a line that is too slow for them, is told in
+``read_queue``. The reads of a
 station that is inactive, or acknowledges commands but does not reply to them in time, are set
 aside; every now and then one of them goes out as a probe, at a pace that leaves seven eighths
 of the line to the others. A write to an inactive station is a probe as well; those that follow
@@ -109,26 +110,31 @@ class Scheduler:
         """Queue a write; may be called from any thread."""
         self._inbox.append(write)
 
-    def next_write(self, now: float, is_read_waiting: bool = False,
-                   busy: Container[int] = ()) -> Write | None:
-        """
-        Return the next write, unless it is a read's turn.
+    @property
+    def is_turn_of_writes(self) -> bool:
+        """Tell whether writes go before all else that is due."""
+        return self._writes_in_a_row < MAX_WRITES_IN_A_ROW
 
-        ``is_read_waiting`` tells of something begun that wants to go on. Writes to
-        stations in ``busy`` keep waiting, and so does one of words that are being written: the
-        packets of two must not mix. Each that is returned ends with ``write_ended``.
+    def next_write(self, now: float, busy: Container[int] = ()) -> Write | None:
+        """
+        Return the next write.
+
+        Writes to stations in ``busy`` keep waiting, and so does one of words that are being
+        written: the packets of two must not mix. Each that is returned ends with
+        ``write_ended``.
         """
         self.expire(now)
         write = self._first_free(busy) if self._writes else None
-        is_reads_turn = self._writes_in_a_row >= MAX_WRITES_IN_A_ROW and (
-            is_read_waiting or self.is_read_due(now))
-        if write is None or is_reads_turn:
-            self._writes_in_a_row = 0
+        if write is None:
             return None
         self._writes.remove(write)
         self._writes_under_way.append(write)
         self._writes_in_a_row += 1
         return write
+
+    def write_goes_on(self) -> None:
+        """Take note that another packet of a write has the line."""
+        self._writes_in_a_row += 1
 
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that need not wait; those of a station keep their order."""
@@ -171,7 +177,10 @@ class Scheduler:
 
     def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
         """Return the next read or probe of a station not in ``busy``, None for nothing due."""
-        return self._take_probe(now) or self._take_read(now, busy)
+        job = self._take_probe(now, busy) or self._take_read(now, busy)
+        if job is not None:
+            self._writes_in_a_row = 0
+        return job
 
     def is_read_due(self, now: float) -> bool:
         """Tell whether a read of an active station is due; those of others are set aside."""
@@ -201,8 +210,12 @@ class Scheduler:
             self._park(job)
             return
         self.release(job.station, now)
-        is_whole = not job.is_under_way
-        self._reads.put(job, max(job.due + job.block.period, job.started) if is_whole else job.due)
+        if job.is_under_way:
+            self._reads.put(job, job.due)
+        elif job.started < job.hastened:  # it had begun before the write
+            self._reads.put(job, now)
+        else:
+            self._reads.put(job, max(job.due + job.block.period, job.started))
 
     def unanswered(self, now: float) -> None:
         """Take note that a write has found its station inactive: the next ones do not try."""
@@ -235,7 +248,7 @@ class Scheduler:
         self.release(write.mapping.station, now)
         for job in self._reads.jobs:
             if job.covers(write):
-                job.is_hastened = True
+                job.is_hastened, job.hastened = True, now
                 if job.due > now:
                     self._reads.put(job, now)
 
@@ -248,28 +261,36 @@ class Scheduler:
             self._report(write.result(Outcome.NOT_SENT, detail, now))
 
     def _queue(self, write: Write, now: float) -> None:
-        at = len(self._writes)
-        older = [old for old in self._writes if old.mapping is write.mapping]
-        if older and not write.is_pulse:
-            at = self._writes.index(older[0])
-            self._writes.remove(older[0])
-            self._report(older[0].result(Outcome.SUPERSEDED, '', now))
-            # In its place, or a topic that never rests would wait behind all others for ever;
-            # but not before what was asked for in between of the same words.
-            if any(map(write.overlaps, itertools.islice(self._writes, at, None))):
-                at = len(self._writes)
-        self._writes.insert(at, write)
+        """
+        Let a write wait, in the place of an older value of its mapping.
 
-    def _take_probe(self, now: float) -> ReadJob | None:
+        At the end, a topic that never rests would wait for ever. But nothing that was asked for
+        in between of the same words is overtaken: then the older value goes out as well, or two
+        such topics would put each other off for ever.
+        """
+        older = [] if write.is_pulse else [
+            old for old in self._writes if old.mapping is write.mapping]
+        if not older:
+            self._writes.append(write)
+            return
+        at = self._writes.index(older[-1])
+        is_overlapped = any(
+            map(write.overlaps, itertools.islice(self._writes, at + 1, None)))
+        if len(older) > 1 or not is_overlapped:
+            self._writes.remove(older[-1])
+            self._report(older[-1].result(Outcome.SUPERSEDED, '', now))
+        self._writes.insert(len(self._writes) if is_overlapped else at, write)
+
+    def _take_probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         if not self._parked:
             return None
         for number in list(self._parked):
             if self._stations[number].replies_in_time:  # to a write, or to somebody else
                 self.release(number, now)
-        if not self._parked or now < self._next_probe:
+        station = next((number for number in self._parked if number not in busy), None)
+        if station is None or now < self._next_probe:
             return None
         self._last_probe_was_echo = False
-        station = next(iter(self._parked))
         jobs = self._parked.pop(station)
         job = jobs.popleft()
         job.due = now

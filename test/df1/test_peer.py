@@ -1046,6 +1046,21 @@ def test_silent_station_is_probed_with_one_try() -> None:
     assert peer.counts()['enq_limit_exceeded'] == len(peer.only(2520)) == 1  # not of a probe
 
 
+def test_replies_that_do_not_come_in_time_are_counted_until_one_does() -> None:
+    peer = bench()
+    for number in range(1, 4):
+        peer.begin(later(COMMAND, number))
+        peer.said()
+        peer.hear(ACK)
+        peer.wait(CMD_TIMEOUT + 0.1)
+        assert peer.stations[1].overdue == number
+    peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    peer.hear_packet(REPLY)
+    assert peer.stations[1].overdue == 0
+
+
 def test_refusing_station_is_probed_with_one_try() -> None:
     peer = bench()
     lose(peer)

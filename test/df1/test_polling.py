@@ -497,6 +497,16 @@ def test_start_is_a_clean_one() -> None:
     assert rig.master.counts()['stale_messages'] == 1
 
 
+def test_station_that_always_has_a_message_does_not_keep_the_line() -> None:
+    rig = bench(PollingSettings((1, 2), multiple=True))
+    for number in range(5000):
+        rig[1].outbox.append(Packet(5, 1, 0x4F, 0, number))  # replies to nothing
+    errands = [rig.ask(2) for _ in range(10)]
+    rig.start()
+    rig.run(3.0)
+    assert all(isinstance(errand.result, Packet) for errand in errands)
+
+
 def test_multiple_messages_stop_when_no_more_can_be_kept() -> None:
     rig = bench(PollingSettings((1, 2), multiple=True))
     for _ in range(40):

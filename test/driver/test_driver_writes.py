@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import itertools
 import math
 
 from abdf1_ros.df1 import frames
@@ -24,6 +25,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.mapping import Mapping
+from abdf1_ros.driver.network import Network, POLLING_MODES
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.simulated_plc import SimulatedPlc
 import pytest
@@ -176,3 +178,32 @@ def test_nothing_that_waited_survives_an_outage() -> None:
     assert bench.driver.stations[1].active
     assert executed.writes == []
     assert len(bench.listener.results) == 6
+
+
+@pytest.mark.parametrize('polling', POLLING_MODES)
+@pytest.mark.parametrize(('text', 'length'), [('N10:0', 200), ('B3:0/0', 40)])
+def test_writes_of_several_packets_leave_reads_their_turns(
+        polling: str, text: str, length: int) -> None:
+    read = make_mapping('N7:0', plc='SLC', period=200)
+    write = make_mapping(text, 'Write', plc='SLC', length=length)
+    bench = DriverBench([read, write], network=Network(
+        baud=19200, timeout=300, polling=polling))
+    bench.plc(1, 'SLC', ('N7:0', 10), ('N10:0', 200), ('B3:0', 10))
+    for number in range(600):
+        bench.at(number / 20, lambda number=number: bench.write(  # type: ignore[misc]
+            write, [number % 2] * length))
+    bench.run(30.0)
+    times = bench.listener.times(read)
+    assert len(times) > 40
+    assert max(after - before for before, after in itertools.pairwise(times)) < 1.0
+
+
+def test_read_that_was_under_way_is_repeated_after_a_write() -> None:
+    read = make_mapping('N7:0', plc='SLC', length=240, period=30_000)
+    write = make_mapping('N7:0', 'Write', plc='SLC')
+    bench = DriverBench([read, write], network=Network(baud=9600, timeout=300))
+    bench.plc(1, 'SLC', ('N7:0', 240))
+    bench.at(30.4, lambda: bench.write(write, [77]))  # between the packets of the second read
+    bench.run(33.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.listener.values(read)[-1][0] == 77

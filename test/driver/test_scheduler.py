@@ -58,11 +58,12 @@ class Bench:
 
     def next(self, now: float) -> ReadJob | Write | None:
         """Return the next job, as the driver asks for it."""
-        return self.next_write(now) or self.scheduler.next_read(now)
+        write = self.next_write(now) if self.scheduler.is_turn_of_writes else None
+        return write or self.scheduler.next_read(now) or self.next_write(now)
 
-    def next_write(self, now: float, *args: bool) -> Write | None:
+    def next_write(self, now: float) -> Write | None:
         """Take the next write, which ends at once."""
-        write = self.scheduler.next_write(now, *args)
+        write = self.scheduler.next_write(now)
         if write is not None:
             self.scheduler.write_ended(write)
         return write
@@ -158,12 +159,17 @@ def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
     assert order == [*writes[:4], job, *writes[4:8], job, *writes[8:]]
 
 
-def test_read_that_has_begun_gets_its_turn_as_well() -> None:
-    bench = Bench()
-    for n in range(6):
-        bench.write(BIT, n % 2, 0.0)
-    taken = [bench.next_write(0.0, True) for _ in range(7)]
-    assert [write is not None for write in taken] == [True] * 4 + [False] + [True] * 2
+def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
+    job = make_job()
+    bench = Bench(job)
+    write = bench.write(WORD, 1, 0.0)
+    assert bench.next(0.0) is write
+    for _ in range(MAX_WRITES_IN_A_ROW - 1):
+        assert bench.scheduler.is_turn_of_writes
+        bench.scheduler.write_goes_on()
+    bench.write(WORD, 2, 0.0)
+    assert bench.next(0.0) is job
+    assert bench.scheduler.is_turn_of_writes
 
 
 def test_writes_go_on_when_no_read_is_due() -> None:
@@ -173,7 +179,7 @@ def test_writes_go_on_when_no_read_is_due() -> None:
     assert [bench.next(0.5) for _ in range(11)] == [*writes, None]
 
 
-def test_writes_go_on_when_the_only_read_that_is_due_is_of_an_inactive_station() -> None:
+def test_probe_of_an_inactive_station_has_its_turn_among_writes() -> None:
     bench = Bench(make_job(station=9))
     bench.stations.lost(9, 0.0)
     bench.read(0.0)
@@ -181,7 +187,7 @@ def test_writes_go_on_when_the_only_read_that_is_due_is_of_an_inactive_station()
     late = make_job('N9:0', station=9)
     bench.scheduler.add_reads([late], 0.0)
     writes = [bench.write(BIT, n % 2, 0.0) for n in range(6)]
-    assert [bench.next(0.0) for _ in range(6)] == writes
+    assert [bench.next(0.0) for _ in range(7)] == [*writes[:5], late, *writes[5:]]
 
 
 def test_waiting_writes_of_a_word_collapse_to_the_newest() -> None:
@@ -198,11 +204,27 @@ def test_waiting_writes_of_a_word_collapse_to_the_newest() -> None:
 
 def test_newer_value_does_not_overtake_what_was_asked_for_meanwhile_of_the_same_words() -> None:
     bench, both = Bench(), make_mapping('N7:5', 'Write', length=2)
-    bench.write(WORD, 1, 0.0)
+    old = bench.write(WORD, 1, 0.0)
     between = Write(both, [2, 2], 0.1)
     bench.scheduler.add_write(between)
-    new = bench.write(WORD, 3, 0.2)
-    assert [bench.next(0.5), bench.next(0.5)] == [between, new]
+    bench.write(WORD, 3, 0.2)
+    new = bench.write(WORD, 4, 0.3)
+    taken = [bench.next(0.5) for _ in range(4)]
+    assert [taken[0], taken[1:]] == [old, [between, new, None]]
+    assert bench.outcomes() == [Outcome.SUPERSEDED]
+
+
+def test_topics_of_the_same_words_that_never_rest_share_the_line() -> None:
+    bench, both = Bench(), make_mapping('N7:5', 'Write', length=2)
+    sent = Counter[str]()
+    for turn in range(300):
+        for mapping in (WORD, both, OTHER):
+            bench.scheduler.add_write(Write(mapping, [turn] * mapping.length, turn / 10))
+        write = bench.next_write(turn / 10)
+        assert write is not None
+        sent[write.mapping.tag + str(write.mapping.length)] += 1
+    assert min(sent.values()) > 60
+    assert len(sent) == len({(mapping.tag, mapping.length) for mapping in (WORD, both, OTHER)})
 
 
 def test_topics_that_never_rest_share_the_line() -> None:
@@ -587,9 +609,9 @@ class AnyOrder(RuleBasedStateMachine):
         mapping = make_mapping(text, 'Write', station=station)
         self.accepted.append(self.bench.write(mapping, 1, self.now))
 
-    @rule(reading=st.booleans(), worked=st.booleans())
-    def take_write(self, reading: bool, worked: bool) -> None:
-        write = self.bench.next_write(self.now, reading)
+    @rule(worked=st.booleans())
+    def take_write(self, worked: bool) -> None:
+        write = self.bench.next_write(self.now)
         if write is not None:
             self.sent.append(write)
             if worked:
