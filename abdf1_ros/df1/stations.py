@@ -35,7 +35,7 @@ class Station:
     ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
     first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
     nodes that we pass on may have the same TNS. ``overdue`` counts the commands in a row that
-    were delivered and whose reply did not come within Cmd_Timeout, where that keeps others waiting.
+    were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
     """
 
     number: int
