@@ -303,7 +303,7 @@ def test_error_replies_are_shown_with_their_meaning(bridge: Bridge) -> None:
         status = until_status(bridge.diagnostics, 'mappings', ERROR,
                               lambda status: details(status)['failed'] == '12')
         assert re.fullmatch(r'failed: L10:0 at station 2, last read \d+\.\d s ago; STS 10: .+',
-                            details(status)['total']), status
+                            details(status)['tag total']), status
         station = find_status(bridge.diagnostics[-1], 'station 2')
         assert station.level == OK  # it answers
         assert int(details(station)['error replies']) >= 8

@@ -133,6 +133,15 @@ def test_every_write_that_has_come_has_its_result_at_the_end(
     observer.forget(results)
 
 
+@pytest.fixture
+def hangups() -> Iterator[None]:
+    """Let processes end with their terminal, also where the tests themselves do not."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures('hangups')
 def test_ends_with_its_terminal(files: Files) -> None:
     with Process('node', *files.args()) as node:
         node.wait_for('cannot open the port')
