@@ -22,6 +22,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.launch_stand_in import SOURCE
 from support.ros import EVERYTHING, Observer, Process, ros_args
+from support.simulator_process import OFTEN
 import yaml
 
 FILE = SOURCE / 'config' / 'diagnostics_aggregator.yaml'
@@ -52,8 +53,8 @@ def test_entries_are_complete() -> None:
 def test_every_status_of_a_node_belongs_to_its_entry(node: str) -> None:
     with Observer() as observer:
         inbox = observer.listen(DiagnosticArray, '/diagnostics', EVERYTHING)
-        arguments = [*ros_args('port:=/dev/ttyS99'), '-r', f'__node:={node}']
-        with Process('node', *arguments) as process:
+        arguments = ros_args('port:=/dev/ttyS99', OFTEN)
+        with Process('node', *arguments, '-r', f'__node:={node}') as process:
             names = [status.name for status in inbox.first().status]
             process.end()
     assert {f'{node}: {what}' for what in ('link', 'counters', 'mappings', 'writes')} < set(names)

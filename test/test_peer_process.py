@@ -186,9 +186,10 @@ class Line:
         assert not any('Traceback' in line for line in self.simulator.lines)
 
 
-@pytest.fixture(params=['CRC', 'BCC'])
+@pytest.fixture
 def line(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Line]:
-    made = Line(tmp_path, request.param)
+    """Return a line with CRC, or with the check that a test names."""
+    made = Line(tmp_path, getattr(request, 'param', 'CRC'))
     yield made
     made.close()
 
@@ -206,6 +207,10 @@ def typed_write(element: int, *values: int) -> bytes:
                   0x99, 0x09, 1 + len(words), 0x42)) + words
 
 
+both_checks = pytest.mark.parametrize('line', ['CRC', 'BCC'], indirect=True)
+
+
+@both_checks
 @pytest.mark.parametrize('is_slow', [False, True])
 def test_commands(line: Line, is_slow: bool) -> None:
     client = line.client
@@ -222,6 +227,7 @@ def test_commands(line: Line, is_slow: bool) -> None:
     assert client.ask(1, 0x0B, b'\2', is_slow) == b'\x10'
 
 
+@both_checks
 def test_responses(line: Line) -> None:
     client = line.client
     client.say(ENQ)
@@ -253,6 +259,7 @@ def test_responses(line: Line) -> None:
     client.say(ACK)
 
 
+@both_checks
 def test_message_of_the_plc(line: Line) -> None:
     client = line.client
     line.simulator.tell('msg 1 N7:50 11 22')

@@ -36,7 +36,7 @@ from support.ros import (
     until_status,
     values_in,
 )
-from support.simulator_process import Files, make_files
+from support.simulator_process import Files, make_files, OFTEN
 
 SPEEDS = (1200, -800)  # of station 1
 SETPOINT = 21.5  # of station 2
@@ -122,7 +122,7 @@ def rigged(observer: Observer, files: Files, port: str, simulator: Process,
         'speeds': observer.listen(Int16MultiArray, '/abdf1/read/speeds', EVERYTHING),
         'setpoint': observer.listen(Float32MultiArray, '/abdf1/read/setpoint', EVERYTHING)}
     arguments = ros_args(f'net_file:={files.net}', f'map_file:={files.map}', f'port:={port}',
-                         *assignments)
+                         OFTEN, *assignments)
     with Process(program, *arguments) as node:
         rig = Rig(observer, files, simulator, node, **inboxes)
         try:

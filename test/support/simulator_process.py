@@ -65,6 +65,9 @@ MAP_ROWS = (
     'reset,Write,B3:1/5,2,SLC,,,,,,',
 )
 
+# Diagnostics that come often, so that who waits for them does not wait long.
+OFTEN = 'diagnostics_period:=0.2'
+
 SIMULATOR_HEADER = 'Station,PLC_Type,Address,Length,Values,Motion,Period'
 SIMULATOR_ROWS = (
     '1,PLC5,I:000,16,,,',
@@ -144,7 +147,7 @@ class Files:
 
     def args(self, *assignments: str) -> list[str]:
         return ros_args(f'net_file:={self.net}', f'map_file:={self.map}',
-                        f'port:={self.port}', *assignments)
+                        f'port:={self.port}', OFTEN, *assignments)
 
     def start_simulator(self) -> Process:
         simulator = Process('simulator', '--pty', str(self.port), '--data', str(self.simulator))

@@ -40,7 +40,7 @@ from support.ros import (
     values_in,
     write_csv,
 )
-from support.simulator_process import NET_HEADER, NET_ROW
+from support.simulator_process import NET_HEADER, NET_ROW, OFTEN
 
 STATIONS = {'Master': 5, 'Slave': 9}
 
@@ -156,7 +156,8 @@ class Line:
             self.observer.listen(Int16MultiArray, f'/{name}/read/ours', EVERYTHING),
             self.observer.listen(Int16MultiArray, f'/{name}/read/theirs', EVERYTHING))
         node = Process('node', *ros_args(
-            f'net_file:={net}', f'map_file:={rows}', f'port:={port}', *assignments),
+            f'net_file:={net}', f'map_file:={rows}', f'port:={port}', OFTEN,
+            *assignments),
             '-r', f'__node:={name}')
         self.ends.append(End(self.observer, name, node, *inboxes))
         return self.ends[-1]

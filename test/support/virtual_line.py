@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 import heapq
+import math
 from random import Random
 from typing import Protocol
 
@@ -120,31 +121,22 @@ class VirtualLine:
     def run_for(self, seconds: float) -> None:
         """Let ``seconds`` pass."""
         end = self.now + seconds
-        while self._next_time() <= end:
-            self._advance()
+        while self._advance(end):
+            pass
         self.now = end
 
-    def _next_time(self) -> float:
-        times = self._deadlines()
-        if self._arrivals:
-            times.append(self._arrivals[0][0])
-        return max(self.now, min(times))
-
-    def _deadlines(self) -> list[float]:
-        """Return when each machine is to be told the time."""
-        return [float('inf') if machine.deadline is None else max(machine.deadline, until)
-                for machine, until in zip(self._machines, self._away, strict=True)]
-
-    def _advance(self) -> bool:
-        """Carry out the next event; return False when there is none."""
-        arrival = self._arrivals[0][0] if self._arrivals else float('inf')
-        first, deadline = -1, float('inf')
-        for index, due in enumerate(self._deadlines()):
-            if due < deadline:
-                first, deadline = index, due
+    def _advance(self, end: float = math.inf) -> bool:
+        """Carry out the next event; return False when there is none up to ``end``."""
+        arrival = self._arrivals[0][0] if self._arrivals else math.inf
+        first, deadline = -1, math.inf
+        for index, machine in enumerate(self._machines):
+            if machine.deadline is not None:
+                due = max(machine.deadline, self._away[index])
+                if due < deadline:
+                    first, deadline = index, due
+        if min(arrival, deadline) > end or first < 0 and not self._arrivals:
+            return False
         if arrival <= deadline:
-            if not self._arrivals:
-                return False
             self.now, number, first, data = heapq.heappop(self._arrivals)
             if self.now < self._away[first]:
                 heapq.heappush(self._arrivals, (self._away[first], number, first, data))
