@@ -304,6 +304,8 @@ def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(pty: Pty) -
     thread = Impatient(script.machine, lambda: open_port(Network(com_port=str(pty.name))), 3)
     thread.start()
     assert pty.read(5) == READY
+    began = time.monotonic()
+    wait_until(lambda: time.monotonic() > began + 0.02)  # a line of that speed is not faster
     pty.write(frame[:8])
     wait_until(lambda: bool(thread.pauses))
     pty.write(frame[8:])

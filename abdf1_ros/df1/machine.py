@@ -139,8 +139,9 @@ class Machine:
         if not self.reply_size or not self.decoder.in_message:
             return 0.0
         data = self.decoder.link_data
-        if not begins_good_reply(data):
-            return 0.0
+        is_faster = self.now - self._line_free < len(data) * self._timing.char_time
+        if is_faster or not begins_good_reply(data):
+            return 0.0  # it is no line of that speed, such as a simulator's; or no such reply
         missing = HEADER_SIZE + self.reply_size - len(data) - _LAST_CHARACTERS
         return max(missing, 0) * self._timing.char_time
 

@@ -241,10 +241,19 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
     bench.machine.start(0.0)
     bench.machine.reply_size = 94
     frame = message_frame(REPLY.encode(), Checksum.CRC)
-    bench.machine.receive_data(frame[:size], 0.5)
+    bench.machine.receive_data(frame[:size], 0.1 + 0.01 * size)  # as fast as the line goes
     assert bench.machine.spare_time == pytest.approx(0.01 * characters)
     bench.machine.receive_data(frame[size:], 2.0)
     assert isinstance(bench.got[0], Frame)
+    assert bench.machine.spare_time == 0.0
+
+
+def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    bench.machine.reply_size = 94
+    bench.machine.receive_data(message_frame(REPLY.encode(), Checksum.CRC)[:20], 0.2)
+    assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
 
 
