@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Ports and the thread that runs a machine on one: the only operating system code.
+Ports, and the thread that runs a machine on one.
 
 A port that has a file descriptor is read with poll(2) and read(2), which costs a half to a
 tenth of pyserial's own read; a port without one (rfc2217) is read through pyserial. What
