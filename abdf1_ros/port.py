@@ -331,7 +331,6 @@ class LinkThread(threading.Thread):
         try:
             self._serve(port)
         except OSError as error:
-            self._machine.counters.read_errors += 1
             end = _reason(error)
             self._set_state(False, f'the port was lost: {end}')
         except Exception as error:  # a bug must not end the bridge at its first appearance
@@ -357,12 +356,21 @@ class LinkThread(threading.Thread):
                 self._pause(spare_time)
             deadline = machine.deadline
             timeout = None if deadline is None else max(0.0, deadline - clock())
-            data = port.read(timeout, self._wake_reader)
+            data = self._read(port, timeout)
+            # First: after a pause of this process the answer that lies in the buffer came too
+            # late, or nobody can tell that it did not.
+            machine.handle_timeout(clock())
             if data:
                 machine.receive_data(data, clock())
             elif self._take_wake() and not self._stopping:
                 machine.wake(clock())
-            machine.handle_timeout(clock())
+
+    def _read(self, port: Port, timeout: float | None) -> bytes:
+        try:
+            return port.read(timeout, self._wake_reader)
+        except OSError:
+            self._machine.counters.read_errors += 1
+            raise
 
     def _take_wake(self) -> bool:
         try:

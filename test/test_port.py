@@ -222,6 +222,38 @@ def test_stop_before_start() -> None:
     LinkThread(Script().machine, lambda: pytest.fail('opened')).stop()
 
 
+class Paused:
+    """A port whose first answer lies in the buffer while the process does not run for 6 s."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Bring an ACK after the pause, then nothing any more."""
+        if self.now:
+            raise OSError('the end')
+        self.now = 6.0
+        return ACK
+
+    def write(self, data: bytes) -> None:
+        """Drop it."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
+    script, port = Script(Step(b'command', 1.0)), Paused()
+    thread = Impatient(script.machine, lambda: port, 1, clock=port.clock)
+    thread.run()
+    assert script.next() is None
+    thread.stop()
+
+
 @pytest.mark.parametrize('step', [
     Step(None, None), Step(None, 3600.0), Step(b'', None), Step(b'x', 3600.0)])
 def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> None:
@@ -533,6 +565,7 @@ def test_full_pty_is_a_lost_port(
     assert link.state().is_open
     assert link.state() == PortState(
         False, 'the port was lost: the line takes no data; is Handshake right?')
+    assert script.machine.counters.read_errors == 0
     assert script.end().startswith('PortLost(')
 
 
