@@ -153,7 +153,8 @@ class BridgeNode(Node):
         self.driver = self._make_driver(configuration)
         self._create_reads()
         self._create_writes()
-        self._diagnostics = Diagnostics(self.get_name(), self.driver, configuration.port)
+        self._diagnostics = Diagnostics(
+            self.get_name(), self.driver, configuration.port, configuration.map_problems)
         self._diagnostics_period = configuration.parameters.diagnostics_period
         self._write_timeout = configuration.parameters.write_timeout
         # Every node has this service, and nobody gives it another name.

@@ -27,6 +27,7 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
+from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.node_health import health_values, trouble
 from abdf1_ros.port import LinkThread
@@ -45,6 +46,9 @@ _LONGEST_UNPOLLED = 5.0
 # A node that was killed is seen for up to 20 s more, the lease of its DDS participant. In so many
 # looks in a row, a second apart, another node of our name is no earlier run of this one.
 _LOOKS_FOR_NAMESAKES = 30
+
+# So many faults of rows that were left out are repeated with every status; check has them all.
+_MOST_LEFT_OUT = 20
 
 _FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
 
@@ -73,11 +77,14 @@ class Diagnostics:
     """
     All statuses of one node, named ``<node>: <section>``.
 
-    ``has_namesake`` is to be set when another node has its name.
+    ``has_namesake`` is to be set when another node has its name. ``left_out`` are the faults of
+    the rows that the map was read without.
     """
 
-    def __init__(self, node_name: str, driver: Driver, port: str) -> None:
+    def __init__(self, node_name: str, driver: Driver, port: str,
+                 left_out: Sequence[Problem] = ()) -> None:
         self.has_namesake = False
+        self._left_out = left_out
         self._driver = driver
         self._port = port
         self._link: LinkThread | None = None
@@ -217,6 +224,14 @@ class Diagnostics:
         }
 
     def _judge_mappings(self, now: float) -> Verdict:
+        level, text = self._judge_reads(now)
+        if not self._left_out:
+            return level, text
+        rows = len({(problem.place.file, problem.place.line) for problem in self._left_out})
+        return max(level, WARN), (f'{text}; {rows} {"row" if rows == 1 else "rows"} left out of '
+                                  f'the map, the first at {self._left_out[0].place}')
+
+    def _judge_reads(self, now: float) -> Verdict:
         found = self._freshness(now)
         if not found:
             return OK, 'no mapping reads'
@@ -234,6 +249,11 @@ class Diagnostics:
         points, found = self._driver.points.values(), self._freshness(now)
         values = {'total': str(len(points))}
         values |= {state.name.lower(): str(found.get(state, 0)) for state in Freshness}
+        left_out = self._left_out[:_MOST_LEFT_OUT]
+        values |= {f'left out {number}': str(problem)
+                   for number, problem in enumerate(left_out, 1)}
+        if more := len(self._left_out) - len(left_out):
+            values['left out, more'] = f'{more} more faults; the log and "check" have them all'
         for point in points:
             tag = point.mapping.tag
             if point.freshness(now) is not Freshness.FRESH:

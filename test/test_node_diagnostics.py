@@ -70,11 +70,11 @@ class Bench:
     """Diagnostics of a driver that no port moves; tests set its state."""
 
     def __init__(self, folder: Path, rows: tuple[str, ...] = ROWS, mode: str = 'Master') -> None:
-        mappings, problems = load_mappings(str(write_csv(folder / 'map.csv', HEADER, rows)))
-        assert not problems
+        mappings, left_out = load_mappings(str(write_csv(folder / 'map.csv', HEADER, rows)))
+        self.folder = folder
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Listener())
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
-        self.diagnostics = Diagnostics('line_a', self.driver, PORT)
+        self.diagnostics = Diagnostics('line_a', self.driver, PORT, left_out)
         self.diagnostics.attach(self.link)
         self.set_port(True, 'open')
 
@@ -297,6 +297,31 @@ def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
 
 
 # mappings
+
+
+def test_rows_left_out_of_the_map_stay_visible(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(ROWS[0], 'pump,Read,N7:0,300,PLC5,-1', 'fan,Read,N7:0,1,PLC6,')
+    file = bench.folder / 'map.csv'
+    bench.point('speed').update(b'\x01\x00', NOW)
+    assert bench.says('mappings', NOW + 0.1) == (
+        WARN, f'WARN: of 1 mappings 1 fresh; 2 rows left out of the map, the first at {file}:3:4 '
+              '(Station)')
+    values = details(bench.status('mappings', NOW + 0.1))
+    assert values['left out 1'].startswith(f'{file}:3:4 (Station): 2501 ERR_BAD_STATION')
+    assert values['left out 2'].startswith(f'{file}:3:6 (Period): Item: 2, Period = "-1" should')
+    assert values['left out 3'].startswith(f'{file}:4:5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE')
+    assert bench.says('mappings', NOW + 4.0)[0] == ERROR
+
+
+def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(*['pump,Read,N7:0,300,PLC5,'] * 23)
+    level, text = bench.says('mappings')
+    assert level == WARN
+    assert text.startswith('WARN: no mapping reads; 23 rows left out of the map, the first at')
+    values = details(bench.status('mappings'))
+    assert 'left out 20' in values
+    assert 'left out 21' not in values
+    assert values['left out, more'] == '3 more faults; the log and "check" have them all'
 
 
 def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
