@@ -40,7 +40,7 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from abdf1_ros.errors import Problem
-from abdf1_ros.numerals import decimal_number
+from abdf1_ros.numbers import decimal_number
 from abdf1_ros.text import printable
 
 VERSION = 1

@@ -37,7 +37,7 @@ from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.report import last_address, make_report, Remark, Report
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
-from abdf1_ros.numerals import decimal_number
+from abdf1_ros.numbers import decimal_number
 from abdf1_ros.terminal import colour, drop_output, GREEN, prepare_output, RED, table, YELLOW
 from abdf1_ros.text import printable
 

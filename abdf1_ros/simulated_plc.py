@@ -33,7 +33,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.csv_table import read_rows, Row
 from abdf1_ros.driver.values import Codec, types_of, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
-from abdf1_ros.numerals import decimal_number, whole_number
+from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.dialects import dialect_of

@@ -45,7 +45,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.network import BAUD_RATES, make_network, Network
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.lines import Line, PtyLine, SerialLine, TcpLine, WAITING
-from abdf1_ros.numerals import decimal_number, whole_number
+from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.port import LinkThread, Port, PortState
 from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc

@@ -41,7 +41,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.dumps import Recording
 from abdf1_ros.errors import Problem
-from abdf1_ros.numerals import whole_number
+from abdf1_ros.numbers import whole_number
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.session import Session

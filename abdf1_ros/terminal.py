@@ -27,7 +27,7 @@ import time
 from types import FrameType
 from typing import TextIO
 
-from abdf1_ros.numerals import decimal_number, whole_number
+from abdf1_ros.numbers import decimal_number, whole_number
 
 RED, YELLOW, GREEN = 31, 33, 32
 

@@ -58,7 +58,7 @@ class Room(NamedTuple):
 ROOMS = (
     Room(('messages.py',), 'numbered errors and notices', ()),
     Room(('counters.py',), 'status counters', ()),
-    Room(('text.py', 'numerals.py'), 'text and numbers from outside', ()),
+    Room(('text.py', 'numbers.py'), 'text and numbers from outside', ()),
     Room(('errors.py',), 'the exceptions', ('messages', 'text')),
     Room(('df1',), 'data-link layer: frames, checksums, machine, stations; master, standard '
                    'polling, slave, peer', _BASE),

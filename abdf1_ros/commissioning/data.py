@@ -32,7 +32,7 @@ from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.driver.transactions import carry_out, Ending, identify, read_values
 from abdf1_ros.driver.values import Values, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
-from abdf1_ros.numerals import decimal_number, two_readings, whole_number
+from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL

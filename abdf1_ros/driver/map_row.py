@@ -31,7 +31,7 @@ from abdf1_ros.driver.structures import type_fault, write_fault
 from abdf1_ros.driver.values import types_of, ValueType, WordOrder
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Message
-from abdf1_ros.numerals import decimal_number, two_readings, whole_number
+from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access, accesses_of
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError

@@ -27,7 +27,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.driver.csv_table import read_rows, shown
 from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
-from abdf1_ros.numerals import whole_number
+from abdf1_ros.numbers import whole_number
 
 MODES = ('Master', 'Slave', 'Peer')
 SUPPORTED_MODES = MODES

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.numerals import whole_number
+from abdf1_ros.numbers import whole_number
 
 
 def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.numerals import decimal_number, two_readings, whole_number
+from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
