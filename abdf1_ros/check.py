@@ -30,14 +30,14 @@ from typing import Any
 
 from abdf1_ros.driver.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import load_network, Network
 from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.report import last_address, make_report, Remark, Report
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.numbers import decimal_number
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.terminal import colour, drop_output, GREEN, prepare_output, RED, table, YELLOW
 from abdf1_ros.text import printable
 

@@ -23,8 +23,8 @@ import socket
 import tty
 from typing import Protocol
 
-from abdf1_ros.driver.network import Network
 from abdf1_ros.port import DescriptorPort, open_port, Port
+from abdf1_ros.settings.network import Network
 
 WAITING = 'waiting for a client'
 

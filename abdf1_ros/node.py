@@ -37,9 +37,7 @@ from typing import Any
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.points import Outcome, WriteResult
-from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import ConfigurationError, FormatError
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.node_diagnostics import Diagnostics, NamesakeWatch
@@ -55,6 +53,8 @@ from abdf1_ros.node_messages import (
 )
 from abdf1_ros.node_parameters import Configuration, configure
 from abdf1_ros.port import LinkThread, PortOptions, PortState
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
 from abdf1_ros.trace import PortOpener
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

@@ -28,8 +28,8 @@ from std_msgs.msg import (
     Float32MultiArray, Int16MultiArray, Int32MultiArray, MultiArrayDimension, MultiArrayLayout,
     String, UInt16MultiArray, UInt32MultiArray, UInt8MultiArray)
 
-from abdf1_ros.driver.mapping import Mapping, Publish
-from abdf1_ros.driver.values import Values, ValueType
+from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.errors import FormatError
 
 MESSAGES: dict[ValueType, Any] = {

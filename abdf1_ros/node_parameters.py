@@ -22,14 +22,14 @@ from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings
-from abdf1_ros.driver.columns import MAP_COLUMNS
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import FIELDS, load_network, make_network, Network
 from abdf1_ros.driver.served import line_problems
-from abdf1_ros.driver.station_lists import parse_stations
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
+from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network
+from abdf1_ros.settings.station_lists import parse_stations
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node

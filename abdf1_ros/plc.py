@@ -30,11 +30,11 @@ from abdf1_ros.commissioning.line import MODES, network_of
 from abdf1_ros.commissioning.options import make_parser
 from abdf1_ros.commissioning.session import Session
 from abdf1_ros.commissioning.watch import Watch
-from abdf1_ros.driver.mapping import Command, Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome
-from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import Abdf1Error, ConfigurationError, PortLost
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
 from abdf1_ros.terminal import (
     colour,
     drop_output,

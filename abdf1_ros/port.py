@@ -37,8 +37,8 @@ import time
 from typing import Any, Protocol
 
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
+from abdf1_ros.settings.network import Network
 import serial
 import serial.rfc2217
 import serial.rs485

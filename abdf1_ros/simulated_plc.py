@@ -30,8 +30,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.csv_table import read_rows, Row
-from abdf1_ros.driver.values import Codec, types_of, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
@@ -42,6 +40,8 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
+from abdf1_ros.settings.csv_table import read_rows, Row
+from abdf1_ros.settings.values import Codec, types_of, ValueType
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')
 _RAMP_TOP = 1000

@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 import re
 
-from abdf1_ros.driver.network import Network
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.settings.network import Network
 from abdf1_ros.simulated_plc import Faults, numbers, SimulatedPlc
 
 COMMANDS = """\

@@ -24,9 +24,9 @@ import threading
 import time
 
 from abdf1_ros.capture import Chunk, Direction
-from abdf1_ros.driver.network import Network
 from abdf1_ros.lines import Line, PtyLine, SerialLine
 from abdf1_ros.port import Port
+from abdf1_ros.settings.network import Network
 
 _PTY = 'pty'
 

@@ -27,10 +27,10 @@ import re
 import subprocess
 import sys
 
-from abdf1_ros.driver.columns import MAP_COLUMNS
-from abdf1_ros.driver.network import FIELDS, load_network
 from abdf1_ros.messages import Message
 from abdf1_ros.node_parameters import Parameters
+from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.network import FIELDS, load_network
 import pytest
 import serial.serialposix
 from support import documents

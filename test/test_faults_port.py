@@ -21,8 +21,8 @@ import os
 from pathlib import Path
 import signal
 
-from abdf1_ros.driver.network import Network
 from abdf1_ros.port import open_port
+from abdf1_ros.settings.network import Network
 import pytest
 from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process

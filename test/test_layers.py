@@ -104,7 +104,7 @@ def test_every_layer_is_looked_at() -> None:
     ('counters.py', 'import time'),
     ('sniffer/session.py', 'import time'),
     ('sniffer/session.py', 'from abdf1_ros.port import Port'),
-    ('sniffer/session.py', 'from abdf1_ros.driver.network import Network'),
+    ('sniffer/session.py', 'from abdf1_ros.settings.network import Network'),
     ('capture.py', 'import os'),
     ('capture.py', 'from abdf1_ros.df1 import packet'),
     ('sniff.py', 'import rclpy'),

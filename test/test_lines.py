@@ -24,9 +24,9 @@ import socket
 import subprocess
 import sys
 
-from abdf1_ros.driver.network import Network
 from abdf1_ros.lines import PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.port import Port
+from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
 

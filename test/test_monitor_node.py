@@ -19,11 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import time
 
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.errors import FormatError
 from abdf1_ros.monitor_node import full_name, Watch
 from abdf1_ros.monitor_view import Reading, Snapshot, Style
 from abdf1_ros.node_messages import latched_qos, new_message, read_qos
+from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.node import Node

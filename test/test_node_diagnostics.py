@@ -26,14 +26,14 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.mapping import Command, Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
-from abdf1_ros.driver.values import Values
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.node_diagnostics import Diagnostics, NamesakeWatch, WriteLog
 from abdf1_ros.port import LinkThread, PortState
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from support.ros import details, ERROR, OK, WARN, write_csv

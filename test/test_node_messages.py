@@ -21,9 +21,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.values import ValueType
 from abdf1_ros.errors import FormatError
 from abdf1_ros.node_messages import (
     encoder,
@@ -34,6 +31,9 @@ from abdf1_ros.node_messages import (
     values_of,
     write_qos,
 )
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.values import ValueType
 import pytest
 from rclpy.duration import Duration
 from rclpy.qos import (

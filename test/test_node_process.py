@@ -24,9 +24,9 @@ import signal
 import time
 
 from abdf1_ros.driver.forecast import intervals, line_model, longest_wait
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.network import load_network
 from abdf1_ros.driver.planner import Planner
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.network import load_network
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rclpy.duration import Infinite

@@ -31,7 +31,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, Symbol
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import PortLost
 from abdf1_ros.port import (
     DescriptorPort,
@@ -42,6 +41,7 @@ from abdf1_ros.port import (
     PortState,
     SerialPort,
 )
+from abdf1_ros.settings.network import Network
 import pytest
 import serial
 from support.device_server import DeviceServer

@@ -21,9 +21,6 @@ from dataclasses import fields
 import re
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.driver.columns import MAP_COLUMNS
-from abdf1_ros.driver.network import FIELDS, NetField
-from abdf1_ros.driver.values import types_of
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -32,6 +29,9 @@ from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.network import FIELDS, NetField
+from abdf1_ros.settings.values import types_of
 
 from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
 from tools.rooms import ROOMS

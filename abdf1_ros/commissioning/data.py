@@ -23,19 +23,19 @@ from dataclasses import replace
 import re
 
 from abdf1_ros.commissioning.session import Session
-from abdf1_ros.driver.csv_table import Row
 from abdf1_ros.driver.forecast import line_model
-from abdf1_ros.driver.map_row import Fault, RowReader
-from abdf1_ros.driver.mapping import Command, Mapping
 from abdf1_ros.driver.planner import Planner
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.driver.transactions import carry_out, Ending, identify, read_values
-from abdf1_ros.driver.values import Values, ValueType
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.map_row import Fault, RowReader
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.values import Values, ValueType
 
 # The family in a diagnostic status, and its PLC_Type.
 _FAMILIES = {'SLC': 'SLC', 'PLC-5': 'PLC5', 'PLC-3': 'PLC3', 'PLC-2': 'PLC2'}

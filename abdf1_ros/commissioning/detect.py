@@ -23,7 +23,7 @@ from abdf1_ros.commissioning.line import MODES
 from abdf1_ros.commissioning.presence import look_at, Presence
 from abdf1_ros.commissioning.session import Session
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.driver.network import Network
+from abdf1_ros.settings.network import Network
 
 # The usual ones first.
 BAUD_RATES = (19200, 9600, 38400, 57600, 115200, 4800, 2400, 1200)

@@ -20,8 +20,8 @@ import argparse
 from dataclasses import replace
 
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.driver.network import load_network, make_network, Network
 from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.settings.network import load_network, make_network, Network
 
 # Somebody waits in front of the screen: a Timeout of 1000 ms, the default of a net CSV, is long.
 DEFAULTS = Network(timeout=300)

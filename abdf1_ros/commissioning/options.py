@@ -20,13 +20,13 @@ import argparse
 from dataclasses import dataclass
 
 from abdf1_ros.commissioning.line import DEFAULTS, MODES
-from abdf1_ros.driver.network import BAUD_RATES
-from abdf1_ros.driver.station_lists import parse_stations
-from abdf1_ros.driver.values import ValueType, WordOrder
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.network import BAUD_RATES
+from abdf1_ros.settings.station_lists import parse_stations
+from abdf1_ros.settings.values import ValueType, WordOrder
 
 _DEFAULT_STATION = 1
 

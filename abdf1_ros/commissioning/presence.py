@@ -21,10 +21,10 @@ from dataclasses import dataclass
 import time
 
 from abdf1_ros.commissioning.session import Session
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.settings.network import Network
 
 _ECHO = bytes(range(1, 17))
 

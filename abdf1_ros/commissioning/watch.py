@@ -28,12 +28,12 @@ from abdf1_ros.commissioning.session import opened
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import show, WriteResult
-from abdf1_ros.driver.values import Values
 from abdf1_ros.messages import Event
 from abdf1_ros.port import LinkThread
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
 from abdf1_ros.terminal import is_terminal, table
 from abdf1_ros.text import printable
 

@@ -36,8 +36,6 @@ from abdf1_ros.driver.forecast import intervals, line_model, longest_wait, scan_
 from abdf1_ros.driver.health import Health
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
@@ -46,12 +44,14 @@ from abdf1_ros.driver.refusals import Change, Refusals
 from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler, waited_too_long
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.transactions import carry_out
-from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
 
 
 class Listener(Protocol):

@@ -32,11 +32,11 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.served import Served
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.network import Network
 
 _Result = TypeVar('_Result')
 

@@ -26,9 +26,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from abdf1_ros.driver.line_model import LineModel
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import BAUD_RATES, Network
 from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import BAUD_RATES, Network
 
 USUAL_RESPONSE_TIME = 0.01
 _ANSWERS = 2

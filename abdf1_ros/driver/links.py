@@ -28,8 +28,8 @@ from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
 from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.network import Network
 from abdf1_ros.messages import Event
+from abdf1_ros.settings.network import Network
 
 Link = HalfDuplexMaster | StandardPollingMaster | FullDuplexPeer | SlaveLink
 

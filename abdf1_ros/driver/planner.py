@@ -30,11 +30,11 @@ from dataclasses import dataclass
 import math
 
 from abdf1_ros.driver.line_model import LineModel, Request
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.partition import Draft, draft, Span, Terms
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.settings.mapping import Mapping
 
 Place = tuple[int, Area, Dialect]
 """Station, area and way to read: what blocks never reach beyond."""

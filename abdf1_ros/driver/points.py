@@ -21,11 +21,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.driver.mapping import Mapping, Publish
-from abdf1_ros.driver.values import Values, ValueType
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
+from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.values import Values, ValueType
 
 _SHOWN_VALUES = 16
 _SHOWN_CHARACTERS = 100  # more than a PLC string has

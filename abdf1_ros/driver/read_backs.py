@@ -24,10 +24,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.points import Write, WriteResult
 from abdf1_ros.driver.transactions import Ending
+from abdf1_ros.settings.mapping import Mapping
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,11 +29,11 @@ from enum import Enum
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver import forecast
 from abdf1_ros.driver.line_model import Request
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Block, Place, Planner
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 
 _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the scan time

@@ -19,9 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
-from abdf1_ros.driver.values import ValueType
 from abdf1_ros.errors import Place, Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
@@ -29,6 +26,9 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import ValueType
 
 
 class _MappedTable(DataTable):

@@ -20,16 +20,16 @@ from collections.abc import Generator
 from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.points import Outcome, Write
-from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import decode_identity, Identity
 from abdf1_ros.pccc.status import check_status, is_local, STS_ILLEGAL_COMMAND
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.values import Values
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')

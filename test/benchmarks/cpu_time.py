@@ -48,11 +48,11 @@ from abdf1_ros.df1 import frames  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.driver.mapping import Mapping  # noqa: E402
-from abdf1_ros.driver.network import Network  # noqa: E402
-from abdf1_ros.driver.values import Values  # noqa: E402
 from abdf1_ros.pccc.slc_dialect import SlcDialect  # noqa: E402
 from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
+from abdf1_ros.settings.mapping import Mapping  # noqa: E402
+from abdf1_ros.settings.network import Network  # noqa: E402
+from abdf1_ros.settings.values import Values  # noqa: E402
 from paced_line import BareLine, block_of, Listener, WORDS  # noqa: E402
 
 STATION = 1

@@ -46,10 +46,10 @@ from typing import Any
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.driver.network import Network
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.network import Network
 from abdf1_ros.simulated_plc import SimulatedPlc
 from node_rig import files, IN_A_FILE, rows, running_node, STATION
 from paced_line import answering_pty

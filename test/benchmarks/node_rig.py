@@ -33,9 +33,9 @@ import time
 sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 
 from abdf1_ros.df1.machine import Machine  # noqa: E402
-from abdf1_ros.driver.map_file import load_mappings  # noqa: E402
-from abdf1_ros.driver.mapping import Mapping  # noqa: E402
-from abdf1_ros.driver.network import Network  # noqa: E402
+from abdf1_ros.settings.map_file import load_mappings  # noqa: E402
+from abdf1_ros.settings.mapping import Mapping  # noqa: E402
+from abdf1_ros.settings.network import Network  # noqa: E402
 from paced_line import far_end  # noqa: E402
 from support.ros import Process, ros_args, write_csv  # noqa: E402
 

@@ -44,15 +44,15 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Command, Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import WriteResult
-from abdf1_ros.driver.values import Values, ValueType
 from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.port import DescriptorPort, LinkThread, Port
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.simulated_plc import SimulatedPlc
 
 BITS = 10

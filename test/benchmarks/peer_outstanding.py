@@ -46,13 +46,13 @@ from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings  # noqa: E402
 from abdf1_ros.df1.stations import ActiveStationList  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
-from abdf1_ros.driver.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.driver.values import ValueType  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.port import Port  # noqa: E402
+from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
+from abdf1_ros.settings.values import ValueType  # noqa: E402
 from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
 from paced_line import BITS, Listener, paced_line  # noqa: E402
 

@@ -48,13 +48,13 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
 from abdf1_ros.driver.forecast import line_model  # noqa: E402
 from abdf1_ros.driver.line_model import Request  # noqa: E402
-from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
-from abdf1_ros.driver.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.driver.partition import Span  # noqa: E402
 from abdf1_ros.driver.planner import Block, Planner  # noqa: E402
-from abdf1_ros.driver.values import ValueType  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
+from abdf1_ros.settings.values import ValueType  # noqa: E402
 
 PERIODS = (100, 100, 250, 500, 1000, 1000, 5000)
 FILES = {'N': ValueType.INT16, 'F': ValueType.FLOAT32, 'T': ValueType.INT16,

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import argparse
 
-from abdf1_ros.driver.network import BAUD_RATES, Network, POLLING_MODES
+from abdf1_ros.settings.network import BAUD_RATES, Network, POLLING_MODES
 from paced_line import block_of, measure, Measured, simulated, WORDS
 
 

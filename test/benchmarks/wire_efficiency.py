@@ -45,12 +45,12 @@ from abdf1_ros.df1 import frames  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.driver.mapping import Command, Mapping  # noqa: E402
-from abdf1_ros.driver.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.driver.values import Values, ValueType  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.slc_dialect import SlcDialect  # noqa: E402
+from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
+from abdf1_ros.settings.values import Values, ValueType  # noqa: E402
 from paced_line import answering_line, answering_pty, BareLine, BITS, far_end, Listener  # noqa: E402
 
 SIZES = (1, 10, 50, 110)

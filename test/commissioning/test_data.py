@@ -30,11 +30,11 @@ from abdf1_ros.commissioning.data import (
     Writing,
 )
 from abdf1_ros.commissioning.session import Session
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.driver.transactions import Ending
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

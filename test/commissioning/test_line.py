@@ -20,8 +20,8 @@ from pathlib import Path
 
 from abdf1_ros.commissioning.line import DEFAULTS, network_of
 from abdf1_ros.commissioning.options import make_parser
-from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.settings.network import Network
 import pytest
 from support.ros import write_csv
 

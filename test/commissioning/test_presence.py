@@ -21,9 +21,9 @@ import threading
 
 from abdf1_ros.commissioning.presence import describe, hint, look_at, Presence, scan
 from abdf1_ros.commissioning.session import Session
-from abdf1_ros.driver.network import Network
 from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import Pty
 

@@ -24,10 +24,10 @@ from abdf1_ros.commissioning.session import opened, Session
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import Pty
 

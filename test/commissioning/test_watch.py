@@ -21,9 +21,9 @@ from pathlib import Path
 import threading
 
 from abdf1_ros.commissioning.watch import Watch
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
-from abdf1_ros.driver.values import Values
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
 import pytest
 from support.driver_bench import store
 from support.mappings import make_mapping

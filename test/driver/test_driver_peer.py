@@ -25,15 +25,15 @@ from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Freshness, Outcome
-from abdf1_ros.driver.scaling import Scaling
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping

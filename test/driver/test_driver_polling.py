@@ -19,8 +19,8 @@ from __future__ import annotations
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.network import Network, POLLING_MODES
 from abdf1_ros.driver.points import Outcome
+from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulated_plc import Faults
 import pytest
 from support.driver_bench import DriverBench, store, stored

@@ -25,14 +25,14 @@ from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping

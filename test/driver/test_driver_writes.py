@@ -24,9 +24,9 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network, POLLING_MODES
 from abdf1_ros.driver.points import Outcome
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, stored

@@ -24,11 +24,11 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.errands import Errands
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.settings.network import Network
 from support.driver_bench import simulated_plc
 from support.virtual_line import VirtualLine
 

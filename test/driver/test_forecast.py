@@ -29,8 +29,8 @@ from abdf1_ros.driver.forecast import (
     scan_time,
 )
 from abdf1_ros.driver.line_model import Request
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.planner import Planner
+from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping

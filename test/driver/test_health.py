@@ -24,10 +24,10 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.health import ECHO_PERIOD
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 from abdf1_ros.simulated_plc import Faults, SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc

@@ -19,11 +19,11 @@ from __future__ import annotations
 from array import array
 
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, show, Write
-from abdf1_ros.driver.scaling import Scaling
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.settings.scaling import Scaling
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.report import Kind, make_report, Report
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 import pytest
 from support.mappings import make_mapping
 

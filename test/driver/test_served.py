@@ -20,14 +20,14 @@ from collections.abc import Sequence
 import tracemalloc
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.served import line_problems, Served
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

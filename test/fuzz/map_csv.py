@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import re
 
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 from fuzz.files import path_of
 from support.driver_bench import DriverBench
 

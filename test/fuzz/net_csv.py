@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.network import FIELDS, load_network
 from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.settings.network import FIELDS, load_network
 from fuzz.files import path_of
 
 

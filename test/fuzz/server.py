@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.served import Served
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import EXTENDED
+from abdf1_ros.settings.mapping import Mapping
 from support.mappings import make_mapping
 
 _STATION = 5

@@ -28,9 +28,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Fault, Frame, FrameDecoder, Symbol
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.driver.points import Outcome
-from abdf1_ros.driver.values import Values
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.values import Values
 from noise.wire import Wire
 
 _VERSIONS = 500

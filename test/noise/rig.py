@@ -32,15 +32,15 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, show, WriteResult
-from abdf1_ros.driver.values import Codec, Values, ValueType
 from abdf1_ros.errors import LinkError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Codec, Values, ValueType
 from abdf1_ros.simulated_plc import SimulatedPlc
 from noise.judge import content_of, Ear, Judge
 from noise.wire import Kind, LISTED, Wire

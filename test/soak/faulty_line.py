@@ -30,14 +30,14 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import WriteResult
-from abdf1_ros.driver.values import Values
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.node_diagnostics import Diagnostics
 from abdf1_ros.node_log import EventLog, LineLog
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
 from soak.hostile import DEAD, hostile_message, LIAR, Liar, OTHER, PLC, SLC, US
 from soak.memory import container_lengths
 from support.driver_bench import simulated_plc

@@ -26,15 +26,15 @@ from abdf1_ros.df1.slave import Station as LineStation
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.mapping import Mapping
-from abdf1_ros.driver.network import Network
 from abdf1_ros.driver.points import Outcome, WriteResult
-from abdf1_ros.driver.values import Codec, types_of, Values, ValueType
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Codec, types_of, Values, ValueType
 from abdf1_ros.simulated_plc import SimulatedPlc
 from support.virtual_line import VirtualLine
 

@@ -25,8 +25,8 @@ from random import Random
 import select
 import threading
 
-from abdf1_ros.driver.network import Network
 from abdf1_ros.port import DescriptorPort, open_port
+from abdf1_ros.settings.network import Network
 from support.ptys import PATIENCE, Pty
 
 _TURN = 0.01  # s; so long the box listens before it looks at what it has been told

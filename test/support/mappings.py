@@ -20,16 +20,16 @@ import math
 from pathlib import Path
 import tempfile
 
-from abdf1_ros.driver.columns import COLUMNS
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.mapping import Command, Mapping, Publish
-from abdf1_ros.driver.scaling import Scaling
-from abdf1_ros.driver.values import types_of, ValueType, WordOrder
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.columns import COLUMNS
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 HEADER = ','.join(COLUMNS)
 

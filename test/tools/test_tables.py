@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.values import types_of
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import file_types_of, PlcType
+from abdf1_ros.settings.values import types_of
 import pytest
 
 from tools import tables

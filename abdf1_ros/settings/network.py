@@ -24,10 +24,10 @@ from urllib.parse import urlsplit
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.driver.csv_table import read_rows, shown
 from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.settings.csv_table import read_rows, shown
 
 MODES = ('Master', 'Slave', 'Peer')
 SUPPORTED_MODES = MODES

@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.structures import type_fault, write_fault
-from abdf1_ros.driver.values import ValueType
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.structures import type_fault, write_fault
+from abdf1_ros.settings.values import ValueType
 import pytest
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC

@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from abdf1_ros.driver.map_file import load_mappings
-from abdf1_ros.driver.values import ValueType
 from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.values import ValueType
 import pytest
 from support.mappings import faults, load_rows, load_text, row, slc
 

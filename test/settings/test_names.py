@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 
-from abdf1_ros.driver.names import MAX_LENGTH, sanitise
+from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -19,9 +19,9 @@ from __future__ import annotations
 from array import array
 import math
 
-from abdf1_ros.driver.scaling import Scaling
-from abdf1_ros.driver.values import ValueType
 from abdf1_ros.errors import FormatError
+from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.settings.values import ValueType
 from hypothesis import assume, given
 from hypothesis import strategies as st
 import pytest

@@ -22,13 +22,6 @@ import math
 from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.driver.columns import MAP_COLUMNS
-from abdf1_ros.driver.csv_table import Row, shown
-from abdf1_ros.driver.mapping import Command, Mapping, Publish
-from abdf1_ros.driver.names import MAX_LENGTH, sanitise
-from abdf1_ros.driver.scaling import Scaling
-from abdf1_ros.driver.structures import type_fault, write_fault
-from abdf1_ros.driver.values import types_of, ValueType, WordOrder
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
@@ -37,6 +30,13 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.csv_table import Row, shown
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.names import MAX_LENGTH, sanitise
+from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.settings.structures import type_fault, write_fault
+from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 _NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)
 _MAX_STATION = 254

@@ -25,10 +25,10 @@ import struct
 import sys
 from typing import Any
 
-from abdf1_ros.driver import strings
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.settings import strings
 
 FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.station_lists import parse_stations
+from abdf1_ros.settings.station_lists import parse_stations
 import pytest
 
 

@@ -20,14 +20,14 @@ from dataclasses import dataclass, field
 from enum import Enum
 import math
 
-from abdf1_ros.driver.scaling import Scaling
-from abdf1_ros.driver.values import Codec, ValueType, WordOrder
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.settings.values import Codec, ValueType, WordOrder
 
 
 class Command(Enum):

@@ -17,13 +17,13 @@
 from __future__ import annotations
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.driver.columns import COLUMNS
-from abdf1_ros.driver.csv_table import read_rows, shown
-from abdf1_ros.driver.map_row import Fault, RowReader
-from abdf1_ros.driver.mapping import Mapping
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.settings.columns import COLUMNS
+from abdf1_ros.settings.csv_table import read_rows, shown
+from abdf1_ros.settings.map_row import Fault, RowReader
+from abdf1_ros.settings.mapping import Mapping
 
 
 def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:

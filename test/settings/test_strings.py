@@ -16,14 +16,14 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.strings import (
+from abdf1_ros.errors import FormatError
+from abdf1_ros.settings.strings import (
     COUNTED_WORDS,
     decode_counted,
     decode_packed,
     encode_counted,
     encode_packed,
 )
-from abdf1_ros.errors import FormatError
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -19,7 +19,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.driver.network import (
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.messages import Severity
+from abdf1_ros.settings.network import (
     BAUD_RATES,
     FIELDS,
     load_network,
@@ -27,8 +29,6 @@ from abdf1_ros.driver.network import (
     Network,
     SUPPORTED_MODES,
 )
-from abdf1_ros.errors import ConfigurationError
-from abdf1_ros.messages import Severity
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -173,7 +173,7 @@ def test_long_cell_is_shown_without_its_end(path: Path, column: str) -> None:
 @pytest.mark.parametrize('mode, number', [('Slave', 1), ('peer', 2)])
 def test_mode_that_this_version_does_not_have(
         path: Path, monkeypatch: pytest.MonkeyPatch, mode: str, number: int) -> None:
-    monkeypatch.setattr('abdf1_ros.driver.network.SUPPORTED_MODES', ('Master',))
+    monkeypatch.setattr('abdf1_ros.settings.network.SUPPORTED_MODES', ('Master',))
     assert faults(path, 'Mode', mode) == [
         f'FILE:2:1 (Mode): 2554 CRT_UNSUPPORTED_MODE: Unsupported Driver Mode ({number}), '
         f'Supported Mode(s): Master; Mode = "{mode.title()}" is not available yet']

@@ -18,15 +18,15 @@ from __future__ import annotations
 
 import math
 
-from abdf1_ros.driver.columns import COLUMNS
-from abdf1_ros.driver.mapping import Command, Mapping, Publish
-from abdf1_ros.driver.scaling import Scaling
-from abdf1_ros.driver.values import ValueType, WordOrder
 from abdf1_ros.messages import Severity
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.columns import COLUMNS
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.settings.values import ValueType, WordOrder
 import pytest
 from support.mappings import fault, faults, load_rows, one, row, slc
 

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from abdf1_ros.driver.values import FLOAT_MAX, ValueType
 from abdf1_ros.errors import FormatError
+from abdf1_ros.settings.values import FLOAT_MAX, ValueType
 
 
 @dataclass(frozen=True, slots=True)

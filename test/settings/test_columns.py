@@ -19,12 +19,12 @@ from __future__ import annotations
 from enum import Enum
 import re
 
-from abdf1_ros.driver.columns import COLUMNS, MAP_COLUMNS
-from abdf1_ros.driver.mapping import Command, Publish
-from abdf1_ros.driver.values import ValueType, WordOrder
 from abdf1_ros.pccc.access import Access, accesses_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
+from abdf1_ros.settings.mapping import Command, Publish
+from abdf1_ros.settings.values import ValueType, WordOrder
 import pytest
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

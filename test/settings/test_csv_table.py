@@ -19,8 +19,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from abdf1_ros.driver.csv_table import read_rows, Row
 from abdf1_ros.errors import ConfigurationError, Place
+from abdf1_ros.settings.csv_table import read_rows, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

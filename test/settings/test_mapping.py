@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from abdf1_ros.driver.columns import COLUMNS
+from abdf1_ros.settings.columns import COLUMNS
 import pytest
 from support.mappings import one
 
