@@ -28,13 +28,13 @@ import json
 import sys
 from typing import Any
 
-from abdf1_ros.driver.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.planner import Block
-from abdf1_ros.driver.report import last_address, make_report, Remark, Report
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.numbers import decimal_number
+from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
+from abdf1_ros.plan.planner import Block
+from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network, Network

@@ -111,7 +111,7 @@ def test_every_layer_is_looked_at() -> None:
     ('plc.py', 'import rclpy'),
     ('check.py', 'from std_msgs.msg import String'),
     ('commissioning/session.py', 'import serial'),
-    ('driver/report.py', 'import time'),
+    ('plan/report.py', 'import time'),
     ('driver/errands.py', 'from abdf1_ros.port import LinkThread'),
     ('driver/errands.py', 'from abdf1_ros.commissioning import session'),
     ('simulator.py', 'import rclpy.node'),

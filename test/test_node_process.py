@@ -23,8 +23,8 @@ import re
 import signal
 import time
 
-from abdf1_ros.driver.forecast import intervals, line_model, longest_wait
-from abdf1_ros.driver.planner import Planner
+from abdf1_ros.plan.forecast import intervals, line_model, longest_wait
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network
 from diagnostic_msgs.msg import DiagnosticArray

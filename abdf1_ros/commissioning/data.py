@@ -23,8 +23,6 @@ from dataclasses import replace
 import re
 
 from abdf1_ros.commissioning.session import Session
-from abdf1_ros.driver.forecast import line_model
-from abdf1_ros.driver.planner import Planner
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.driver.transactions import carry_out, Ending, identify, read_values
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
@@ -32,6 +30,8 @@ from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.plan.forecast import line_model
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import Fault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping

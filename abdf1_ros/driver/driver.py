@@ -32,15 +32,12 @@ from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.driver.forecast import intervals, line_model, longest_wait, scan_time
 from abdf1_ros.driver.health import Health
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
-from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
-from abdf1_ros.driver.refusals import Change, Refusals
 from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler, waited_too_long
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.transactions import carry_out
@@ -49,6 +46,9 @@ from abdf1_ros.messages import Event
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.plan.forecast import intervals, line_model, longest_wait, scan_time
+from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values

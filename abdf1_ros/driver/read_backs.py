@@ -24,9 +24,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.points import Write, WriteResult
 from abdf1_ros.driver.transactions import Ending
+from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 
 

@@ -35,11 +35,11 @@ import itertools
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.forecast import PATIENCE, scan_time
-from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.points import ReadPoint, Write
 from abdf1_ros.driver.transactions import read_packet
 from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.plan.forecast import PATIENCE, scan_time
+from abdf1_ros.plan.planner import Block
 
 _TURNS = 4
 _MOST_ENTRIES = 4  # for each read

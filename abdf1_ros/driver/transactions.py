@@ -20,7 +20,6 @@ from collections.abc import Generator
 from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.driver.planner import Block
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
@@ -28,6 +27,7 @@ from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import decode_identity, Identity
 from abdf1_ros.pccc.status import check_status, is_local, STS_ILLEGAL_COMMAND
+from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
 

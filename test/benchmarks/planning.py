@@ -46,12 +46,12 @@ import time
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
-from abdf1_ros.driver.forecast import line_model  # noqa: E402
-from abdf1_ros.driver.line_model import Request  # noqa: E402
-from abdf1_ros.driver.partition import Span  # noqa: E402
-from abdf1_ros.driver.planner import Block, Planner  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.plan.forecast import line_model  # noqa: E402
+from abdf1_ros.plan.line_model import Request  # noqa: E402
+from abdf1_ros.plan.partition import Span  # noqa: E402
+from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import ValueType  # noqa: E402

@@ -38,10 +38,10 @@ import time
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
 from abdf1_ros.driver.driver import Driver  # noqa: E402
-from abdf1_ros.driver.forecast import scan_time  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.plan.forecast import scan_time  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import Values, ValueType  # noqa: E402

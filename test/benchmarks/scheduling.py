@@ -48,12 +48,12 @@ import time
 sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 
 from abdf1_ros.driver.driver import Driver  # noqa: E402
-from abdf1_ros.driver.forecast import block_time, intervals, line_model, load  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.driver.planner import Block, Planner  # noqa: E402
 from abdf1_ros.driver.points import WriteResult  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.plan.forecast import block_time, intervals, line_model, load  # noqa: E402
+from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import Values, ValueType  # noqa: E402

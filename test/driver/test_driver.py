@@ -23,13 +23,13 @@ import random
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.forecast import block_time, longest_wait
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.plan.forecast import block_time, longest_wait
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values

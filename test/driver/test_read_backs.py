@@ -19,13 +19,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from abdf1_ros.df1.frames import EOT, STX
-from abdf1_ros.driver.forecast import line_model
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.transactions import Ending
 from abdf1_ros.errors import CommandTimeout
+from abdf1_ros.plan.forecast import line_model
+from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest

@@ -25,12 +25,12 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.forecast import block_time, intervals, load, PATIENCE
-from abdf1_ros.driver.line_model import LineModel
-from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import ReadPoint, Write
 from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.plan.forecast import block_time, intervals, load, PATIENCE
+from abdf1_ros.plan.line_model import LineModel
+from abdf1_ros.plan.planner import Block, Planner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest

@@ -23,11 +23,11 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.line_model import LineModel
-from abdf1_ros.driver.planner import Planner
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
 from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, MAX_WRITES_IN_A_ROW, Scheduler
+from abdf1_ros.plan.line_model import LineModel
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import settings
 from hypothesis import strategies as st

@@ -19,8 +19,6 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.line_model import LineModel
-from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.driver.transactions import (
     carry_out,
@@ -33,6 +31,8 @@ from abdf1_ros.driver.transactions import (
 )
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.plan.line_model import LineModel
+from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.network import Network
 import pytest
 from support.mappings import make_mapping

@@ -25,8 +25,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from abdf1_ros.driver.line_model import LineModel
-from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.plan.line_model import LineModel
+from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import BAUD_RATES, Network
 

@@ -24,11 +24,11 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.line_model import LineModel
-from abdf1_ros.driver.partition import Span
-from abdf1_ros.driver.planner import Block, Planner
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.plan.line_model import LineModel
+from abdf1_ros.plan.partition import Span
+from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st

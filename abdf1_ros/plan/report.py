@@ -27,11 +27,11 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.driver import forecast
-from abdf1_ros.driver.line_model import Request
-from abdf1_ros.driver.planner import Block, Place, Planner
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.plan import forecast
+from abdf1_ros.plan.line_model import Request
+from abdf1_ros.plan.planner import Block, Place, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 

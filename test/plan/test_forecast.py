@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from abdf1_ros.driver.forecast import (
+from abdf1_ros.plan.forecast import (
     block_time,
     intervals,
     line_model,
@@ -28,8 +28,8 @@ from abdf1_ros.driver.forecast import (
     PATIENCE,
     scan_time,
 )
-from abdf1_ros.driver.line_model import Request
-from abdf1_ros.driver.planner import Planner
+from abdf1_ros.plan.line_model import Request
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import DriverBench

@@ -20,7 +20,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 import math
 
-from abdf1_ros.driver.partition import cheapest, Draft, draft, Span, Terms, without_contained
+from abdf1_ros.plan.partition import cheapest, Draft, draft, Span, Terms, without_contained
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -29,11 +29,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import math
 
-from abdf1_ros.driver.line_model import LineModel, Request
-from abdf1_ros.driver.partition import Draft, draft, Span, Terms
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.plan.line_model import LineModel, Request
+from abdf1_ros.plan.partition import Draft, draft, Span, Terms
 from abdf1_ros.settings.mapping import Mapping
 
 Place = tuple[int, Area, Dialect]

@@ -26,8 +26,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from abdf1_ros.driver.partition import Span
-from abdf1_ros.driver.planner import Block, Planner
+from abdf1_ros.plan.partition import Span
+from abdf1_ros.plan.planner import Block, Planner
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.driver.report import Kind, make_report, Report
+from abdf1_ros.plan.report import Kind, make_report, Report
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
