@@ -80,7 +80,7 @@ def test_every_layer_is_looked_at() -> None:
 @pytest.mark.parametrize(('module', 'source'), [
     ('df1/master.py', 'from abdf1_ros.pccc import slc'),
     ('df1/master.py', 'from abdf1_ros.driver.points import Point'),
-    ('df1/master.py', 'import abdf1_ros.pccc.slc'),
+    ('df1/master.py', 'import abdf1_ros.pccc.slc.commands'),
     ('df1/master.py', 'from ..pccc import slc'),
     ('df1/master.py', 'from .. import pccc'),
     ('df1/master.py', 'from abdf1_ros import pccc'),

@@ -33,10 +33,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 import re
 
-from abdf1_ros.pccc import plc2_address, plc3_address
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_types import file_types_of, FileType, Layout, layout_of, PlcType
+from abdf1_ros.pccc.plc2 import address as plc2_address
+from abdf1_ros.pccc.plc3 import address as plc3_address
 
 BITS = 16
 

@@ -24,15 +24,19 @@ from typing import Any
 
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc import diagnostics, notation, plc2, plc5, slc, word_range
+from abdf1_ros.pccc import diagnostics, notation
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.identity import decode_identity
 from abdf1_ros.pccc.notation import count_of, hexadecimal, part_of, words_text
-from abdf1_ros.pccc.plc3 import ExtendedAddress
-from abdf1_ros.pccc.plc5 import SystemAddress
-from abdf1_ros.pccc.slc import LogicalRead, LogicalWrite
+from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
+from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.plc5.commands import SystemAddress
+from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.typed_data import TypedData
+from abdf1_ros.pccc.word_range import commands as word_range
 
 # Commands that carry a function code (M 7-2, 7-3).
 _WITH_FUNCTION = (0x06, 0x07, 0x0F)

@@ -20,11 +20,11 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access, accesses_of
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.plc2_dialect import Plc2Dialect
-from abdf1_ros.pccc.plc5_dialect import Plc5Dialect
+from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
+from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.processor import Processor, USUAL
-from abdf1_ros.pccc.slc_dialect import SlcDialect
-from abdf1_ros.pccc.word_range_dialect import PLC3, PLC5_WORD_RANGE
+from abdf1_ros.pccc.slc.dialect import SlcDialect
+from abdf1_ros.pccc.word_range.dialect import PLC3, PLC5_WORD_RANGE
 
 _DIALECTS: dict[tuple[PlcType, Access], Dialect] = {
     (PlcType.PLC2, Access.UNPROTECTED): Plc2Dialect(Access.UNPROTECTED),

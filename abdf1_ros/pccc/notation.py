@@ -20,9 +20,14 @@ from collections.abc import Callable
 import struct
 from typing import Any
 
-from abdf1_ros.pccc import plc2_address, plc3, plc3_address, plc5, slc, typed_data
+from abdf1_ros.pccc import typed_data
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import BY_SLC_CODE, file_types_of, FileType, layout_of, PlcType
+from abdf1_ros.pccc.plc2 import address as plc2_address
+from abdf1_ros.pccc.plc3 import address as plc3_address
+from abdf1_ros.pccc.plc3 import commands as plc3
+from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.typed_data import TypedData
 
 _BY_PLC5_FILE = {

@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.pccc import slc
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.slc import commands as slc
 
 
 class Processor(Enum):

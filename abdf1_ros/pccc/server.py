@@ -32,11 +32,11 @@ from abdf1_ros.pccc.family import Commands, Family, Refusal
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
-from abdf1_ros.pccc.plc2_server import Plc2Commands
-from abdf1_ros.pccc.plc3_server import Plc3Commands
-from abdf1_ros.pccc.plc5_server import Plc5Commands
+from abdf1_ros.pccc.plc2.server import Plc2Commands
+from abdf1_ros.pccc.plc3.server import Plc3Commands
+from abdf1_ros.pccc.plc5.server import Plc5Commands
 from abdf1_ros.pccc.served_diagnostics import served_diagnostics
-from abdf1_ros.pccc.slc_server import SlcCommands
+from abdf1_ros.pccc.slc.server import SlcCommands
 
 
 class Server:

@@ -48,7 +48,7 @@ from abdf1_ros.df1 import frames  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.pccc.slc_dialect import SlcDialect  # noqa: E402
+from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
 from abdf1_ros.port import DescriptorPort, LinkThread  # noqa: E402
 from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import Network  # noqa: E402

@@ -47,7 +47,7 @@ from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
-from abdf1_ros.pccc.slc_dialect import SlcDialect  # noqa: E402
+from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import Values, ValueType  # noqa: E402

@@ -21,9 +21,9 @@ from collections.abc import Callable
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.driver.transactions import REWRITTEN
-from abdf1_ros.pccc import slc
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc, store, stored

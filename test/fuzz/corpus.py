@@ -27,8 +27,9 @@ from pathlib import Path
 from abdf1_ros import simulated_plc
 from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.df1.frames import ACK
-from abdf1_ros.pccc import plc5, slc
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.network import FIELDS
 from support.vectors import CAPTURED, commands, MESSAGES, VECTORS

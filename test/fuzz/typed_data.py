@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc5 import SystemAddress
+from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.typed_data import TypedData
 
 

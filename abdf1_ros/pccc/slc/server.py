@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from abdf1_ros.pccc import slc, status
+from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.family import Codes, Commands, Refusal
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import BY_SLC_CODE, FileType, PlcType
-from abdf1_ros.pccc.plc2_server import BasicService, Window
+from abdf1_ros.pccc.plc2.server import BasicService, Window
+from abdf1_ros.pccc.slc import commands as slc
 
 _COMMON_INTERFACE_FILE = 9
 _ADDRESSING_MODE = Address(PlcType.SLC, FileType.STATUS, 2, 2)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Transfer
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.word_range_dialect import PLC3, PLC5_WORD_RANGE, WordRangeDialect
+from abdf1_ros.pccc.word_range.dialect import PLC3, PLC5_WORD_RANGE, WordRangeDialect
 import pytest
 from support.vectors import vector
 

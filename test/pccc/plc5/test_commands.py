@@ -18,7 +18,13 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc5 import BitSet, ReadModifyWrite, SystemAddress, TypedRead, TypedWrite
+from abdf1_ros.pccc.plc5.commands import (
+    BitSet,
+    ReadModifyWrite,
+    SystemAddress,
+    TypedRead,
+    TypedWrite,
+)
 from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given
 from hypothesis import strategies as st

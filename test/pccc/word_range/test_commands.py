@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc3 import ExtendedAddress
-from abdf1_ros.pccc.plc5 import SystemAddress
-from abdf1_ros.pccc.word_range import WordBitWrite, WordRangeRead, WordRangeWrite
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
+from abdf1_ros.pccc.plc5.commands import SystemAddress
+from abdf1_ros.pccc.word_range.commands import WordBitWrite, WordRangeRead, WordRangeWrite
 import pytest
 from support.vectors import vector
 

@@ -17,15 +17,17 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import plc3_address, status, word_range
+from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.family import Codes
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc2_server import BasicService, Window
-from abdf1_ros.pccc.plc3 import ExtendedAddress
-from abdf1_ros.pccc.word_range_server import WordRangeService
+from abdf1_ros.pccc.plc2.server import BasicService, Window
+from abdf1_ros.pccc.plc3 import address as plc3_address
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
+from abdf1_ros.pccc.word_range import commands as word_range
+from abdf1_ros.pccc.word_range.server import WordRangeService
 
 
 class Plc3Commands:

@@ -18,15 +18,21 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from abdf1_ros.pccc import plc5, word_range
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import exactly, Request, Transfer
 from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
 from abdf1_ros.pccc.line_order import in_line_order
-from abdf1_ros.pccc.plc3 import ExtendedAddress
-from abdf1_ros.pccc.plc3_address import SECTIONS
-from abdf1_ros.pccc.plc5 import SystemAddress
-from abdf1_ros.pccc.word_range import WireAddress, WordBitWrite, WordRangeRead, WordRangeWrite
+from abdf1_ros.pccc.plc3.address import SECTIONS
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
+from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.plc5.commands import SystemAddress
+from abdf1_ros.pccc.word_range import commands as word_range
+from abdf1_ros.pccc.word_range.commands import (
+    WireAddress,
+    WordBitWrite,
+    WordRangeRead,
+    WordRangeWrite,
+)
 
 
 class _Family(Protocol):

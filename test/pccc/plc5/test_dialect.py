@@ -20,7 +20,7 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
-from abdf1_ros.pccc.plc5_dialect import Plc5Dialect
+from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
 import pytest
 from support.tables import replied

@@ -16,12 +16,12 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc import slc
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import exactly, Request, Transfer
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.slc import commands as slc
 
 
 class SlcDialect:

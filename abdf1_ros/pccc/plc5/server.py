@@ -16,15 +16,16 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc import plc5, status
+from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.family import Codes, Commands, extended
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.plc2_server import BasicService, Window
+from abdf1_ros.pccc.plc2.server import BasicService, Window
+from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.typed_data import TypedData
-from abdf1_ros.pccc.word_range_server import WordRangeService
+from abdf1_ros.pccc.word_range.server import WordRangeService
 
 
 class Plc5Commands:

@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import plc2
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import exactly, Request, Transfer
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.plc2 import BasicBitWrite, BasicRead, BasicWrite, ByteChange
+from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, ByteChange
 
 
 class Plc2Dialect:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc2 import BasicBitWrite, BasicRead, BasicWrite, ByteChange
+from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, ByteChange
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

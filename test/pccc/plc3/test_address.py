@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc3_address import last_element, SECTIONS
+from abdf1_ros.pccc.plc3.address import last_element, SECTIONS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -20,7 +20,7 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc2_dialect import Plc2Dialect
+from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
 import pytest
 from support.vectors import vector
 

@@ -17,13 +17,13 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import slc
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.slc_dialect import SlcDialect
+from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.dialect import SlcDialect
 import pytest
 from support.tables import replied
 from support.vectors import pair

@@ -23,13 +23,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from abdf1_ros.pccc import plc2, status
+from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.family import BasicCommand, BasicCommands, Codes, Commands, Refusal
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc2 import BasicBitWrite, BasicRead, BasicWrite
+from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite
 
 
 @dataclass(frozen=True, slots=True)

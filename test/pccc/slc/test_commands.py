@@ -22,7 +22,7 @@ from functools import partial
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import BY_SLC_CODE, FileType
-from abdf1_ros.pccc.slc import (
+from abdf1_ros.pccc.slc.commands import (
     FLAT_CODES,
     LogicalAddress,
     LogicalRead,

@@ -17,10 +17,11 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import plc5, typed_data
+from abdf1_ros.pccc import typed_data
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
 from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.typed_data import TypedData
 
 

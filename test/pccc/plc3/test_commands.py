@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc3 import ExtendedAddress
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -33,7 +33,7 @@ import re
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
 from abdf1_ros.pccc.members import Members
-from abdf1_ros.pccc.plc3 import CONTEXT, DATA_TABLE
+from abdf1_ros.pccc.plc3.commands import CONTEXT, DATA_TABLE
 
 Parts = tuple[FileType, int, int, int, int | None]
 """File type, file, element, word in the element, bit."""
