@@ -35,13 +35,13 @@ import signal
 import sys
 import time
 
-from abdf1_ros.capture import Chunk
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.dumps import Recording
 from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.settings.network import BAUD_RATES, Network
+from abdf1_ros.sniffer.capture import Chunk
+from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.session import Session

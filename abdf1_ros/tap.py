@@ -23,10 +23,10 @@ from queue import Empty, SimpleQueue
 import threading
 import time
 
-from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.lines import Line, PtyLine, SerialLine
 from abdf1_ros.port import Port
 from abdf1_ros.settings.network import Network
+from abdf1_ros.sniffer.capture import Chunk, Direction
 
 _PTY = 'pty'
 

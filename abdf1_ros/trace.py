@@ -22,9 +22,9 @@ import math
 from pathlib import Path
 import time
 
-from abdf1_ros.capture import CaptureWriter, Chunk, Direction
 from abdf1_ros.port import open_port, Port, PortOptions, USUAL_OPTIONS
 from abdf1_ros.settings.network import Network
+from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
 
 
 def begun_now() -> str:

@@ -20,8 +20,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from abdf1_ros.capture import Direction
 from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
+from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.entries import Mark
 
 # Seconds after which no reply is expected any more: Cmd_Timeout goes up to 5 s (S0), and a

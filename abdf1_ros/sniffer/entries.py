@@ -19,9 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.capture import Direction
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.capture import Direction
 
 
 class Kind(Enum):

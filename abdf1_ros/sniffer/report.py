@@ -20,9 +20,9 @@ from collections.abc import Iterator
 import json
 from typing import Any
 
-from abdf1_ros.capture import Direction
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.pccc.describe import command_name
+from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.summary import Counts, Summary
 

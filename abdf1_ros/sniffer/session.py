@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Duplex, Fault, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.df1.packet import BROADCAST, HEADER_SIZE, Packet
 from abdf1_ros.pccc.describe import describe
+from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.conversation import Conversation, Transaction
 from abdf1_ros.sniffer.entries import Entry, Kind
 

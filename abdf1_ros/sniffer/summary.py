@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 
-from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 
 BITS_PER_CHARACTER = 10

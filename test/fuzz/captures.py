@@ -25,11 +25,11 @@ from pathlib import Path
 from typing import Any
 
 from abdf1_ros import sniff
-from abdf1_ros.capture import CaptureWriter, Chunk, Direction
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.dumps import Recording
 from abdf1_ros.errors import Problem
+from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
+from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.session import Session
 from abdf1_ros.text import printable

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.capture import Direction
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.conversation import Conversation, Facts
 from abdf1_ros.sniffer.entries import Mark
 import pytest

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import json
 
-from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary

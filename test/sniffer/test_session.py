@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.session import Session
 from hypothesis import given, strategies

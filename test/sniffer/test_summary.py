@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.capture import Chunk, Direction
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.summary import Latency, Summary
 import pytest

@@ -18,8 +18,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from abdf1_ros.capture import CaptureWriter, Chunk, Direction, is_capture_line, read_capture
 from abdf1_ros.errors import Problem
+from abdf1_ros.sniffer.capture import (
+    CaptureWriter,
+    Chunk,
+    Direction,
+    is_capture_line,
+    read_capture,
+)
 from hypothesis import given, strategies
 import pytest
 

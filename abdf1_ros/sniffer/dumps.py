@@ -25,8 +25,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 import re
 
-from abdf1_ros.capture import Chunk, Direction, is_capture_line, read_capture
 from abdf1_ros.errors import Problem
+from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
 
 _BLOCK = 4096
 # Bytes of a line of text: no program writes longer ones, and what has no line ends at all, such as
