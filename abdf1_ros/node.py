@@ -52,11 +52,11 @@ from abdf1_ros.node_messages import (
     write_qos,
 )
 from abdf1_ros.node_parameters import Configuration, configure
-from abdf1_ros.port import LinkThread, PortOptions, PortState
+from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
+from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
-from abdf1_ros.trace import PortOpener
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup

@@ -30,7 +30,7 @@ from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.node_health import health_values, trouble
-from abdf1_ros.port import LinkThread
+from abdf1_ros.ports.port import LinkThread
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 

@@ -21,7 +21,7 @@ import time
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.port import LinkThread
+from abdf1_ros.ports.port import LinkThread
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 

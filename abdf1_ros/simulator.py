@@ -43,10 +43,10 @@ from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import ConfigurationError
-from abdf1_ros.lines import Line, PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
-from abdf1_ros.port import LinkThread, Port, PortState
+from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
+from abdf1_ros.ports.port import LinkThread, Port, PortState
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
 from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
 from abdf1_ros.simulator_commands import CommandError, COMMANDS, execute

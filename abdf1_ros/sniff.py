@@ -39,6 +39,8 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.ports.tap import is_pty, Tap
+from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.sniffer.capture import Chunk
 from abdf1_ros.sniffer.dumps import Recording
@@ -46,7 +48,6 @@ from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.session import Session
 from abdf1_ros.sniffer.summary import Summary
-from abdf1_ros.tap import is_pty, Tap
 from abdf1_ros.terminal import (
     drop_output,
     interruptible,
@@ -56,7 +57,6 @@ from abdf1_ros.terminal import (
     whole_option,
 )
 from abdf1_ros.text import printable
-from abdf1_ros.trace import begun_now, Trace
 
 EXIT_LOST = 1  # a port that was there, or a file that cannot be read
 EXIT_USAGE = 2

@@ -21,7 +21,7 @@ import os
 from pathlib import Path
 import signal
 
-from abdf1_ros.port import open_port
+from abdf1_ros.ports.port import open_port
 from abdf1_ros.settings.network import Network
 import pytest
 from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT

@@ -23,7 +23,7 @@ from tools.rooms import ALLOWED, imports, MODULES, PACKAGE, room_of
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
-_MAY_WAIT = ('port.py', 'node.py', 'simulator.py', 'sniff.py', 'tap.py',
+_MAY_WAIT = ('ports/port.py', 'node.py', 'simulator.py', 'sniff.py', 'ports/tap.py',
              'commissioning/watch.py')
 
 
@@ -55,8 +55,8 @@ def violations(module: str, source: str) -> list[str]:
             found.append(f'{module} has to do without {top}')
         elif _is_ros(top) and not _may_use_ros(module):
             found.append(f'only the node imports {top}, not {module}')
-        elif top == 'serial' and module != 'port.py':
-            found.append(f'only port.py imports {top}, not {module}')
+        elif top == 'serial' and module != 'ports/port.py':
+            found.append(f'only ports/port.py imports {top}, not {module}')
         elif top in _WAITING and module not in _MAY_WAIT:
             found.append(f'{module} has to do without {top}')
     return found
@@ -94,7 +94,7 @@ def test_every_layer_is_looked_at() -> None:
     ('pccc/server.py', 'import socket'),
     ('driver/scheduler.py', 'import time'),
     ('driver/scheduler.py', 'import select'),
-    ('driver/scheduler.py', 'from abdf1_ros.port import LinkThread'),
+    ('driver/scheduler.py', 'from abdf1_ros.ports.port import LinkThread'),
     ('driver/scheduler.py', 'from abdf1_ros.node import Node'),
     ('driver/scheduler.py', 'from std_msgs.msg import String'),
     ('driver/deep/inside.py', 'from abdf1_ros import port'),
@@ -103,7 +103,7 @@ def test_every_layer_is_looked_at() -> None:
     ('errors.py', 'from abdf1_ros.df1 import packet'),
     ('counters.py', 'import time'),
     ('sniffer/session.py', 'import time'),
-    ('sniffer/session.py', 'from abdf1_ros.port import Port'),
+    ('sniffer/session.py', 'from abdf1_ros.ports.port import Port'),
     ('sniffer/session.py', 'from abdf1_ros.settings.network import Network'),
     ('sniffer/capture.py', 'import os'),
     ('sniffer/capture.py', 'from abdf1_ros.df1 import packet'),
@@ -112,7 +112,7 @@ def test_every_layer_is_looked_at() -> None:
     ('check.py', 'from std_msgs.msg import String'),
     ('commissioning/session.py', 'import serial'),
     ('plan/report.py', 'import time'),
-    ('driver/errands.py', 'from abdf1_ros.port import LinkThread'),
+    ('driver/errands.py', 'from abdf1_ros.ports.port import LinkThread'),
     ('driver/errands.py', 'from abdf1_ros.commissioning import session'),
     ('simulator.py', 'import rclpy.node'),
     ('simulator.py', 'import serial'),
@@ -122,7 +122,7 @@ def test_every_layer_is_looked_at() -> None:
     ('monitor.py', 'import threading'),
     ('node_log.py', 'import threading'),
     ('paths.py', 'import rclpy'),
-    ('port.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
+    ('ports/port.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
     ('tools/node_helper.py', 'import rclpy'),
 ])
 def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
@@ -138,12 +138,12 @@ def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
     ('pccc/server.py', 'from abdf1_ros.df1 import packet'),
     ('driver/scheduler.py', 'from abdf1_ros.df1.master import HalfDuplexMaster'),
     ('driver/scheduler.py', 'from abdf1_ros.pccc import dialects'),
-    ('port.py', 'import os, select, serial, threading, time'),
+    ('ports/port.py', 'import os, select, serial, threading, time'),
     ('node.py', 'import rclpy\nfrom std_msgs.msg import String\nfrom abdf1_ros import port'),
     ('node_parameters.py', 'from rcl_interfaces.msg import ParameterDescriptor\nimport rclpy'),
     ('node_diagnostics.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
     ('monitor_node.py', 'import rclpy\nfrom std_msgs.msg import String'),
-    ('simulator.py', 'import os, time\nfrom abdf1_ros.port import LinkThread'),
+    ('simulator.py', 'import os, time\nfrom abdf1_ros.ports.port import LinkThread'),
 ])
 def test_import_along_the_arrows_is_let_through(module: str, source: str) -> None:
     assert violations(module, source) == []

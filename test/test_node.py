@@ -27,7 +27,7 @@ from typing import Any
 from abdf1_ros.node import BridgeNode, main
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.port import PortState
+from abdf1_ros.ports.port import PortState
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.node import Node

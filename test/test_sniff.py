@@ -31,7 +31,7 @@ from abdf1_ros import sniff
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.lines import PtyLine
+from abdf1_ros.ports.endpoints import PtyLine
 from abdf1_ros.sniff import main
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly

@@ -70,10 +70,10 @@ ROOMS = (
     Room(('sniffer/dumps.py',), 'recorded bytes from files of other kinds', ('errors', 'capture')),
     Room(('sniffer',), 'traffic told to people', ('errors', 'capture', 'df1', 'pccc')),
     Room(('monitor_view.py',), 'the state of a running node as lines of text', ('text',)),
-    Room(('port.py',), 'opens a port, runs a link in its thread'),
-    Room(('lines.py',), 'lines that we make or open ourselves: pseudo-terminal, listening TCP '
+    Room(('ports/port.py',), 'opens a port, runs a link in its thread'),
+    Room(('ports/endpoints.py',), 'lines that we make or open ourselves: pseudo-terminal, listening TCP '
                         'port, serial port'),
-    Room(('trace.py', 'tap.py'), 'recording and listening on ports'),
+    Room(('ports/trace.py', 'ports/tap.py'), 'recording and listening on ports'),
     Room(('node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
     Room(('simulator.py', 'simulator_commands.py', 'simulated_plc.py'),
          'PLCs on a line, to test against'),

@@ -26,7 +26,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.errands import Errands, Order
 from abdf1_ros.errors import PortLost
-from abdf1_ros.port import LinkThread, open_port, Port, PortState
+from abdf1_ros.ports.port import LinkThread, open_port, Port, PortState
 from abdf1_ros.settings.network import Network
 from abdf1_ros.terminal import reason_of
 

@@ -16,7 +16,7 @@
 The driver of one line: carries out jobs one after the other and hands on what comes of them.
 
 It is sans-IO like the link layer below it: ``Driver.machine`` takes bytes and a clock value,
-and a ``Listener`` gets values, results and events. ``abdf1_ros.port.LinkThread`` gives it a
+and a ``Listener`` gets values, results and events. ``abdf1_ros.ports.port.LinkThread`` gives it a
 port and a clock; the tests give it a virtual line.
 """
 

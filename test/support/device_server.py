@@ -31,7 +31,7 @@ import struct
 import threading
 import time
 
-from abdf1_ros.port import DescriptorPort, open_port
+from abdf1_ros.ports.port import DescriptorPort, open_port
 from abdf1_ros.settings.network import Network
 import serial
 import serial.rfc2217

@@ -25,7 +25,7 @@ from random import Random
 import select
 import threading
 
-from abdf1_ros.port import DescriptorPort, open_port
+from abdf1_ros.ports.port import DescriptorPort, open_port
 from abdf1_ros.settings.network import Network
 from support.ptys import PATIENCE, Pty
 

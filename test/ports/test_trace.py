@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
 from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction, read_capture
-from abdf1_ros.trace import PortOpener, Trace, TracedPort
 import pytest
 from support.ptys import Pty
 

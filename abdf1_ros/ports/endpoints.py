@@ -23,7 +23,7 @@ import socket
 import tty
 from typing import Protocol
 
-from abdf1_ros.port import DescriptorPort, open_port, Port
+from abdf1_ros.ports.port import DescriptorPort, open_port, Port
 from abdf1_ros.settings.network import Network
 
 WAITING = 'waiting for a client'

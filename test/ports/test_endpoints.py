@@ -24,8 +24,8 @@ import socket
 import subprocess
 import sys
 
-from abdf1_ros.lines import PtyLine, SerialLine, TcpLine, WAITING
-from abdf1_ros.port import Port
+from abdf1_ros.ports.endpoints import PtyLine, SerialLine, TcpLine, WAITING
+from abdf1_ros.ports.port import Port
 from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
@@ -103,7 +103,7 @@ def test_name_that_cannot_be_had_leaves_no_terminal_open(
 
 def test_name_that_another_process_has(tmp_path: Path) -> None:
     name = str(tmp_path / 'plc')
-    code = 'import sys; from abdf1_ros.lines import PtyLine; PtyLine(sys.argv[1])'
+    code = 'import sys; from abdf1_ros.ports.endpoints import PtyLine; PtyLine(sys.argv[1])'
     with closing(PtyLine(name)):
         before = os.readlink(name)
         other = subprocess.run([sys.executable, '-c', code, name], text=True,

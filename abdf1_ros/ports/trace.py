@@ -22,7 +22,7 @@ import math
 from pathlib import Path
 import time
 
-from abdf1_ros.port import open_port, Port, PortOptions, USUAL_OPTIONS
+from abdf1_ros.ports.port import open_port, Port, PortOptions, USUAL_OPTIONS
 from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
 

@@ -21,9 +21,9 @@ import math
 import os
 from pathlib import Path
 
+from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
-from abdf1_ros.tap import is_pty, Tap
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
 

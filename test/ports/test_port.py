@@ -32,7 +32,7 @@ from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, 
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
-from abdf1_ros.port import (
+from abdf1_ros.ports.port import (
     DescriptorPort,
     LinkThread,
     open_port,
@@ -536,7 +536,7 @@ def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -
 
 def test_write_to_a_line_that_takes_no_more_does_not_hang(
         sockets: tuple[DescriptorPort, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.port._WRITE_TIMEOUT', 0.05)
+    monkeypatch.setattr('abdf1_ros.ports.port._WRITE_TIMEOUT', 0.05)
     with pytest.raises(OSError, match='the line takes no data; is Handshake right'):
         sockets[0].write(bytes(10_000_000))
 
@@ -559,7 +559,7 @@ def test_write_waits_for_a_line_that_is_slow(
 
 def test_full_pty_is_a_lost_port(
         pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.port._WRITE_TIMEOUT', 0.05)
+    monkeypatch.setattr('abdf1_ros.ports.port._WRITE_TIMEOUT', 0.05)
     script = Script(Step(bytes(1_000_000), None))
     link.start(script.machine, pty.name)
     assert link.state().is_open

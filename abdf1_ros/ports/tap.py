@@ -23,8 +23,8 @@ from queue import Empty, SimpleQueue
 import threading
 import time
 
-from abdf1_ros.lines import Line, PtyLine, SerialLine
-from abdf1_ros.port import Port
+from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine
+from abdf1_ros.ports.port import Port
 from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
