@@ -58,11 +58,11 @@ $(INSTALLED): setup.py requirements/ros.txt requirements/test.txt requirements/t
 
 .PHONY: demo
 demo: $(INSTALLED) ## Run bridge and simulated PLC for DEMO_SECONDS (20; 0: until Ctrl-C)
-	@$(PY) -m abdf1_ros.demo --seconds $(DEMO_SECONDS)
+	@$(PY) -m abdf1_ros demo --seconds $(DEMO_SECONDS)
 
 .PHONY: demo-peer
 demo-peer: $(INSTALLED) ## The same on a full-duplex line
-	@$(PY) -m abdf1_ros.demo --peer --seconds $(DEMO_SECONDS)
+	@$(PY) -m abdf1_ros demo --peer --seconds $(DEMO_SECONDS)
 
 .PHONY: test
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some

@@ -93,7 +93,7 @@ def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(tmp_path: Pa
     install, etc = tmp_path / 'install', tmp_path / 'etc'
     node = install / 'lib' / 'abdf1_ros' / 'node'
     node.parent.mkdir(parents=True)
-    node.write_text(f'#!/bin/sh\nexec {sys.executable} -m abdf1_ros.node "$@"\n')
+    node.write_text(f'#!/bin/sh\nexec {sys.executable} -m abdf1_ros node "$@"\n')
     node.chmod(0o755)
     (install / 'setup.bash').write_text(f'cd {SOURCE}\n')
     etc.mkdir()

@@ -48,7 +48,7 @@ def environment(tmp_path: Path) -> dict[str, str]:
     folder.mkdir()
     for command in ('plc', 'check', 'sniff', 'simulator'):
         script = folder / command
-        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m abdf1_ros.{command} "$@"\n')
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m abdf1_ros {command} "$@"\n')
         script.chmod(0o755)
     paths = {'PATH': f'{folder}:{os.environ["PATH"]}', 'PYTHONPATH': str(documents.ROOT)}
     return os.environ | paths

@@ -23,8 +23,8 @@ from tools.rooms import ALLOWED, imports, MODULES, PACKAGE, room_of
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
-_MAY_WAIT = ('ports/port.py', 'node.py', 'simulator.py', 'sniff.py', 'ports/tap.py',
-             'commissioning/watch.py')
+_MAY_WAIT = ('ports/port.py', 'node.py', 'cli/simulator.py', 'cli/sniff.py', 'ports/tap.py',
+             'cli/plc/watch.py')
 
 
 def room(module: str) -> str:
@@ -33,7 +33,7 @@ def room(module: str) -> str:
 
 
 def _may_use_ros(module: str) -> bool:
-    return module in ('node.py', 'demo.py', 'monitor.py', 'monitor_node.py') or (
+    return module in ('node.py', 'cli/demo.py', 'cli/monitor/command.py', 'cli/monitor/node.py') or (
         module.startswith('node_') and '/' not in module)
 
 
@@ -107,19 +107,19 @@ def test_every_layer_is_looked_at() -> None:
     ('sniffer/session.py', 'from abdf1_ros.settings.network import Network'),
     ('sniffer/capture.py', 'import os'),
     ('sniffer/capture.py', 'from abdf1_ros.df1 import packet'),
-    ('sniff.py', 'import rclpy'),
-    ('plc.py', 'import rclpy'),
-    ('check.py', 'from std_msgs.msg import String'),
-    ('commissioning/session.py', 'import serial'),
+    ('cli/sniff.py', 'import rclpy'),
+    ('cli/plc/command.py', 'import rclpy'),
+    ('cli/check.py', 'from std_msgs.msg import String'),
+    ('cli/plc/session.py', 'import serial'),
     ('plan/report.py', 'import time'),
     ('driver/errands.py', 'from abdf1_ros.ports.port import LinkThread'),
     ('driver/errands.py', 'from abdf1_ros.commissioning import session'),
-    ('simulator.py', 'import rclpy.node'),
-    ('simulator.py', 'import serial'),
-    ('demo.py', 'from threading import Thread'),
-    ('monitor_view.py', 'import rclpy'),
-    ('monitor_view.py', 'from abdf1_ros.node_messages import MESSAGES'),
-    ('monitor.py', 'import threading'),
+    ('cli/simulator.py', 'import rclpy.node'),
+    ('cli/simulator.py', 'import serial'),
+    ('cli/demo.py', 'from threading import Thread'),
+    ('cli/monitor/view.py', 'import rclpy'),
+    ('cli/monitor/view.py', 'from abdf1_ros.node_messages import MESSAGES'),
+    ('cli/monitor/command.py', 'import threading'),
     ('node_log.py', 'import threading'),
     ('paths.py', 'import rclpy'),
     ('ports/port.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
@@ -142,8 +142,8 @@ def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
     ('node.py', 'import rclpy\nfrom std_msgs.msg import String\nfrom abdf1_ros import port'),
     ('node_parameters.py', 'from rcl_interfaces.msg import ParameterDescriptor\nimport rclpy'),
     ('node_diagnostics.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
-    ('monitor_node.py', 'import rclpy\nfrom std_msgs.msg import String'),
-    ('simulator.py', 'import os, time\nfrom abdf1_ros.ports.port import LinkThread'),
+    ('cli/monitor/node.py', 'import rclpy\nfrom std_msgs.msg import String'),
+    ('cli/simulator.py', 'import os, time\nfrom abdf1_ros.ports.port import LinkThread'),
 ])
 def test_import_along_the_arrows_is_let_through(module: str, source: str) -> None:
     assert violations(module, source) == []

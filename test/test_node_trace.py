@@ -40,7 +40,7 @@ def test_trace_of_a_running_node_tells_what_it_has_read(files: Files) -> None:
         observer.listen(Float32MultiArray, '/abdf1/read/setpoint').values([21.5])
         node.end()
     result = subprocess.run(
-        [sys.executable, '-m', 'abdf1_ros.sniff', '--json', str(trace)], text=True,
+        [sys.executable, '-m', 'abdf1_ros', 'sniff', '--json', str(trace)], text=True,
         capture_output=True, timeout=20, check=True)
     *entries, summary = map(json.loads, result.stdout.splitlines())
     texts = {entry.get('text', '').partition(': ')[2] for entry in entries}

@@ -123,7 +123,7 @@ class Simulator:
         data = folder / 'data.csv'
         data.write_text(DATA, encoding='utf-8')
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros.simulator', '--data', str(data), *args], cwd=ROOT,
+            [sys.executable, '-m', 'abdf1_ros', 'simulator', '--data', str(data), *args], cwd=ROOT,
             text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         self.lines: list[str] = []
         self._news = threading.Condition()

@@ -69,20 +69,20 @@ ROOMS = (
     Room(('sniffer/capture.py',), 'the format of recorded bytes', ('errors', 'text', 'numerals')),
     Room(('sniffer/dumps.py',), 'recorded bytes from files of other kinds', ('errors', 'capture')),
     Room(('sniffer',), 'traffic told to people', ('errors', 'capture', 'df1', 'pccc')),
-    Room(('monitor_view.py',), 'the state of a running node as lines of text', ('text',)),
+    Room(('cli/monitor/view.py',), 'the state of a running node as lines of text', ('text',)),
     Room(('ports/port.py',), 'opens a port, runs a link in its thread'),
     Room(('ports/endpoints.py',), 'lines that we make or open ourselves: pseudo-terminal, listening TCP '
                         'port, serial port'),
     Room(('ports/trace.py', 'ports/tap.py'), 'recording and listening on ports'),
     Room(('node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
-    Room(('simulator.py', 'simulator_commands.py', 'simulated_plc.py'),
+    Room(('cli/simulator.py', 'simulator_commands.py', 'simulated_plc.py'),
          'PLCs on a line, to test against'),
-    Room(('commissioning', 'plc.py'), 'single questions to PLCs: the command `plc`'),
-    Room(('sniff.py', 'check.py'), 'the commands of these names'),
-    Room(('monitor.py', 'monitor_node.py'), 'the command `monitor`'),
-    Room(('demo.py',), 'starts node and simulator together'),
-    Room(('executables.py',), 'entry points that end quietly while they still import'),
-    Room(('paths.py', 'terminal.py'), 'installed files; what commands print on a terminal'),
+    Room(('commissioning', 'cli/plc/command.py'), 'single questions to PLCs: the command `plc`'),
+    Room(('cli/sniff.py', 'cli/check.py'), 'the commands of these names'),
+    Room(('cli/monitor/command.py', 'cli/monitor/node.py'), 'the command `monitor`'),
+    Room(('cli/demo.py',), 'starts node and simulator together'),
+    Room(('cli/main.py',), 'entry points that end quietly while they still import'),
+    Room(('paths.py', 'cli/terminal.py'), 'installed files; what commands print on a terminal'),
 )
 
 ALLOWED = {path: (*room.allowed, *room.paths) for room in ROOMS if room.allowed is not None

@@ -24,7 +24,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from abdf1_ros import sniff
+from abdf1_ros.cli import sniff
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.errors import Problem

@@ -1,0 +1,228 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Check a net CSV and a map CSV before anything is connected.
+
+Every fault of both files is shown with file, line and column. Then comes what the node will do
+with them: which tags are read together, how long that takes on the line, and what is odd.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+import json
+import sys
+from typing import Any
+
+from abdf1_ros.cli.terminal import colour, drop_output, GREEN, prepare_output, RED, table, YELLOW
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.served import line_problems
+from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.numbers import decimal_number
+from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
+from abdf1_ros.plan.planner import Block
+from abdf1_ros.plan.report import last_address, make_report, Remark, Report
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.text import printable
+
+EXIT_FAULTY = 2
+EXIT_INTERRUPTED = 130
+
+_LONGEST = 86_400_000
+_SHOWN_TAGS = 8  # in the table; JSON has them all
+_EPILOG = """\
+exit status: 0 when both files are good, also with warnings; 2 for errors;
+             130 when interrupted by Ctrl-C
+
+examples:
+  check config/net.csv config/map.csv
+  check --response-time 25 net.csv map.csv    the PLC needs 25 ms for each answer
+  check --json net.csv map.csv | jq .load
+"""
+
+
+@dataclass(slots=True)
+class Findings:
+    """What there is to say of both files; no network where the net file has faults."""
+
+    network: Network | None = None
+    mappings: list[Mapping] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
+
+
+def examine(net_file: str, map_file: str) -> Findings:
+    """Read both files, collecting every fault."""
+    found = Findings()
+    try:
+        found.network = load_network(net_file)
+    except ConfigurationError as error:
+        found.problems += error.problems
+    try:
+        found.mappings, problems = load_mappings(map_file)
+        found.problems += problems
+    except ConfigurationError as error:
+        found.problems += error.problems
+    if found.network is not None:
+        for mapping, problem in line_problems(found.mappings, found.network, map_file):
+            found.mappings.remove(mapping)
+            found.problems.append(problem)
+    return found
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Print the findings; return 2 when there are errors, otherwise 0."""
+    prepare_output()
+    options = _parse(args)
+    try:
+        found = examine(options.net, options.map)
+        report = None
+        if found.network is not None:
+            report = make_report(found.network, found.mappings, options.default_period / 1000,
+                                 options.response_time / 1000)
+        print(_json(found, report) if options.json else _text(found, report), flush=True)
+    except BrokenPipeError:
+        drop_output()
+    except OSError as error:  # such as a full disk
+        drop_output()
+        print(f'check: cannot print: {error.strerror}', file=sys.stderr)
+        return EXIT_FAULTY
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    return EXIT_FAULTY if found.problems else 0
+
+
+def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='check', description=__doc__, epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('net', metavar='NET', help='the net CSV')
+    parser.add_argument('map', metavar='MAP', help='the map CSV')
+    parser.add_argument('--json', action='store_true',
+                        help='print one JSON object, with every tag of every block')
+    parser.add_argument('--default-period', type=_duration, metavar='MS',
+                        default=DriverSettings().default_period * 1000,
+                        help="the node's default_period (default: %(default)g)")
+    parser.add_argument('--response-time', type=_duration, metavar='MS',
+                        default=USUAL_RESPONSE_TIME * 1000,
+                        help='ms that a PLC takes for each answer (default: %(default)g)')
+    return parser.parse_args(args)
+
+
+def _duration(text: str) -> float:
+    value = decimal_number(text)
+    if value is None or not 0 <= value <= _LONGEST:
+        raise argparse.ArgumentTypeError(f'"{text}" should be ms from 0 to {_LONGEST}')
+    return value
+
+
+def _text(found: Findings, report: Report | None) -> str:
+    """Return everything for people."""
+    parts = [colour(f'error: {problem}', RED, sys.stdout) for problem in found.problems]
+    if report is None:
+        return '\n'.join([*parts, 'no plan without a good net file'])
+    if parts:
+        parts.append('the plan is that of the rows without errors')
+    remarks = report.remarks()
+    parts += ['', _line_text(report), '', _plan_text(report), '', _times_text(report)]
+    parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
+              for remark in remarks]
+    if not found.problems and not remarks:
+        parts.append(colour('no errors, no warnings', GREEN, sys.stdout))
+    return '\n'.join(parts).lstrip('\n')
+
+
+def _line_text(report: Report) -> str:
+    network = report.network
+    mappings, blocks = len(report.mappings), len(report.blocks)
+    return (f'{printable(network.port)}: Mode {network.mode}, {network.baud} baud, '
+            f'{network.data_bits} data bits, parity {network.parity}, {network.stop_bits} stop, '
+            f'{network.error_code}; our own Station is {network.station}\n'
+            f'{mappings} {"mapping is" if mappings == 1 else "mappings are"} read with '
+            f'{blocks} {"block" if blocks == 1 else "blocks"}')
+
+
+def _plan_text(report: Report) -> str:
+    """Return the read plan as a table."""
+    head = ('station', 'PLC_Type', 'from', 'to', 'words', 'bytes', 'packets', 'line ms',
+            'total ms', 'period ms', 'tags')
+    rows = []
+    for block in report.blocks:
+        entry = _entry(report, block)
+        tags = entry.pop('tags')
+        names = printable(', '.join(tags[:_SHOWN_TAGS]))
+        if len(tags) > _SHOWN_TAGS:
+            names += f' and {len(tags) - _SHOWN_TAGS} more'
+        rows.append([*map(_cell, entry.values()), names])
+    return table(head, rows, right=(0, 4, 5, 6, 7, 8, 9))
+
+
+def _cell(value: object) -> str:
+    return f'{value:.1f}' if isinstance(value, float) else str(value)
+
+
+def _entry(report: Report, block: Block) -> dict[str, Any]:
+    """Return what there is to say about a block, times in ms."""
+    last = last_address(block.start, block.span.end - 1)
+    return {
+        'station': block.station, 'plc_type': block.mappings[0].plc_type.value,
+        'first': str(block.start), 'last': str(last), 'words': block.words,
+        'bytes': 2 * block.words, 'packets': len(block.requests),
+        'line_ms': _ms(block.line_time), 'total_ms': _ms(report.time(block)),
+        'period_ms': _ms(block.period), 'tags': [mapping.tag for mapping in block.mappings]}
+
+
+def _times_text(report: Report) -> str:
+    response = report.response_time * 1000
+    return (f'expected scan time: {report.scan_time * 1000:.1f} ms for everything once, with '
+            f'{response:g} ms for each answer of a PLC\n'
+            f'load of the line: {report.load:.0%} of the time is needed to keep the periods')
+
+
+def _json(found: Findings, report: Report | None) -> str:
+    """Return the same for programs; every key is always there, times are in ms."""
+    content: dict[str, Any] = {
+        'errors': [_problem(problem) for problem in found.problems],
+        'warnings': [], 'network': None, 'mappings': len(found.mappings), 'blocks': [],
+        'scan_time_ms': None, 'load': None, 'needed_baud': None, 'response_time_ms': None}
+    if report is not None:
+        content |= {
+            'network': asdict(report.network), 'warnings': [*map(_remark, report.remarks())],
+            'blocks': [_entry(report, block) for block in report.blocks],
+            'scan_time_ms': _ms(report.scan_time), 'load': round(report.load, 4),
+            'needed_baud': report.needed_baud(),
+            'response_time_ms': _ms(report.response_time)}
+    return json.dumps(content, indent=2)
+
+
+def _problem(problem: Problem) -> dict[str, Any]:
+    return {
+        **asdict(problem.place), 'number': problem.message.number if problem.message else None,
+        'mnemonic': problem.message.name if problem.message else None, 'text': str(problem)}
+
+
+def _remark(remark: Remark) -> dict[str, Any]:
+    return {'kind': remark.kind.value, 'station': remark.station, 'text': remark.text}
+
+
+def _ms(seconds: float) -> float:
+    return round(seconds * 1000, 3)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

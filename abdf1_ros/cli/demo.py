@@ -1,0 +1,340 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The demo: simulator and node as processes, and what a robot cell sees of them, told in order.
+
+It needs no hardware. Everything stays on this machine: discovery is limited to localhost, and
+the domain is one of our own unless ROS_DOMAIN_ID is set.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+from abdf1_ros.cli.terminal import ignore_further, interruptible
+from abdf1_ros.node_messages import MESSAGES
+from abdf1_ros.numbers import decimal_number
+from abdf1_ros.paths import config_file
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+_PATIENCE = 15.0
+_OK = DiagnosticStatus.OK
+_WRITTEN = (211, 222, 233, 244)
+_TOO_LARGE = (1, 2, 3, 5000)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is shown: files, the simulated line, and who plays which part."""
+
+    title: str
+    net_file: str
+    map_file: str
+    simulator: tuple[str, ...]
+    failing_station: int
+    watched: str
+    surviving: str | None
+    push: str | None = None
+
+
+HALF_DUPLEX = Scene(
+    'A PLC-5 (station 1) and an SLC 5/03 (station 2), simulated on one half-duplex DF1 line',
+    'net.csv', 'map.csv', (), 2, 'part_counter', 'line_speed')
+FULL_DUPLEX = Scene(
+    'A PLC-5 (station 1), simulated on a full-duplex DF1 line',
+    'peer_net.csv', 'peer_map.csv', ('--full-duplex', '1'), 1, 'line_speed', None,
+    'msg 1 N7:50 11 22 33 44')
+
+
+class Interrupted(Exception):
+    """The user or a process we started has ended the demo."""
+
+
+class Watcher(Node):
+    """The robot cell's side: subscribes to everything and remembers the last of each."""
+
+    def __init__(self, mappings: Sequence[Mapping]) -> None:
+        super().__init__('demo_watcher')
+        self.values: dict[str, Any] = {}
+        self.results: list[DiagnosticStatus] = []
+        self.statuses: dict[str, DiagnosticStatus] = {}
+        self.missed = 0
+        for mapping in mappings:
+            if mapping.reads:
+                self.create_subscription(
+                    MESSAGES[mapping.message_type], f'/abdf1/read/{mapping.topic}',
+                    self._taker(mapping), QoSProfile(
+                        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self.create_subscription(
+            DiagnosticStatus, '/abdf1/write_results', self.results.append, 10)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
+
+    def expect(self, mapping: Mapping) -> float:
+        """Ask to be told when values stop for as long as the bridge promises; return that (s)."""
+        topic = f'/abdf1/read/{mapping.topic}'
+        deadline = self.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
+
+        def missed(event: Any) -> None:
+            self.missed += event.total_count_change
+
+        self.create_subscription(
+            MESSAGES[mapping.message_type], topic, lambda message: None,
+            QoSProfile(depth=1, deadline=deadline),
+            event_callbacks=SubscriptionEventCallbacks(deadline=missed))
+        return float(deadline.nanoseconds / 1e9)
+
+    def _taker(self, mapping: Mapping) -> Callable[[Any], None]:
+        def take(message: Any) -> None:
+            self.values[mapping.tag] = message.data
+        return take
+
+    def _diagnostics(self, message: DiagnosticArray) -> None:
+        self.statuses.update({status.name: status for status in message.status})
+
+
+class Demo:
+    """Tell the story; every step waits for what it shows to have happened."""
+
+    def __init__(self, scene: Scene, link: Path) -> None:
+        net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
+        mappings, _ = load_mappings(str(map_file))
+        self._scene = scene
+        self._mappings = {mapping.tag: mapping for mapping in mappings}
+        self._begin = time.monotonic()
+        self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
+                             '-p', f'map_file:={map_file}')
+        self._simulator_args = ('--pty', str(link), *scene.simulator)
+        self._children: list[subprocess.Popen[bytes]] = []
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._watcher = Watcher(mappings)
+
+    def run(self, seconds: float) -> None:
+        """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
+        self._simulator = self._start('simulator', *self._simulator_args)
+        self._bridge = self._start('node', *self._bridge_args)
+        self._title(self._scene.title)
+        domain = os.environ['ROS_DOMAIN_ID']
+        self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} '
+                  'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor')
+        self._show_reads()
+        self._show_writes()
+        if self._scene.push:
+            self._show_push(self._scene.push)
+        self._show_failure(f'station {self._scene.failing_station}')
+        self._show_diagnostics()
+        while not seconds or time.monotonic() - self._begin < seconds:
+            self._pause(5.0)
+            self._title('Still running' + ('' if seconds else '; Ctrl-C ends it'))
+            self._print_values()
+
+    def close(self) -> None:
+        """End both processes, the bridge first."""
+        for process in reversed(self._children):
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            process.wait(_PATIENCE)
+        self._watcher.destroy_node()
+        rclpy.try_shutdown()
+
+    def _start(self, name: str, *args: str) -> subprocess.Popen[bytes]:
+        # By its executable, which a signal during the imports ends quietly. A session of its own:
+        # Ctrl-C is for us, who then end both in order.
+        code = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+        self._children.append(subprocess.Popen(
+            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, start_new_session=True))
+        return self._children[-1]
+
+    def _show_reads(self) -> None:
+        polled = {tag for tag, mapping in self._mappings.items() if mapping.polls}
+        self._wait('every mapped topic', lambda: polled <= self._watcher.values.keys())
+        self._title(f'1. Reads: every row of config/{self._scene.map_file} is a topic')
+        self._print_values()
+        self._pause(2.0)
+        self._say('two seconds later:')
+        self._print_values()
+
+    def _print_values(self) -> None:
+        for tag, mapping in self._mappings.items():
+            if tag in self._watcher.values:
+                place = f'station {mapping.station}  {mapping.address!s:<9}'
+                print(f'    {place} -> /abdf1/read/{mapping.topic:<16}'
+                      f' {_shown(self._watcher.values[tag])}', flush=True)
+
+    def _show_writes(self) -> None:
+        self._title('2. Writes: published to ~/write/<topic>, answered on ~/write_results')
+        self._write('recipe', _WRITTEN)
+        self._wait('the value to come back',
+                   lambda: tuple(self._watcher.values['recipe']) == _WRITTEN)
+        self._say(f'and /abdf1/read/recipe now shows {_shown(self._watcher.values["recipe"])}')
+        self._write('recipe', _TOO_LARGE)
+        self._pause(1.0)
+
+    def _write(self, tag: str, values: Sequence[int]) -> None:
+        mapping = self._mappings[tag]
+        publisher = self._watcher.create_publisher(
+            MESSAGES[mapping.message_type], f'/abdf1/write/{mapping.topic}', 10)
+        self._wait('the bridge to listen', lambda: publisher.get_subscription_count() > 0)
+        self._watcher.results.clear()
+        publisher.publish(MESSAGES[mapping.message_type](data=values))
+        self._say(f'publish {list(values)} to /abdf1/write/{mapping.topic}')
+        self._wait('the result', lambda: bool(self._watcher.results))
+        result = self._watcher.results[0]
+        latency = {pair.key: pair.value for pair in result.values}['latency_ms']
+        self._say(f'result: {result.message} ({latency} ms)')
+
+    def _show_push(self, command: str) -> None:
+        self._title('   Serve: the PLC writes to words of ours, without being asked')
+        tag = next(tag for tag, mapping in self._mappings.items() if mapping.serves)
+        self._command(command)
+        self._wait('the values', lambda: tag in self._watcher.values)
+        self._say(f'/abdf1/read/{tag} shows {_shown(self._watcher.values[tag])}')
+
+    def _show_failure(self, station: str) -> None:
+        self._title(f'3. {station.capitalize()} loses its power')
+        watched = self._mappings[self._scene.watched]
+        deadline = self._watcher.expect(watched)
+        self._pause(1.0)
+        self._watcher.missed = 0
+        self._command(f'silent {self._scene.failing_station}')
+        self._wait('the loss to be noticed', lambda: self._watcher.missed > 0)
+        self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of '
+                  f'{deadline:.1f} s is told: no more values')
+        self._wait('the station to be inactive', lambda: self._level(station) != _OK)
+        self._print_statuses('link', station, 'mappings')
+        if self._scene.surviving:
+            self._show_survivor(self._scene.surviving)
+        self._title('   ... and gets it back')
+        self._command(f'normal {self._scene.failing_station}')
+        self._wait('the station to answer', lambda: self._level('mappings') == _OK)
+        self._print_statuses('link', station, 'mappings')
+
+    def _show_survivor(self, tag: str) -> None:
+        before = list(self._watcher.values[tag])
+        self._wait('new values', lambda: list(self._watcher.values[tag]) != before)
+        self._say(f'the other goes on: /abdf1/read/{tag} {before} -> '
+                  f'{_shown(self._watcher.values[tag])}')
+
+    def _show_diagnostics(self) -> None:
+        self._title('4. Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
+        self._print_statuses(*(name.partition(': ')[2] for name in self._watcher.statuses))
+        self._say('the counters of the line that are not 0:')
+        for pair in self._watcher.statuses['abdf1: counters'].values:
+            if pair.value != '0':
+                print(f'    {pair.key:<24} {pair.value:>7}', flush=True)
+
+    def _level(self, section: str) -> bytes:
+        level: bytes = self._watcher.statuses[f'abdf1: {section}'].level
+        return level
+
+    def _print_statuses(self, *sections: str) -> None:
+        for section in sections:
+            status = self._watcher.statuses[f'abdf1: {section}']
+            print(f'    {status.name:<18} {status.message}', flush=True)
+
+    def _command(self, line: str) -> None:
+        assert self._simulator.stdin is not None
+        self._simulator.stdin.write(f'{line}\n'.encode())
+        self._simulator.stdin.flush()
+
+    def _pause(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        self._spin_until(lambda: time.monotonic() >= end, seconds + _PATIENCE)
+
+    def _wait(self, what: str, condition: Callable[[], bool]) -> None:
+        if not self._spin_until(condition, _PATIENCE):
+            raise Interrupted(f'waited {_PATIENCE:g} s in vain for {what}')
+
+    def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
+        end = time.monotonic() + limit
+        while time.monotonic() < end:
+            if condition():
+                return True
+            for process in (self._simulator, self._bridge):
+                if process.poll() is not None:
+                    raise Interrupted('a process has ended; see above')
+            rclpy.spin_once(self._watcher, timeout_sec=0.05)
+        return condition()
+
+    def _title(self, text: str) -> None:
+        print(f'\n{text}', flush=True)
+
+    def _say(self, text: str) -> None:
+        print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
+
+
+def _shown(values: Any) -> str:
+    if isinstance(values, str):
+        return values
+    return '[' + ', '.join(f'{value:g}' for value in values) + ']'
+
+
+def _seconds(text: str) -> float:
+    value = decimal_number(text)
+    if value is None or value < 0:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds from 0')
+    return value
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the demo; return 0, or 1 when something did not happen."""
+    parser = argparse.ArgumentParser(prog='demo', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--seconds', type=_seconds, default=20.0,
+                        help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
+    parser.add_argument('--peer', action='store_true',
+                        help='show a full-duplex line, on which the PLC writes by itself')
+    options = parser.parse_args(args)
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
+        try:
+            demo = Demo(FULL_DUPLEX if options.peer else HALF_DUPLEX, Path(folder) / 'line')
+            return _tell(demo, options.seconds)
+        except KeyboardInterrupt:
+            print()
+    return 0
+
+
+def _tell(demo: Demo, seconds: float) -> int:
+    try:
+        demo.run(seconds)
+    except Interrupted as reason:
+        print(f'demo: {reason}', file=sys.stderr)
+        return 1
+    finally:
+        ignore_further()  # or a process of ours might stay
+        demo.close()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,116 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The commands by their names, for the executables and for ``python3 -m abdf1_ros``.
+
+Importing what a command needs takes a while. Until its ``main`` handles signals, Ctrl-C and
+SIGTERM end it as they do later: at once, with the same status and without a traceback. There is
+nothing yet that wants to be closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+import os
+from pathlib import Path
+import signal
+import sys
+from types import FrameType
+
+_NOT_INSTALLED = 2
+_INTERRUPTED = 130  # of the commands whose status tells whether they have done what they should
+
+COMMANDS = {
+    'node': 'abdf1_ros.ros.node',
+    'monitor': 'abdf1_ros.cli.monitor.command',
+    'demo': 'abdf1_ros.cli.demo',
+    'simulator': 'abdf1_ros.cli.simulator',
+    'sniff': 'abdf1_ros.cli.sniff',
+    'check': 'abdf1_ros.cli.check',
+    'plc': 'abdf1_ros.cli.plc.command',
+}
+"""Where the ``main`` of each command is."""
+
+_TELLING = ('check', 'plc')
+
+
+def run(name: str) -> int:
+    """Run a command with the arguments of this process; return its exit status."""
+    with _ending_quietly(_INTERRUPTED if name in _TELLING else 0):
+        module = import_module(COMMANDS[name])
+    return _ended(module.main())
+
+
+def node() -> int:
+    """Run the node."""
+    return run('node')
+
+
+def monitor() -> int:
+    """Run the monitor."""
+    return run('monitor')
+
+
+def demo() -> int:
+    """Run the demonstration."""
+    return run('demo')
+
+
+def simulator() -> int:
+    """Run the simulator."""
+    return run('simulator')
+
+
+def sniff() -> int:
+    """Run the sniffer."""
+    return run('sniff')
+
+
+def check() -> int:
+    """Check files."""
+    return run('check')
+
+
+def plc() -> int:
+    """Ask a PLC."""
+    return run('plc')
+
+
+@contextmanager
+def _ending_quietly(status: int = 0) -> Iterator[None]:
+    def leave(number: int, frame: FrameType | None) -> None:
+        os._exit(status)
+
+    usual = {number: signal.signal(number, leave)
+             for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith('abdf1_ros'):
+            raise
+        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; '
+              'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?', file=sys.stderr)
+        sys.exit(_NOT_INSTALLED)
+    for number, handler in usual.items():
+        signal.signal(number, handler)
+
+
+def _ended(status: int) -> int:
+    """Return the status, which a second Ctrl-C while Python ends is not to change."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    return status

@@ -1,0 +1,276 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Show what a running bridge does, from its topics alone.
+
+That is: values and their ages, stations, the load of the line, writes and counters. On a terminal
+the picture is renewed in place; arrow and page keys scroll, Ctrl-L draws it anew, q or Ctrl-C
+ends. Elsewhere, or with --once, plain text is printed.
+
+A value is fresh, or STALE when it is older than its topic promises; topics that are published on
+change, or when a PLC writes to us, promise nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import curses
+import locale
+import math
+import os
+import shutil
+import signal
+import sys
+import time
+from types import FrameType
+
+from abdf1_ros.cli.monitor.node import full_name, Watch
+from abdf1_ros.cli.monitor.view import Line, render, Style
+from abdf1_ros.cli.terminal import drop_output, prepare_output, seconds_option
+from abdf1_ros.errors import FormatError
+from abdf1_ros.text import printable
+from rclpy.utilities import remove_ros_args
+
+EXIT_NOT_FOUND = 1
+EXIT_USAGE = 2
+
+# How often (s) the picture is renewed where a terminal shows it in place.
+_RENEWAL = 0.25
+
+# How long (s) one picture waits for values that have been promised, once the node is found.
+_COMPLETION = 3.0
+
+_PROGRESS_PERIOD = 2.0
+
+# What draws everything anew on a terminal, as when something else has written there.
+_CONTROL_L = 12
+
+# Colours by the codes of ANSI, which stand for the same colours in curses.
+_COLOURS = {Style.GOOD: 2, Style.WARNING: 3, Style.BAD: 1}
+
+_EPILOG = """\
+exit status: 0 at the end, 1 when the node is not found within --wait, 2 for bad options
+
+examples:
+  monitor
+  monitor --node /cell/line_1
+  monitor --once | grep -E 'STALE|no value'
+  monitor --seconds 60 --period 10 > state.txt
+"""
+
+
+class _Ending:
+    """Tells whether a signal has come, or the time is up."""
+
+    def __init__(self) -> None:
+        self._end = math.inf
+        self._signalled = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._signal)
+
+    def __call__(self) -> bool:
+        return self._signalled or time.monotonic() >= self._end
+
+    def limit(self, seconds: float) -> None:
+        """Let the time be up in so many seconds."""
+        self._end = time.monotonic() + seconds
+
+    def _signal(self, number: int, frame: FrameType | None) -> None:
+        self._signalled = True
+
+
+class _Screen:
+    """A terminal that shows lines in place, for curses.wrapper."""
+
+    def __init__(self, window: curses.window) -> None:
+        self._window = window
+        self._top = 0
+        self._colours: dict[Style, int] = {}
+        window.nodelay(True)
+        try:
+            curses.curs_set(0)
+        except curses.error:  # a terminal that cannot hide it
+            pass
+        if curses.has_colors() and 'NO_COLOR' not in os.environ:
+            curses.use_default_colors()
+            for style, number in _COLOURS.items():
+                curses.init_pair(number, number, -1)
+                self._colours[style] = curses.color_pair(number)
+
+    @property
+    def width(self) -> int:
+        return self._window.getmaxyx()[1] - 1  # writing into the last corner is an error
+
+    def show(self, lines: Sequence[Line]) -> None:
+        """Show what fits, from the line that has been scrolled to."""
+        height = self._window.getmaxyx()[0]
+        self._top = max(0, min(self._top, len(lines) - height))
+        self._window.erase()
+        for row, line in enumerate(lines[self._top:self._top + height]):
+            attributes = self._colours.get(line.style, 0)
+            if line.style is Style.TITLE:
+                attributes = curses.A_BOLD
+            try:
+                self._window.addnstr(row, 0, line.text, self.width, attributes)
+            except curses.error:  # letters of double width, or a window just made smaller
+                pass
+        self._window.refresh()
+
+    def wants_end(self) -> bool:
+        """Take the keys that have been pressed; tell whether one of them ends."""
+        page = self._window.getmaxyx()[0] - 1
+        steps = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
+                 curses.KEY_NPAGE: page, curses.KEY_HOME: -self._top, ord(' '): page}
+        while (key := self._window.getch()) != -1:
+            if key == ord('q'):
+                return True
+            if key in (_CONTROL_L, curses.KEY_RESIZE):
+                self._window.clearok(True)
+            self._top = max(0, self._top + steps.get(key, 0))
+        return False
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Show the node until SIGINT, SIGTERM, q or --seconds.
+
+    Returns 0, 1 when there is no such node, 2 for bad options.
+    """
+    words = list(sys.argv if args is None else ['monitor', *args])
+    prepare_output()
+    try:
+        return _run(_parse(remove_ros_args(words)[1:]), words)
+    except (FormatError, RuntimeError, ValueError) as error:  # also rclpy's, for --ros-args
+        _say(' '.join(str(error).split()))
+        return EXIT_USAGE
+    except BrokenPipeError:  # whoever reads us has seen enough
+        drop_output()
+        return 0
+    except OSError as error:  # such as a full disk
+        drop_output()
+        _say(f'cannot print: {error.strerror or error}')
+        return EXIT_USAGE
+
+
+def _run(options: argparse.Namespace, words: list[str]) -> int:
+    has_ended = _Ending()
+    with Watch(full_name(options.node), words) as watch:
+        if _find(watch, options.wait, has_ended):
+            has_ended.limit(options.seconds)
+            _show(watch, options, has_ended)
+        elif not has_ended():
+            _say(_not_found(watch, options.wait))
+            return EXIT_NOT_FOUND
+    return 0
+
+
+def _parse(args: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='monitor', description=__doc__, epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--node', default='/abdf1',
+                        help='name of the bridge with its namespace (default: %(default)s)')
+    parser.add_argument('--once', action='store_true', help='print one picture and end')
+    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
+                        help='end so many seconds after the node has been found')
+    parser.add_argument('--period', type=seconds_option, default=1.0,
+                        help='seconds from one printed picture to the next (default: '
+                             '%(default)g)')
+    parser.add_argument('--wait', type=seconds_option, default=10.0,
+                        help='seconds to look for the node at the start (default: %(default)g)')
+    return parser.parse_args(args)
+
+
+def _find(watch: Watch, seconds: float, has_ended: _Ending) -> bool:
+    """Listen until the node is there."""
+    end = time.monotonic() + seconds
+    said = time.monotonic()
+    while not watch.is_there and not has_ended() and time.monotonic() < end:
+        watch.spin(0.1)
+        if time.monotonic() - said >= _PROGRESS_PERIOD:
+            said = time.monotonic()
+            _say(f'looking for {watch.name}, {max(0.0, end - said):.0f} s more')
+    return watch.is_there
+
+
+def _not_found(watch: Watch, seconds: float) -> str:
+    bridges = watch.bridges()
+    if watch.name in bridges:
+        return (f'{watch.name} is seen, but nothing is heard of it within {seconds:g} s: programs '
+                'of one machine have to run as the same user')
+    domain = os.environ.get('ROS_DOMAIN_ID', '0')
+    hint = f'--node may be one of {", ".join(bridges)}' if bridges else (
+        f'no bridge is heard with ROS_DOMAIN_ID {domain}; that and '
+        'ROS_AUTOMATIC_DISCOVERY_RANGE have to be those of the bridge')
+    return f'there is no node {watch.name} within {seconds:g} s: {hint}'
+
+
+def _show(watch: Watch, options: argparse.Namespace, has_ended: _Ending) -> None:
+    if options.once:
+        _complete(watch, has_ended)
+        _print(watch)
+    elif sys.stdout.isatty() and _can_draw():
+        locale.setlocale(locale.LC_ALL, '')  # or curses shows letters of other languages wrong
+        curses.wrapper(_draw, watch, has_ended)
+    else:
+        _complete(watch, has_ended)
+        while not has_ended():
+            _print(watch)
+            _spin(watch, options.period, has_ended)
+
+
+def _can_draw() -> bool:
+    try:
+        curses.setupterm()
+    except curses.error:  # TERM names no terminal that is known here
+        return False
+    return True
+
+
+def _draw(window: curses.window, watch: Watch, has_ended: _Ending) -> None:
+    screen = _Screen(window)
+    while not has_ended() and not screen.wants_end():
+        screen.show(render(watch.snapshot(), time.monotonic(), screen.width))
+        watch.spin(_RENEWAL)
+
+
+def _complete(watch: Watch, has_ended: _Ending) -> None:
+    """Give the values that have been promised some time to come."""
+    _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
+
+
+def _spin(watch: Watch, seconds: float, is_enough: Callable[[], bool]) -> None:
+    end = time.monotonic() + seconds
+    while not is_enough() and (left := end - time.monotonic()) > 0:
+        watch.spin(min(left, 0.1))
+
+
+def _print(watch: Watch) -> None:
+    is_terminal = sys.stdout.isatty()
+    colours = is_terminal and 'NO_COLOR' not in os.environ
+    width = shutil.get_terminal_size((100, 24)).columns if is_terminal else 200
+    for line in render(watch.snapshot(), time.monotonic(), width):
+        number = _COLOURS.get(line.style)
+        print(f'\x1b[3{number}m{line.text}\x1b[0m' if colours and number else line.text)
+    print(flush=True)
+
+
+def _say(text: str) -> None:
+    print(f'monitor: {printable(text)}', file=sys.stderr, flush=True)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,224 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the monitor hears: a ROS node that subscribes to all that a bridge publishes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+import time
+from typing import Any
+
+from abdf1_ros.cli.monitor.view import Reading, Result, Snapshot, Status, Style
+from abdf1_ros.errors import FormatError
+from abdf1_ros.node_messages import latched_qos, MESSAGES
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import rclpy
+from rclpy.duration import Infinite
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from std_msgs.msg import String, UInt16MultiArray
+
+# How often (s) the topics of the node are looked for; they do not change while it lives.
+_DISCOVERY_PERIOD = 0.5
+
+_RESULTS_KEPT = 8
+
+_TYPES = {f'std_msgs/msg/{message.__name__}': message for message in MESSAGES.values()}
+
+_STYLES = {DiagnosticStatus.OK: Style.GOOD, DiagnosticStatus.WARN: Style.WARNING}
+
+# The default callbacks make every subscription a burden on every turn of the executor.
+_QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
+
+
+def full_name(text: str) -> str:
+    """Return the fully qualified name of a node; FormatError when it cannot be one."""
+    name = f'/{text.strip("/")}'
+    try:
+        validate_full_topic_name(name)
+    except InvalidTopicNameException as error:
+        reason = str(error).splitlines()[0].removeprefix('Invalid topic name: ').rstrip(':')
+        raise FormatError(f'node name "{text}": {reason}; it should be like /abdf1 '
+                          'or /cell/abdf1') from None
+    return name
+
+
+@dataclass(slots=True)
+class _Subscription:
+    type_name: str
+    handle: Any
+    reading: Reading
+
+
+class Watch:
+    """
+    Listen to the node with the full name ``name`` until it is closed.
+
+    Nothing is asked of the publishers beyond what every bridge offers, nothing is published
+    and no service is called: the bridge does not notice. Ages of topics that promise nothing
+    count from the publisher's time stamp, so for them the clocks of the hosts have to agree.
+    """
+
+    def __init__(self, name: str, ros_arguments: list[str]) -> None:
+        # Signals are for whoever shows the picture; rclpy's handlers would end us in between.
+        rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
+        self.name = name
+        self._node = Node('abdf1_monitor', start_parameter_services=False, enable_rosout=False)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._subscriptions: dict[str, _Subscription] = {}
+        self._statuses: list[Status] = []
+        self._told: float | None = None
+        self._active: list[int] | None = None
+        self._results: deque[Result] = deque(maxlen=_RESULTS_KEPT)
+        self._next_discovery = 0.0
+        self.is_there = False
+        for message_type, topic, callback, qos in (
+                (DiagnosticArray, '/diagnostics', self._take_diagnostics, 100),
+                (DiagnosticStatus, f'{name}/write_results', self._take_result, 100),
+                (UInt16MultiArray, f'{name}/active_stations', self._take_active,
+                 latched_qos())):
+            self._node.create_subscription(
+                message_type, topic, callback, qos, event_callbacks=_QUIET)
+
+    def __enter__(self) -> Watch:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    @property
+    def is_complete(self) -> bool:
+        """Tell whether diagnostics, all topics and every value that is promised are here."""
+        totals = [status.values.get('total', '') for status in self._statuses
+                  if status.section == 'mappings']
+        if not totals or not totals[0].isdecimal():
+            return False
+        return len(self._subscriptions) >= int(totals[0]) and all(
+            subscription.reading.values is not None or subscription.reading.promised is None
+            for subscription in self._subscriptions.values())
+
+    def spin(self, seconds: float) -> None:
+        """Listen for so many seconds."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            if time.monotonic() >= self._next_discovery:
+                self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
+                self._discover()
+            self._executor.spin_once(timeout_sec=min(left, _DISCOVERY_PERIOD))
+
+    def bridges(self) -> list[str]:
+        """Return the full names of the bridges that can be seen."""
+        ending = '/active_stations'
+        return sorted(topic.removesuffix(ending)
+                      for topic, types in self._node.get_topic_names_and_types()
+                      if topic.endswith(ending) and self._node.count_publishers(topic))
+
+    def snapshot(self) -> Snapshot:
+        """Return what is known now."""
+        readings = [self._subscriptions[topic].reading for topic in sorted(self._subscriptions)]
+        return Snapshot(
+            self.name, self.is_there, self._told, tuple(self._statuses), readings,
+            self._active, tuple(self._results), self._remarks())
+
+    def _remarks(self) -> list[str]:
+        base = self.name.rpartition('/')[2]
+        others = [name for name in self._node.get_node_names_and_namespaces()
+                  if name[0] == base and _joined(*name) != self.name]
+        return [f'{_joined(*name)} has the same name on /diagnostics: link, stations, mappings '
+                'and counters below may be those of either' for name in others]
+
+    def _discover(self) -> None:
+        """Subscribe to the read topics that the node publishes now."""
+        namespace, _, base = self.name.rpartition('/')
+        try:
+            topics = self._node.get_publisher_names_and_types_by_node(base, namespace or '/')
+        except NodeNameNonExistentError:
+            self.is_there = False
+            return
+        self.is_there = True
+        reads = {topic: types[0] for topic, types in topics
+                 if topic != f'{self.name}/active_stations' and types[0] in _TYPES}
+        for topic, known in list(self._subscriptions.items()):
+            if reads.get(topic) != known.type_name:  # the node came back with another map
+                self._node.destroy_subscription(known.handle)
+                del self._subscriptions[topic]
+        for topic, type_name in reads.items():
+            self._listen(topic, type_name)
+
+    def _listen(self, topic: str, type_name: str) -> None:
+        known = self._subscriptions.get(topic)
+        if known is None:
+            handle = self._node.create_subscription(
+                _TYPES[type_name], topic, self._taker(topic), latched_qos(),
+                event_callbacks=_QUIET)
+            known = _Subscription(
+                type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/')))
+            self._subscriptions[topic] = known
+        known.reading = replace(known.reading, promised=self._promised(topic))
+
+    def _promised(self, topic: str) -> float | None:
+        deadlines = [endpoint.qos_profile.deadline
+                     for endpoint in self._node.get_publishers_info_by_topic(topic)
+                     if _joined(endpoint.node_name, endpoint.node_namespace) == self.name]
+        if not deadlines or deadlines[0] == Infinite:
+            return None
+        return float(deadlines[0].nanoseconds) / 1e9
+
+    def _taker(self, topic: str) -> Any:  # rclpy's types know callbacks of one argument only
+        def take(message: Any, info: Any) -> None:
+            subscription = self._subscriptions[topic]
+            reading, received = subscription.reading, time.monotonic()
+            if reading.promised is None and info['source_timestamp']:
+                received -= max(0.0, (time.time_ns() - info['source_timestamp']) / 1e9)
+            address = ''
+            if not isinstance(message, String) and message.layout.dim:
+                address = message.layout.dim[0].label
+            subscription.reading = replace(
+                reading, values=message.data, address=address, received=received)
+        return take
+
+    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        prefix = f'{self.name.rpartition("/")[2]}: '
+        statuses = [
+            Status(status.name.removeprefix(prefix), _style(status.level), status.message,
+                   {pair.key: pair.value for pair in status.values})
+            for status in message.status if status.name.startswith(prefix)]
+        if statuses:
+            self._statuses, self._told = statuses, time.monotonic()
+
+    def _take_result(self, status: DiagnosticStatus) -> None:
+        self._results.appendleft(Result(
+            status.name, _style(status.level), status.message,
+            {pair.key: pair.value for pair in status.values}, time.monotonic()))
+
+    def _take_active(self, message: UInt16MultiArray) -> None:
+        self._active = [16 * word + bit for word, bits in enumerate(message.data)
+                        for bit in range(16) if bits >> bit & 1]
+
+
+def _style(level: bytes) -> Style:
+    return _STYLES.get(level, Style.BAD)
+
+
+def _joined(name: str, namespace: str) -> str:
+    return f'{namespace.rstrip("/")}/{name}'

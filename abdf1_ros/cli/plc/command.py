@@ -1,0 +1,298 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Read, write and look for PLCs on a DF1 line from the command line.
+
+It is for commissioning: it has the port for itself, so stop the node first, and on a
+half-duplex line it is the master, so there must be no other. It needs no ROS.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import sys
+
+from abdf1_ros.cli.plc import data, detect, presence
+from abdf1_ros.cli.plc.line import MODES, network_of
+from abdf1_ros.cli.plc.options import make_parser
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.cli.terminal import (
+    colour,
+    drop_output,
+    GREEN,
+    interruptible,
+    prepare_output,
+    Progress,
+    RED,
+)
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.errors import Abdf1Error, ConfigurationError, PortLost
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
+from abdf1_ros.text import printable
+
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_UNKNOWN = 3
+EXIT_INTERRUPTED = 130
+
+_UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Carry out one command; the exit statuses are those of --help."""
+    prepare_output()
+    options = make_parser(__doc__).parse_args(args)
+    with interruptible():
+        return _run(options)
+
+
+def _run(options: argparse.Namespace) -> int:
+    try:
+        status = _COMMANDS[options.command](options)
+        sys.stdout.flush()
+        return status
+    except ConfigurationError as error:
+        for problem in error.problems:
+            _complain(str(problem))
+        return EXIT_USAGE
+    except BrokenPipeError:
+        drop_output()
+        return EXIT_USAGE if options.command == 'write' else 0  # nothing has been written then
+    except OSError as error:  # the port's has no number, that of a full disk has
+        if error.errno is not None:
+            drop_output()
+        _complain(f'cannot print: {error.strerror}' if error.strerror else str(error))
+        return EXIT_USAGE
+    except PortLost as error:
+        _complain(str(error))
+        return EXIT_FAILED
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+
+
+def _mappings(options: argparse.Namespace, session: Session, command: Command,
+              addresses: Sequence[str], length: int | str) -> list[Mapping]:
+    """Return the mappings of addresses, after asking the PLC what it is where need be."""
+    kind = {'PLC_Type': options.plc_type} if options.plc_type \
+        else data.ask_kind(session, options.station)
+    given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
+             'Type': options.type, 'Word_Order': options.word_order, 'Access': options.access,
+             'Processor': options.processor}
+    cells = kind | {column: text for column, text in given.items() if text}
+    return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
+
+
+def _failed(session: Session, station: int, error: Abdf1Error) -> int:
+    """Say why a station has not done what it should; return the exit status."""
+    if isinstance(error, ConfigurationError | PortLost):
+        raise error
+    _complain(f'station {station}: {error}')
+    advice = presence.hint(session, error)
+    if advice:
+        _complain(advice)
+    return EXIT_FAILED
+
+
+def _read(options: argparse.Namespace) -> int:
+    status = 0
+    with Session(network_of(options)) as session:
+        try:
+            mappings = _mappings(
+                options, session, Command.READ, options.addresses, options.length)
+        except Abdf1Error as error:
+            return _failed(session, options.station, error)
+        for mapping in mappings:
+            try:
+                values = data.read(session, mapping)
+            except Abdf1Error as error:
+                status = _failed(session, mapping.station, error)
+            else:
+                _print_values(mapping, values)
+    return status
+
+
+def _print_values(mapping: Mapping, values: Values) -> None:
+    rows = list(data.rows(mapping, values))
+    width = max(len(address) for address, _ in rows)
+    for address, text in rows:
+        print(f'{address:{width}}  {printable(text)}')
+
+
+def _write(options: argparse.Namespace) -> int:
+    with Session(network_of(options)) as session:
+        try:
+            length = data.length_of(options.address, options.type, options.values)
+            mapping, = _mappings(
+                options, session, Command.READ_WRITE, [options.address], length)
+        except Abdf1Error as error:
+            return _failed(session, options.station, error)
+        try:
+            writing = data.Writing(mapping, options.values)
+        except Abdf1Error as error:
+            _complain(f'{options.address}: {error}')
+            return EXIT_USAGE
+        if not options.yes and not _is_confirmed(session, writing):
+            _complain('nothing was written; --yes writes')
+            return EXIT_USAGE
+        return _carry_out(session, writing)
+
+
+def _is_confirmed(session: Session, writing: data.Writing) -> bool:
+    """Show what would happen; ask, where there is somebody to answer."""
+    mapping = writing.mapping
+    try:
+        print('now:')
+        _print_values(mapping, data.read(session, mapping))
+    except Abdf1Error as error:
+        _failed(session, mapping.station, error)
+    question = f'write {writing.value} to {mapping.address} of station {mapping.station}'
+    if not sys.stdin.isatty():
+        print(f'would {printable(question)}')
+        return False
+    try:
+        return input(f'{printable(question)}? [y/N] ').strip().lower() in ('y', 'yes')
+    except EOFError:
+        return False
+
+
+def _carry_out(session: Session, writing: data.Writing) -> int:
+    """Write, show what the PLC holds after it, and return the exit status."""
+    mapping = writing.mapping
+    ending = writing.carry_out(session)
+    text = ending.outcome.value + (f': {ending.detail}' if ending.detail else '')
+    if ending.outcome is not Outcome.WRITTEN:
+        _complain(f'{mapping.address} of station {mapping.station}: {text}')
+        return EXIT_UNKNOWN if ending.outcome in _UNCERTAIN else EXIT_FAILED
+    try:
+        print(f'{colour(text, GREEN, sys.stdout)}; now:', flush=True)
+        _print_values(mapping, data.read(session, mapping))
+        sys.stdout.flush()
+    except KeyboardInterrupt:  # it is written all the same
+        pass
+    except Abdf1Error as error:
+        _complain(f'cannot be read back: {error}')
+    except OSError as error:
+        drop_output()
+        _complain(f'{text}, but that cannot be printed: {error.strerror}')
+    return 0
+
+
+def _watch(options: argparse.Namespace) -> int:
+    network = network_of(options)
+    with Session(network) as session:
+        try:
+            mappings = _mappings(
+                options, session, Command.READ, options.addresses, options.length)
+        except Abdf1Error as error:
+            return _failed(session, options.station, error)
+    failed = Watch(network, mappings, options.period).run(options.count)
+    return EXIT_FAILED if failed else 0
+
+
+def _status(options: argparse.Namespace) -> int:
+    with Session(network_of(options)) as session:
+        there = presence.look_at(session, options.station)
+        if there.identity is None:
+            assert there.error is not None
+            return _failed(session, options.station, there.error)
+    print('\n'.join(presence.describe(there)))
+    return 0
+
+
+def _ping(options: argparse.Namespace) -> int:
+    times: list[float] = []
+    failures = 0
+    with Session(network_of(options)) as session:
+        try:
+            for _ in range(options.count):
+                try:
+                    times.append(presence.ping(session, options.station))
+                except PortLost:
+                    raise
+                except Abdf1Error as error:
+                    failures += 1
+                    _failed(session, options.station, error)
+                else:
+                    print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
+        except KeyboardInterrupt:
+            pass  # the one that was under way does not count
+    text = f'{failures + len(times)} sent, {len(times)} answered'
+    if times:
+        text += (f'; shortest {min(times) * 1000:.1f}, mean '
+                 f'{sum(times) / len(times) * 1000:.1f}, longest {max(times) * 1000:.1f} ms')
+    print(text)
+    return 0 if times and not failures else EXIT_FAILED
+
+
+def _scan(options: argparse.Namespace) -> int:
+    progress = Progress()
+    found = 0
+    for number, there in enumerate(presence.scan(network_of(options), options.stations), 1):
+        if there.is_there:
+            found += 1
+            progress.clear()
+            print(f'{there.station:3}  {there.seconds * 1000:4.0f} ms  {there}', flush=True)
+        progress.show(f'{number} of {len(options.stations)} stations asked, {found} found')
+    progress.clear()
+    print(f'{found} of {len(options.stations)} stations answer')
+    return 0 if found else EXIT_FAILED
+
+
+def _detect(options: argparse.Namespace) -> int:
+    network = network_of(options)
+    progress = Progress()
+    bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
+        else detect.BAUD_RATES
+    modes = [MODES[options.duplex]] if options.duplex else list(reversed(MODES.values()))
+    checks = [network.error_code] if options.check else detect.CHECKS
+    search = detect.Search(network, options.stations, progress.show)
+    found = search.run(bauds, modes, checks)
+    progress.clear()
+    if found is None:
+        _complain('nothing answers with any of these settings')
+        for trace in search.traces or [presence.SILENCE]:
+            _complain(trace)
+        return EXIT_FAILED
+    there = found.presence
+    print(f'{colour(str(found.candidate), GREEN, sys.stdout)}: station {there.station} {there}')
+    print(f'net.csv:\n{_net_csv(network, found)}')
+    return 0
+
+
+def _net_csv(network: Network, found: detect.Found) -> str:
+    """Return a net CSV with the settings that have been found."""
+    candidate = found.candidate
+    row = (network.station, candidate.mode, candidate.check, network.port, candidate.baud,
+           network.parity, 300)
+    return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
+            + ','.join(map(str, row)))
+
+
+_COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
+    'scan': _scan, 'detect': _detect}
+
+
+def _complain(text: str) -> None:
+    line = f'plc: {printable(text)}'
+    print(colour(line, RED, sys.stderr), file=sys.stderr, flush=True)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

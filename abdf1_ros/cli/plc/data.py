@@ -1,0 +1,197 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Reading and writing addresses that are given on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as MappingType
+from concurrent.futures import Future
+from dataclasses import replace
+import re
+
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.driver.transactions import carry_out, Ending, identify, read_values
+from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
+from abdf1_ros.numbers import decimal_number, two_readings, whole_number
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.plan.forecast import line_model
+from abdf1_ros.plan.planner import Planner
+from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.map_row import Fault, RowReader
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.values import Values, ValueType
+
+# The family in a diagnostic status, and its PLC_Type.
+_FAMILIES = {'SLC': 'SLC', 'PLC-5': 'PLC5', 'PLC-3': 'PLC3', 'PLC-2': 'PLC2'}
+
+# What stands on the command line for a column of a map CSV.
+_ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
+              'Word_Order': '--word-order', 'Access': '--access', 'Processor': '--processor'}
+
+_WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
+_VALUES_IN_ROW = 10
+_BITS_IN_ROW = 16
+
+
+def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Mapping:
+    """
+    Return the mapping of an address; ``cells`` are other columns of a map CSV.
+
+    Raises ConfigurationError with every fault, each by the argument that it is in.
+    """
+    row = Row('', item, item, {'Tag': f'address_{item}', 'Address': address, **cells}, {})
+    reader = RowReader(row)
+    mapping = reader.read()
+    if mapping is None:
+        raise ConfigurationError([_in_arguments(fault, row) for fault in reader.faults])
+    return mapping
+
+
+def _in_arguments(fault: Fault, row: Row) -> Problem:
+    """Return a fault of a row in the words of the command line."""
+    argument, text = _ARGUMENTS.get(fault.column, fault.column), fault.text
+    if fault.value is not None:
+        text = f'"{fault.value}" {text}'
+    if fault.is_superfluous:
+        text += f'; leave {argument} out'
+    if fault.column == 'Length':
+        if fault.message is not None:  # the numbered text alone says what is too long
+            text = f'{row.get("Length")} elements do not fit at {row.get("Address")}; {text}'
+        if row.get('Command') != Command.READ.value:  # there it is how many values are given
+            argument = 'VALUE'
+    elif fault.column == 'Address':
+        argument += f' "{row.get("Address")}"'
+    return Problem(argument, text)
+
+
+def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
+    """Return the Length of a write; in A and N files a string takes a word for two characters."""
+    if address.upper().startswith('ST'):
+        return 1
+    is_packed = kind == ValueType.STRING.value
+    return max(1, (len(texts[0]) + 1) // 2) if is_packed else len(texts)
+
+
+def ask_kind(session: Session, station: int) -> dict[str, str]:
+    """
+    Return the columns PLC_Type and Processor of a station, as it says itself.
+
+    Raises LinkError, RemoteError, or FormatError where that cannot be told.
+    """
+    identity = session.ask(station, identify())
+    if identity.family not in _FAMILIES:
+        raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
+    return {'PLC_Type': _FAMILIES[identity.family], 'Processor': processor_of(identity)}
+
+
+def processor_of(identity: Identity) -> str:
+    """Return the Processor cell of a map file for an identity; empty for the usual one."""
+    model = identity.model.replace('MicroLogix ', 'ML').removeprefix('SLC ').partition(' ')[0]
+    unusual = {processor.value for processor in Processor if processor is not USUAL}
+    return model if model in unusual else ''
+
+
+def read(session: Session, mapping: Mapping) -> Values:
+    """Return the values of a mapping; raises LinkError, RemoteError or FormatError."""
+    planner = Planner(line_model(session.network), 1.0)
+    block, = planner.plan([mapping])
+    return session.ask(mapping.station, read_values(mapping, block))
+
+
+class Writing:
+    """
+    One write to one mapping.
+
+    Raises FormatError, saying what is wrong, when ``texts`` are no values of the mapping.
+    """
+
+    def __init__(self, mapping: Mapping, texts: Sequence[str]) -> None:
+        self.mapping = mapping
+        self._write = Write(mapping, parse_values(mapping, texts), 0.0)
+
+    @property
+    def value(self) -> str:
+        """Return what is to be written, for people."""
+        return self._write.value
+
+    def carry_out(self, session: Session) -> Ending:
+        """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
+        future: Future[Ending] = Future()
+        try:
+            # Inside, as an interrupt may come while the command is on the line already.
+            session.start(self.mapping.station, carry_out(self._write), future)
+            return session.wait(future)
+        except (KeyboardInterrupt, PortLost) as error:
+            session.close()
+            failure = future.exception() if future.done() else error
+            if failure is None:
+                return future.result()
+            is_sent = getattr(failure, 'sent', True)
+            return Ending(Outcome.UNKNOWN if is_sent else Outcome.NOT_SENT, str(failure), 0)
+
+
+def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
+    """Return what texts stand for, whole numbers also as 0x and 0b; FormatError for others."""
+    if mapping.type is ValueType.STRING:
+        if len(texts) != 1:
+            raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
+        return texts[0]
+    return [_number(mapping, text) for text in texts]
+
+
+def _number(mapping: Mapping, text: str) -> float:
+    kind = mapping.type
+    low, high = kind.range
+    value: float | None
+    if kind is not ValueType.FLOAT32:
+        value = int(text, 0) if _WITH_BASE.fullmatch(text) else whole_number(text)
+        right = f'a whole number from {low:.0f} to {high:.0f}'
+    elif right := two_readings(text):
+        raise FormatError(f'"{text}" could be two numbers; write {right}')
+    else:
+        value = decimal_number(text.replace(',', '.'))
+        right = 'a number such as -1.5 or 2e3'
+    if value is None or not low <= value <= high:
+        raise FormatError(f'"{text}" is no {kind.value}, {right}')
+    return value
+
+
+def rows(mapping: Mapping, values: Values) -> Iterator[tuple[str, str]]:
+    """Yield values in rows, each with the address of its first."""
+    if isinstance(values, str):
+        yield str(mapping.address), repr(values)
+        return
+    step = _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
+    width = max(len(_show(value)) for value in values)
+    for first in range(0, len(values), step):
+        shown = (_show(value).rjust(width) for value in values[first:first + step])
+        yield str(element(mapping, first)), '  '.join(shown)
+
+
+def _show(value: float) -> str:
+    return str(value) if isinstance(value, int) else f'{value:.7g}'
+
+
+def element(mapping: Mapping, number: int) -> Address:
+    """Return the address of an element of a mapping, counted from 0."""
+    address = mapping.address
+    if address.bit is None:
+        return address.at_offset(address.offset + number * mapping.codec.element_words)
+    words, bit = divmod(address.bit + number, 16)
+    return replace(address.at_offset(address.offset + words), bit=bit)

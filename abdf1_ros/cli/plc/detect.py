@@ -1,0 +1,108 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Find out the settings of a line by trying them until something answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from abdf1_ros.cli.plc.line import MODES
+from abdf1_ros.cli.plc.presence import look_at, Presence
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.settings.network import Network
+
+# The usual ones first.
+BAUD_RATES = (19200, 9600, 38400, 57600, 115200, 4800, 2400, 1200)
+CHECKS = tuple(check.value for check in (Checksum.CRC, Checksum.BCC))
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Settings that may be those of the line."""
+
+    baud: int
+    mode: str
+    check: str
+
+    def __str__(self) -> str:
+        """Return the settings in words."""
+        return f'{self.baud} baud, {_WORDS[self.mode]}, {self.check}'
+
+
+_WORDS = {'Peer': 'full duplex', 'Master': 'half duplex'}
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Settings with which a station takes commands."""
+
+    candidate: Candidate
+    presence: Presence
+
+
+class Search:
+    """
+    Try settings on the port of ``network``, in half duplex with each of ``stations``.
+
+    ``show`` is told what is being tried. What was heard without being understood is in
+    ``traces``.
+    """
+
+    def __init__(self, network: Network, stations: Sequence[int],
+                 show: Callable[[str], None] = lambda text: None) -> None:
+        self.traces: list[str] = []
+        self._network = replace(network, nak_retries=0, enq_retries=1, cmd_timeout=500)
+        self._stations = stations
+        self._show = show
+
+    def run(self, bauds: Sequence[int], modes: Sequence[str] = tuple(_WORDS),
+            checks: Sequence[str] = CHECKS) -> Found | None:
+        """Return the first settings that work, None when none do; raises OSError, PortLost."""
+        for baud in bauds:
+            for mode in modes:
+                found = self._try(baud, mode, checks)
+                if found is not None:
+                    return found
+        return None
+
+    def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
+        """Try one speed and discipline; where nobody is heard, the check does not matter."""
+        stations = self._stations
+        for check in checks:
+            heard = []
+            for presence in self._look(Candidate(baud, mode, check), stations):
+                if presence.takes_commands:
+                    return Found(Candidate(baud, mode, check), presence)
+                if presence.is_there:
+                    heard.append(presence.station)
+            if mode == 'Master' and not heard:
+                return None  # polls have no check of their own that could be wrong
+            stations = heard or stations
+        return None
+
+    def _look(self, candidate: Candidate, stations: Sequence[int]) -> Iterator[Presence]:
+        network = replace(self._network, baud=candidate.baud, mode=candidate.mode,
+                          error_code=candidate.check)
+        # In full duplex there is one PLC, and most take whatever they get.
+        listed = stations[:1] if candidate.mode == MODES['full'] else stations
+        with Session(network, absent=listed) as session:
+            for station in listed:
+                self._show(f'trying {candidate}, station {station}')
+                yield look_at(session, station)
+            if session.counters.chars_received:
+                self.traces.append(
+                    f'{candidate}: {session.counters.chars_received} characters came')

@@ -1,0 +1,207 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The options of ``plc``: what it is asked to do, and on which line."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+
+from abdf1_ros.cli.plc.line import DEFAULTS, MODES
+from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.network import BAUD_RATES
+from abdf1_ros.settings.station_lists import parse_stations
+from abdf1_ros.settings.values import ValueType, WordOrder
+
+_DEFAULT_STATION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class _LineDefaults:
+    """What a command does about its line where no option says it, in words."""
+
+    baud: str = str(DEFAULTS.baud)
+    check: str = DEFAULTS.error_code
+    duplex: str = 'half'
+    timeout: str = str(DEFAULTS.timeout)
+    net: str = 'the line'
+
+
+_TRIED = 'all are tried'
+_DETECT_DEFAULTS = _LineDefaults(
+    baud=f'{_TRIED}, but none at a URL', check=_TRIED, duplex=_TRIED,
+    timeout='200',  # most of what is tried does not answer
+    net='port, parity and own station')
+
+
+_STATUSES = """\
+exit status:
+  0    done: read, written and confirmed, answered, found
+  1    no answer, or the PLC refused it; the port was lost
+  2    wrong options, addresses or values; a port that cannot be opened; a write not confirmed
+       with --yes. Nothing was written
+  3    a write without a reply, or broken off: unknown whether the PLC has it, or has all of it
+  130  interrupted by Ctrl-C; but watch and ping, once they have begun, end by it with 0 or 1
+"""
+_EPILOG = _STATUSES + """
+examples:
+  plc detect --port /dev/ttyUSB0              which settings does this line have?
+  plc scan 0-31 --net net.csv                 who is there?
+  plc status 1 --port /dev/ttyUSB0 --baud 19200
+  plc read N7:0 --length 10 --peer --port /dev/ttyUSB0
+  plc write N7:10 5 6 7 --yes --net net.csv
+  plc write F8:2 --yes --net net.csv -- -1.5e3
+  plc watch B3:0 N7:0 T4:0.ACC --net net.csv
+
+"plc COMMAND --help" explains each command.
+"""
+
+
+def make_parser(description: str | None) -> argparse.ArgumentParser:
+    """Return the parser; the name of the command is in ``command``."""
+    parser = argparse.ArgumentParser(
+        prog='plc', description=description, epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
+
+    def add(name: str, text: str, *examples: str,
+            defaults: _LineDefaults = _LineDefaults()) -> argparse.ArgumentParser:
+        shown = '\n'.join(f'  plc {example}' for example in examples)
+        command = commands.add_parser(
+            name, help=text, description=f'{text[0].upper()}{text[1:]}.',
+            epilog=f'example:\n{shown}\n\n{_STATUSES}',
+            formatter_class=argparse.RawDescriptionHelpFormatter)
+        _add_line_options(command, defaults)
+        return command
+
+    _add_addresses(add('read', 'read addresses once', 'read N7:0 --length 10 --net net.csv'))
+    _complete_write(add('write', 'write values to an address',
+                        'write N7:10 5 6 7 --yes --net net.csv',
+                        'write F8:2 --yes --net net.csv -- -1.5e3'))
+    _complete_watch(add('watch', 'show values live until Ctrl-C',
+                        'watch B3:0 N7:0 --period 0.5 --net net.csv'))
+    status = add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv')
+    status.add_argument('station', metavar='STATION', nargs='?', type=_station,
+                        default=_DEFAULT_STATION, help='default: %(default)s')
+    ping = add('ping', 'measure how long a PLC takes to send something back',
+               'ping 1 --count 10 --net net.csv')
+    ping.add_argument('station', metavar='STATION', type=_station)
+    ping.add_argument('--count', type=_count, default=4, metavar='N',
+                      help='how often (default: %(default)s)')
+    scan = add('scan', 'look for stations', 'scan 0-31 --net net.csv')
+    scan.add_argument('stations', metavar='STATIONS', type=_stations, help='such as 0-31 or 1,5')
+    search = add('detect', 'find out the settings of a line by trying them',
+                 'detect --port /dev/ttyUSB0 --stations 1-4', defaults=_DETECT_DEFAULTS)
+    search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
+                        help='who may be there in half duplex (default: 0-7)')
+    search.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
+    return parser
+
+
+def _complete_write(write: argparse.ArgumentParser) -> None:
+    _add_data_options(write)
+    write.add_argument('address', metavar='ADDRESS', help='such as N7:10, B3:0/5, F8:2')
+    write.add_argument('values', metavar='VALUE', nargs='+',
+                       help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string; '
+                            'one such as -1.5e3 goes last, behind all options and --')
+    write.add_argument('--yes', action='store_true',
+                       help='do it; without it, what is there now is shown, and a terminal '
+                            'is asked')
+
+
+def _complete_watch(watch: argparse.ArgumentParser) -> None:
+    _add_addresses(watch)
+    watch.add_argument('--period', type=_seconds, default=0.5, metavar='S',
+                       help='s between reads (default: %(default)s)')
+    watch.add_argument('--count', type=_count, metavar='N', help='end after so many reads')
+
+
+def _add_line_options(parser: argparse.ArgumentParser, defaults: _LineDefaults) -> None:
+    """Add what says how to reach the line."""
+    group = parser.add_argument_group('line')
+    group.add_argument('--port', metavar='NAME',
+                       help='serial port, or URL such as socket://192.168.0.9:4001')
+    group.add_argument('--net', metavar='FILE',
+                       help=f'take {defaults.net} from this net CSV; other options go before it')
+    group.add_argument('--baud', help=f'one of {", ".join(map(str, BAUD_RATES))} '
+                                      f'(default: {defaults.baud})')
+    group.add_argument('--check', type=str.upper, help=f'CRC or BCC (default: {defaults.check})')
+    group.add_argument('--parity', help='None, Even or Odd (default: None)')
+    either = group.add_mutually_exclusive_group()
+    either.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
+                        help='half: several stations on a line; full: one PLC '
+                             f'(default: {defaults.duplex})')
+    either.add_argument('--peer', action='store_const', const='full', dest='duplex',
+                        help='the same as --duplex full')
+    group.add_argument('--own-station', metavar='N',
+                       help=f'our own address, which no PLC has (default: {DEFAULTS.station})')
+    group.add_argument('--timeout', metavar='MS',
+                       help=f'to wait for each answer (default: {defaults.timeout})')
+
+
+def _add_data_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group('data')
+    group.add_argument('--station', metavar='N', type=_station, default=_DEFAULT_STATION,
+                       help='address of the PLC (default: %(default)s)')
+    group.add_argument('--plc-type', type=str.upper,
+                       choices=[kind.value for kind in PlcType],
+                       help='default: the PLC is asked what it is')
+    group.add_argument('--type', choices=[kind.value for kind in ValueType],
+                       help='default: what is natural for the file')
+    group.add_argument('--word-order', choices=[order.value for order in WordOrder],
+                       help='which word of 32 bits comes first')
+    group.add_argument('--processor', choices=[entry.value for entry in Processor],
+                       help='of an SLC or MicroLogix (default: the one it says it is)')
+    group.add_argument('--access', choices=[access.value for access in Access],
+                       help='how the words are reached, where a family has several ways')
+
+
+def _add_addresses(parser: argparse.ArgumentParser) -> None:
+    _add_data_options(parser)
+    parser.add_argument('addresses', metavar='ADDRESS', nargs='+',
+                        help='such as N7:0, B3:0/5, T4:0.ACC, ST9:1')
+    parser.add_argument('--length', metavar='N', default='1',
+                        help='elements of each address (default: %(default)s)')
+
+
+def _seconds(text: str) -> float:
+    value = decimal_number(text)
+    if value is None or not 0 <= value <= 86400:
+        raise argparse.ArgumentTypeError(f'"{text}" should be seconds from 0 to 86400')
+    return value
+
+
+def _count(text: str) -> int:
+    value = whole_number(text)
+    if value is None or value < 1:
+        raise argparse.ArgumentTypeError(f'"{text}" should be a whole number from 1')
+    return value
+
+
+def _stations(text: str) -> tuple[int, ...]:
+    stations, faults = parse_stations(text)
+    if faults or not stations:
+        raise argparse.ArgumentTypeError('; '.join(faults) or 'name a station')
+    return stations
+
+
+def _station(text: str) -> int:
+    stations = _stations(text)
+    if len(stations) != 1:
+        raise argparse.ArgumentTypeError(f'"{text}" should be one station')
+    return stations[0]

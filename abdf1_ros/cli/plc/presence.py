@@ -1,0 +1,108 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who is there: diagnostic status, echo, and a scan of many stations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import time
+
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.driver.transactions import echo, identify
+from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, StationInactive
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.settings.network import Network
+
+_ECHO = bytes(range(1, 17))
+
+SILENCE = 'not one character came: cable, port, power?'
+
+
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """
+    What a station has said of itself, and after how many seconds.
+
+    Without an ``identity`` ``error`` says why; ``is_there`` tells whether it has been heard at
+    all, ``takes_commands`` whether it understands our frames.
+    """
+
+    station: int
+    seconds: float
+    identity: Identity | None
+    error: Abdf1Error | None
+    is_there: bool
+    takes_commands: bool
+
+    def __str__(self) -> str:
+        """Return one line for people."""
+        return str(self.identity or f'answers, but not who it is: {self.error}')
+
+
+def look_at(session: Session, station: int) -> Presence:
+    """Ask a station who it is; raises PortLost."""
+    started = time.monotonic()
+    identity, error = None, None
+    try:
+        identity = session.ask(station, identify())
+    except PortLost:
+        raise
+    except Abdf1Error as caught:
+        error = caught
+    seconds = time.monotonic() - started
+    takes_commands = not isinstance(error, StationInactive)
+    is_there = takes_commands or session.stations[station].last_heard is not None
+    return Presence(station, seconds, identity, error, is_there, takes_commands)
+
+
+def scan(network: Network, stations: Sequence[int]) -> Iterator[Presence]:
+    """Yield every station, there or not; raises OSError and PortLost."""
+    with Session(network, absent=stations) as session:
+        for station in stations:
+            yield look_at(session, station)
+
+
+def ping(session: Session, station: int) -> float:
+    """Return the seconds that an echo takes; raises LinkError, RemoteError or FormatError."""
+    started = time.monotonic()
+    session.ask(station, echo(_ECHO))
+    return time.monotonic() - started
+
+
+def describe(presence: Presence) -> list[str]:
+    """Return all that a station has said, line by line."""
+    identity = presence.identity
+    if identity is None:
+        return [f'station {presence.station} {presence}']
+    lines = [('mode', identity.mode_text), ('faults', ', '.join(identity.faults) or 'none'),
+             ('remarks', ', '.join(identity.remarks)), ('name', identity.name),
+             ('program', '' if identity.program_id is None else f'0x{identity.program_id:04X}'),
+             ('memory', identity.memory), ('answered', f'after {presence.seconds * 1000:.0f} ms')]
+    return [f'station {presence.station}: {identity}',
+            *(f'  {name:9} {text}' for name, text in lines if text)]
+
+
+def hint(session: Session, error: Abdf1Error) -> str:
+    """Return what to look at after an error, where that can be told."""
+    if not isinstance(error, LinkError) or isinstance(error, PortLost):
+        return ''
+    received = session.counters.chars_received
+    if not received:
+        return f'{SILENCE} "plc detect" tries other settings'
+    if session.counters.messages_received + session.counters.acks_received == 0:
+        return (f'{received} characters came, but no answer that makes sense: baud rate, '
+                'check, duplex, or another master? "plc detect" tries other settings')
+    return ''

@@ -1,0 +1,111 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An open line on which one order is carried out after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
+import random
+from types import TracebackType
+from typing import TypeVar
+
+from abdf1_ros.cli.terminal import reason_of
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.errands import Errands, Order
+from abdf1_ros.errors import PortLost
+from abdf1_ros.ports.port import LinkThread, open_port, Port, PortState
+from abdf1_ros.settings.network import Network
+
+# So often (s) a wait looks whether there still is a port.
+_GLANCE = 0.2
+
+_Result = TypeVar('_Result')
+
+
+def opened(network: Network) -> Callable[[], Port]:
+    """
+    Open the port of ``network`` and return what hands it out; after that, it opens it again.
+
+    So a port that is not there is an OSError here, not a state of a thread.
+    """
+    try:
+        ports = [open_port(network)]
+    except OSError as error:
+        raise OSError(reason_of(network.port, error)) from None
+    return lambda: ports.pop() if ports else open_port(network)
+
+
+class Session:
+    """
+    A line from opening its port to the end of a ``with`` block.
+
+    ``absent`` stations get one try. Raises OSError when the port cannot be opened.
+    """
+
+    def __init__(self, network: Network, absent: Iterable[int] = ()) -> None:
+        self.network = network
+        self._lost: str | None = None
+        self._errands = Errands(network, absent, random.randrange(0x10000))
+        self._link = LinkThread(
+            self._errands.machine, opened(network), on_state=self._port_changed)
+        self._link.start()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    @property
+    def counters(self) -> Counters:
+        """Return the counters of the line."""
+        return self._errands.counters
+
+    @property
+    def stations(self) -> ActiveStationList:
+        """Return what is known of each station."""
+        return self._errands.stations
+
+    def ask(self, station: int, order: Order[_Result]) -> _Result:
+        """Carry out an order and return its result; raises what the order raises."""
+        return self.wait(self.start(station, order))
+
+    def start(self, station: int, order: Order[_Result],
+              future: Future[_Result] | None = None) -> Future[_Result]:
+        """Begin to carry out an order; ``future`` is where its result goes."""
+        future = future or Future()
+        self._errands.add(station, order, future.set_result, future.set_exception)
+        self._link.wake()
+        return future
+
+    def wait(self, future: Future[_Result]) -> _Result:
+        """Return the result of an order; raises what it raises, PortLost at the latest."""
+        while True:
+            try:
+                return future.result(_GLANCE)
+            except TimeoutError:
+                if self._lost is not None and not future.done():
+                    raise PortLost(self._lost) from None
+
+    def close(self) -> None:
+        """End what is under way and close the port; every order has ended after this."""
+        self._link.stop()
+
+    def _port_changed(self, state: PortState) -> None:
+        if not state.is_open:
+            self._lost = state.text

@@ -1,0 +1,151 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Show values live: a table that changes on a terminal, elsewhere a line for each change."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Sequence
+from datetime import datetime
+import random
+import shutil
+import sys
+import threading
+
+from abdf1_ros.cli.plc.session import opened
+from abdf1_ros.cli.terminal import is_terminal, table
+from abdf1_ros.df1.stations import Station
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.points import show, WriteResult
+from abdf1_ros.messages import Event
+from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
+from abdf1_ros.text import printable
+
+# So often (s) what is shown is made anew where nothing has come: ages and errors.
+_GLANCE = 0.25
+
+# Values that came faster than they could be shown; the older ones are dropped.
+_MAX_NEWS = 1000
+
+
+class Watch:
+    """
+    The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
+
+    It is the driver's ``Listener``. Raises OSError when the port cannot be opened.
+    """
+
+    def __init__(self, network: Network, mappings: Sequence[Mapping], period: float) -> None:
+        self._mappings = mappings
+        settings = DriverSettings(
+            default_period=period, read_only=True, first_tns=random.randrange(0x10000))
+        self._driver = Driver(network, mappings, settings, self)
+        self._link = LinkThread(self._driver.machine, opened(network))
+        self._news: deque[tuple[Mapping, str]] = deque(maxlen=_MAX_NEWS)
+        self._has_news = threading.Event()
+        self._reads: Counter[Mapping] = Counter()
+        self._shown: dict[Mapping, str] = {}
+        self._height = 0
+
+    def run(self, count: int | None) -> int:
+        """
+        Show values until each address has been read ``count`` times, or KeyboardInterrupt.
+
+        A failed read counts too. Returns how many addresses have no value at the end.
+        """
+        self._link.start()
+        try:
+            while not self._link.has_failed and not self._is_done(count):
+                self._has_news.wait(_GLANCE)
+                self._has_news.clear()
+                self._show()
+            self._show()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            # What the end of the line does to the points is not to be shown.
+            failed = sum(self._driver.points[mapping].error is not None
+                         for mapping in self._mappings)
+            self._link.stop()
+        return failed
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take the values of a read; called in the link thread."""
+        self._news.append((mapping, printable(show(values))))
+        self._reads[mapping] += 1
+        self._has_news.set()
+
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Do nothing: the reason is looked up with the point."""
+
+    def written(self, result: WriteResult) -> None:
+        """Do nothing: nothing is written."""
+
+    def happened(self, event: Event) -> None:
+        """Do nothing: what matters is in the reason of a failed read."""
+
+    def station_changed(self, station: Station) -> None:
+        """Show the news at once."""
+        self._has_news.set()
+
+    def _is_done(self, count: int | None) -> bool:
+        if count is None:
+            return False
+        points = self._driver.points
+        return all(self._reads[mapping] + points[mapping].failures >= count
+                   for mapping in self._mappings)
+
+    def _show(self) -> None:
+        changed = []
+        while self._news:
+            mapping, text = self._news.popleft()
+            changed.append((mapping, text))
+        for mapping in self._mappings:
+            error = self._driver.points[mapping].error
+            if error is not None:
+                changed.append((mapping, f'no value: {printable(error)}'))
+        if is_terminal(sys.stdout):
+            self._shown.update(changed)
+            self._redraw()
+        else:
+            self._print(changed)
+
+    def _print(self, changed: Sequence[tuple[Mapping, str]]) -> None:
+        """Print a line for everything that is not what was printed last."""
+        for mapping, text in changed:
+            if self._shown.get(mapping) != text:
+                self._shown[mapping] = text
+                time = datetime.now().isoformat(timespec='milliseconds').partition('T')[2]
+                print(f'{time}  {mapping.address}  {text}', flush=True)
+
+    def _redraw(self) -> None:
+        """Draw the table over the one before."""
+        now = self._driver.machine.now
+        rows = []
+        for mapping in self._mappings:
+            age = self._driver.points[mapping].age(now)
+            rows.append((str(mapping.address), str(mapping.station), mapping.type.value,
+                         '' if age is None else f'{max(age, 0.0):.1f}',
+                         self._shown.get(mapping, '')))
+        width, height = shutil.get_terminal_size()
+        lines = table(('address', 'station', 'type', 'age s', 'value'), rows, right=(1, 3))
+        shown = [line[:width - 1] for line in lines.split('\n')[:height - 1]]
+        up = f'\x1b[{self._height}A' if self._height else ''
+        print(up + '\n'.join(f'\x1b[K{line}' for line in shown), flush=True)
+        self._height = len(shown)

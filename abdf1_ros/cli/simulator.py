@@ -1,0 +1,340 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The simulator: PLCs on one line, to try the bridge without hardware.
+
+By default all PLCs of the data file share a half-duplex multidrop line; with --full-duplex one
+of them has a full-duplex line for itself, on which it can also send commands. The line is a
+pseudo-terminal, a serial port, or a TCP port. While it runs, lines on standard input switch
+faults on and off.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from contextlib import suppress
+import math
+from operator import itemgetter
+import os
+import select
+import signal
+import sys
+import threading
+import time
+import traceback
+
+from abdf1_ros.cli.terminal import (
+    drop_output,
+    interruptible,
+    prepare_output,
+    reason_of,
+    seconds_option,
+    whole_option,
+)
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameDecoder, NAK
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.paths import config_file
+from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
+from abdf1_ros.ports.port import LinkThread, Port, PortState
+from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
+from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
+from abdf1_ros.simulator_commands import CommandError, COMMANDS, execute
+
+EXIT_FAULT = 1
+EXIT_CONFIGURATION = 2
+
+_EPILOG = COMMANDS + """
+exit status: 0 when it is ended, 1 when the port cannot be opened or the name of --pty is taken,
+2 for bad options or data files
+
+examples:
+  simulator --pty /tmp/plc
+  simulator --tcp 127.0.0.1:4001 --check BCC
+  simulator --full-duplex 1 --pty /tmp/plc --at '3 msg 1 N7:50 11 22'
+  simulator --pty /tmp/plc --at '5 silent 2' --at '10 normal 2'
+"""
+
+
+class _FaultyPort:
+    """The port of the one PLC on a full-duplex line, as good as its faults allow."""
+
+    def __init__(self, port: Port, plc: SimulatedPlc, checksum: Checksum) -> None:
+        self._port = port
+        self._plc = plc
+        self._decoder = FrameDecoder(checksum, Duplex.FULL)
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes; a silent PLC hears none, a full one only that there are messages."""
+        data = self._port.read(timeout, wake)
+        if self._plc.faults.full:
+            self._refuse(data)
+        return b'' if self._plc.faults.silent or self._plc.faults.full else data
+
+    def _refuse(self, data: bytes) -> None:
+        """Answer NAK to every message and every enquiry."""
+        self._decoder.feed(data)
+        while (symbol := self._decoder.next_symbol()) is not None:
+            if isinstance(symbol, Frame) or symbol == Control(Code.ENQ):
+                self.write(NAK)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, damaged or not at all."""
+        if not self._plc.faults.silent:
+            self._port.write(self._plc.damaged(data))
+
+    def close(self) -> None:
+        """Close the port."""
+        self._port.close()
+
+
+Script = list[tuple[float, str]]
+"""Seconds and command."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Run until SIGINT, SIGTERM, "quit" or the end of --seconds.
+
+    The exit statuses are those of --help, and 1 after internal errors.
+    """
+    prepare_output()
+    options = _parse(args)
+    with interruptible():
+        try:
+            return _run(options)
+        except KeyboardInterrupt:  # so early that there was nothing to end yet
+            return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    try:
+        script = sorted(map(_scheduled, options.at), key=itemgetter(0))
+        if script:
+            _try_out(script, options)
+        plcs = _load(options)
+        line = _make_line(options)
+    except (CommandError, ConfigurationError, ValueError) as error:
+        print(f'simulator: {error}', file=sys.stderr)
+        return EXIT_CONFIGURATION
+    except OSError as error:  # of the line; what is wrong with a file is a ConfigurationError
+        print(f'simulator: {error}', file=sys.stderr)
+        return EXIT_FAULT
+    try:
+        return _play(plcs, line, script, options)
+    finally:
+        line.close()
+
+
+def _play(plcs: Sequence[SimulatedPlc], line: Line, script: Script,
+          options: argparse.Namespace) -> int:
+    """Let the PLCs answer on a line until it is time to end; return the exit status."""
+    link = _make_thread(plcs, line, options)
+    names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
+    _say(f'stations {names} on {line.name}, {options.check}')
+    try:
+        link.start()
+        _converse(plcs, script, link, options)
+    finally:  # the thread would keep the process alive
+        link.stop()
+    return EXIT_FAULT if link.has_failed else 0
+
+
+def _try_out(script: Script, options: argparse.Namespace) -> None:
+    """Raise CommandError for a command of --at that would fail later; nothing is sent yet."""
+    plcs = _load(options)
+    for _, line in script:
+        try:
+            if line.strip() != 'quit':
+                execute(line, plcs, options.full_duplex is not None)
+        except CommandError as error:
+            raise CommandError(f'--at: {error}') from None
+
+
+def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
+    """Return the PLCs of the data file, or the one that has a line for itself."""
+    plcs = load_plcs(options.data or str(config_file('simulator.csv')),
+                     Checksum(options.check), time.monotonic)
+    if options.full_duplex is None:
+        return plcs
+    for plc in plcs:
+        if options.full_duplex == str(plc.station):
+            return [plc]
+    known = ', '.join(str(plc.station) for plc in plcs)
+    raise ValueError(f'--full-duplex: name a station ({known})')
+
+
+def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
+                 options: argparse.Namespace) -> LinkThread:
+    """Return the thread that plays ``plcs`` on ``line``."""
+    checksum = Checksum(options.check)
+    machine = Machine(multidrop(plcs), checksum=checksum)
+    open_line = line.open
+    if options.full_duplex is not None:
+        # Only a port has a speed of its own, for which the timers have to wait.
+        timing = Network(baud=options.baud).timing if options.port else LineTiming()
+        machine = _full_duplex(plcs[0], checksum, timing)
+
+        def open_line() -> Port:
+            return _FaultyPort(line.open(), plcs[0], checksum)
+
+    return LinkThread(machine, open_line, on_state=_Announcer().announce,
+                      on_fault=_print_fault)
+
+
+class _Announcer:
+    """Say what has become of the line, each state once."""
+
+    def __init__(self) -> None:
+        self._last = ''
+
+    def announce(self, state: PortState) -> None:
+        """Say it, unless it is what was said last or what is normal."""
+        is_news = state.text != self._last and not state.is_open
+        self._last = state.text
+        if is_news and WAITING not in state.text:
+            _say(state.text)
+
+
+def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='simulator', description=__doc__, epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
+    line = parser.add_mutually_exclusive_group()
+    line.add_argument('--pty', metavar='NAME', type=_name,
+                      help='a pseudo-terminal of this name (default: one with the name that is '
+                           'printed)')
+    line.add_argument('--port', type=_name, help='a serial port or a URL of pyserial')
+    line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
+    parser.add_argument('--full-duplex', metavar='STATION',
+                        help='this PLC alone, on a full-duplex line')
+    parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
+                        help='of the serial port (default: %(default)s)')
+    parser.add_argument('--check', choices=[check.value for check in Checksum],
+                        default=Checksum.CRC.value, help='default: %(default)s')
+    parser.add_argument('--at', metavar='"SECONDS COMMAND"', action='append', default=[],
+                        help='a command to carry out after so many seconds; may be repeated')
+    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
+                        help='end after so many seconds')
+    return parser.parse_args(args)
+
+
+def _name(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError('the name is missing')
+    return text
+
+
+def _scheduled(text: str) -> tuple[float, str]:
+    seconds, _, command = text.partition(' ')
+    value = decimal_number(seconds)
+    if value is None or value < 0 or not command.strip():
+        raise ValueError(f'--at "{text}" should be seconds from 0 and a command, as in '
+                         '"5 silent 1"')
+    return value, command
+
+
+def _make_line(options: argparse.Namespace) -> Line:
+    """Return the line; OSError says which one cannot be had."""
+    try:
+        if options.tcp is not None:
+            return TcpLine(*_host_and_port(options.tcp))
+        if options.port is not None:
+            return SerialLine(options.port, _network(options))
+    except OSError as error:
+        raise OSError(reason_of(options.port or f'--tcp "{options.tcp}"', error)) from None
+    return PtyLine(options.pty)
+
+
+def _network(options: argparse.Namespace) -> Network:
+    """Return how the port is set; ConfigurationError for a URL that no port can have."""
+    network = Network(baud=options.baud)
+    return make_network({'com_port': (options.port, '--port')}, network) \
+        if '://' in options.port else network
+
+
+def _host_and_port(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(':')
+    number = whole_number(port)
+    with suppress(UnicodeError):
+        host = host.encode('idna').decode()
+        if number is not None and 0 <= number <= 65535:
+            return host or '127.0.0.1', number
+    raise ValueError(f'--tcp "{text}" should be HOST:PORT')
+
+
+def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> Machine:
+    """Return a machine that is ``plc`` at the other end of a full-duplex line."""
+    def run(machine: Machine) -> Procedure:
+        peer = FullDuplexPeer(
+            machine, PeerSettings(checksum), ActiveStationList(), plc.serve)
+        return peer.run(plc)
+
+    plc.be_full_duplex()
+    return Machine(run, checksum=checksum, duplex=Duplex.FULL, timing=timing,
+                   counters=plc.counters)
+
+
+def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
+              options: argparse.Namespace) -> None:
+    """Carry out commands as they come, until it is time to end."""
+    def carry_out(line: str) -> None:
+        if line.strip() == 'quit':
+            ended.set()
+        elif line.strip():
+            try:
+                _say(execute(line, plcs, options.full_duplex is not None, _say))
+            except CommandError as error:
+                _say(str(error))
+            link.wake()
+
+    ended = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: ended.set())
+    signal.signal(signal.SIGTERM, lambda *_: ended.set())
+    begin = time.monotonic()
+    inputs = [sys.stdin.fileno()] if sys.stdin else []
+    rest = b''
+    while not ended.is_set() and (passed := time.monotonic() - begin) < options.seconds:
+        while script and script[0][0] <= passed:
+            carry_out(script.pop(0)[1])
+        if select.select(inputs, [], [], 0.05)[0]:
+            data = os.read(inputs[0], 4096)
+            *lines, rest = (rest + data).split(b'\n')
+            if not data:
+                lines, inputs = [rest], []  # closed; signals and --seconds still end us
+            for line in lines:
+                carry_out(line.decode(errors='replace'))
+
+
+def _say(text: str) -> None:
+    try:
+        print(f'simulator: {text}', flush=True)
+    except OSError:  # nobody reads it any more; the PLCs go on
+        drop_output()
+
+
+def _print_fault(error: Exception) -> None:
+    traceback.print_exception(error)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,324 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Tell what is said on a DF1 line, live or from a recording.
+
+Live: --port listens on a port that is wired to the line, without sending; --tap stands between
+two ports and passes everything on at once. A file is a capture (of --save, or of the node's
+parameter trace_file), a hex dump as xxd or hexdump -C write it, or with --binary raw bytes.
+
+A line has the time in seconds, the direction (">" sent by the master, the first port of the tap
+or whoever has recorded it; "<" the other way; "?" not known), the station, what it is, and
+whether its check is good. The summary comes at the end, also after Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+import math
+import os
+from pathlib import Path
+import signal
+import sys
+import time
+
+from abdf1_ros.cli.terminal import (
+    drop_output,
+    interruptible,
+    prepare_output,
+    reason_of,
+    seconds_option,
+    whole_option,
+)
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.errors import Problem
+from abdf1_ros.numbers import whole_number
+from abdf1_ros.ports.tap import is_pty, Tap
+from abdf1_ros.ports.trace import begun_now, Trace
+from abdf1_ros.settings.network import BAUD_RATES, Network
+from abdf1_ros.sniffer.capture import Chunk
+from abdf1_ros.sniffer.dumps import Recording
+from abdf1_ros.sniffer.entries import Entry
+from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
+from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.summary import Summary
+from abdf1_ros.text import printable
+
+EXIT_LOST = 1  # a port that was there, or a file that cannot be read
+EXIT_USAGE = 2
+
+_AUTO = 'auto'
+_CHECKS = {check.value.lower(): check for check in Checksum}
+_DUPLEX = {duplex.name.lower(): duplex for duplex in Duplex}
+_DEFAULT_BAUD = Network().baud
+_PROGRESS_PERIOD = 2.0
+
+_EPILOG = """\
+exit status: 0 at the end, 1 when a port is lost or a file cannot be read, 2 for bad options,
+contents of files, or ports
+
+examples:
+  sniff --port /dev/ttyUSB0 --baud 19200
+  sniff --tap /dev/ttyUSB0 /dev/ttyUSB1 --save line.cap
+  sniff --tap pty:/tmp/plc /dev/ttyUSB0      the program that talks to the PLC opens /tmp/plc
+  sniff line.cap.1 line.cap
+  sniff --json line.cap | jq 'select(.latency_ms > 100)'
+  sniff --summary --binary recorded.bin
+"""
+
+
+class _Output:
+    """Decode chunks and print what they say."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._options = options
+        self._session: Session | None = None
+        self._summary = Summary(options.baud)
+        self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
+        self._shows_progress = sys.stderr.isatty() and (
+            options.summary or not sys.stdout.isatty())
+        self._next_progress = time.monotonic() + _PROGRESS_PERIOD
+
+    def begin(self, settings: dict[str, str]) -> Session:
+        """Return the session; what options leave open is taken from a capture's head."""
+        if self._session is None:
+            options, baud = self._options, settings.get('baud', '')
+            check, duplex = (
+                settings.get(name, '').lower() if chosen == _AUTO else chosen
+                for name, chosen in (('check', options.check), ('duplex', options.duplex)))
+            self._session = Session(_CHECKS.get(check), _DUPLEX.get(duplex))
+            speed = whole_number(baud)
+            if self._summary.baud is None and speed and speed > 0:
+                self._summary.baud = speed
+        return self._session
+
+    def take(self, chunk: Chunk, settings: dict[str, str]) -> None:
+        """Print what a chunk says."""
+        session = self.begin(settings)
+        self._summary.take(chunk)
+        for entry in session.feed(chunk):
+            self._print(entry)
+
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether there was nothing to decode."""
+        return not self._summary.bytes.total()
+
+    def show_progress(self, done: str) -> None:
+        """Tell every two seconds how far it is, where a terminal shows nothing else."""
+        if self._shows_progress and time.monotonic() >= self._next_progress:
+            self._next_progress = time.monotonic() + _PROGRESS_PERIOD
+            _say(f'{done}, {self._summary.bytes.total()} bytes so far')
+
+    def end(self) -> None:
+        """Print what is left, then the summary."""
+        for entry in self.begin({}).finish():
+            self._print(entry)
+        self.sum_up()
+
+    def sum_up(self) -> None:
+        """Print the summary."""
+        session = self.begin({})
+        if self._options.json:
+            print(summary_json(self._summary, session.kind))
+        else:
+            print('\n'.join(summary_lines(self._summary, session.kind)))
+        sys.stdout.flush()
+
+    def _print(self, entry: Entry) -> None:
+        self._summary.add(entry)
+        if self._options.json and not self._options.summary:
+            print(json_line(entry))
+        elif not self._options.summary:
+            print(text_line(entry, self._colour))
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Decode until the end of the file, SIGINT, SIGTERM or --seconds.
+
+    The exit statuses are those of --help.
+    """
+    prepare_output()
+    options = _parse(args)
+    with interruptible():
+        return _decode(options)
+
+
+def _decode(options: argparse.Namespace) -> int:
+    output = _Output(options)
+    try:
+        if options.files:
+            return _decode_files(options, output)
+        return _listen(options, output)
+    except BrokenPipeError:  # whoever reads us has seen enough
+        drop_output()
+        return 0
+    except OSError as error:  # such as a full disk
+        drop_output()
+        print(f'sniff: cannot print: {error.strerror or error}', file=sys.stderr)
+        return EXIT_USAGE
+    except KeyboardInterrupt:  # before there was anything to sum up
+        return 0
+
+
+def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='sniff', description=__doc__, epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('files', metavar='FILE', nargs='*',
+                        help='captures or hex dumps, decoded one after the other')
+    parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
+    parser.add_argument('--port', metavar='NAME',
+                        help='listen on a serial port, a URL of pyserial, pty, or pty:NAME')
+    parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'),
+                        help='listen between two ports; ">" is from A to B')
+    parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
+                        help=f'of the ports (default: {_DEFAULT_BAUD}); for a file, to know '
+                             'the load of the line')
+    parser.add_argument('--parity', choices=('None', 'Even', 'Odd'), default='None',
+                        help='of the ports (default: %(default)s)')
+    parser.add_argument('--check', type=str.lower, choices=(*_CHECKS, _AUTO), default=_AUTO,
+                        help='default: found by itself')
+    parser.add_argument('--duplex', type=str.lower, choices=(*_DUPLEX, _AUTO), default=_AUTO,
+                        help='default: found by itself')
+    parser.add_argument('--json', action='store_true',
+                        help='one JSON object a line, the summary last')
+    parser.add_argument('--summary', action='store_true', help='print the summary only')
+    parser.add_argument('--save', metavar='FILE',
+                        help='also write what a port or a tap hears into a capture')
+    parser.add_argument('--seconds', type=seconds_option, default=math.inf,
+                        help='end after so many seconds')
+    options = parser.parse_args(args)
+    if sum(map(bool, (options.files, options.port, options.tap))) != 1:
+        parser.error('give files, or --port, or --tap')
+    if options.tap and options.tap[0] == options.tap[1] != 'pty':
+        parser.error('--tap stands between two ports; these are one and the same')
+    if options.files and options.save:
+        parser.error('--save is for --port and --tap')
+    if options.binary and not options.files:
+        parser.error('--binary is for files')
+    return options
+
+
+class _Unreadable(Exception):
+    """A file that the system does not give us; the text says which and why."""
+
+
+def _decode_files(options: argparse.Namespace, output: _Output) -> int:
+    status = 0
+    end = time.monotonic() + options.seconds
+    try:
+        for name in options.files:
+            has_bytes = False
+            for recording, chunk in _recorded(name, options.binary):
+                if time.monotonic() >= end:
+                    output.end()
+                    return status
+                has_bytes = True
+                output.take(chunk, recording.settings)
+                output.show_progress(
+                    f'{name}: {recording.percent} %' if recording.has_size else name)
+            if not has_bytes:
+                _say(f'{name}: there are no bytes in it')
+    except KeyboardInterrupt:  # also out of reading a pipe into which nobody writes
+        output.sum_up()
+        return status
+    except Problem as problem:
+        status = EXIT_USAGE
+        _say(str(problem))
+    except _Unreadable as error:
+        status = EXIT_LOST
+        _say(str(error))
+    if not status or not output.is_empty:
+        output.end()
+    return status
+
+
+def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:
+    """Yield the chunks of a file."""
+    try:
+        recording = Recording(Path(name), is_binary)
+        for chunk in recording.chunks():
+            yield recording, chunk
+    except OSError as error:
+        raise _Unreadable(f'{name}: cannot be read: {error.strerror or error}') from None
+
+
+def _listen(options: argparse.Namespace, output: _Output) -> int:
+    names = options.tap or [options.port]
+    settings = {'begun': begun_now(), 'ports': ' '.join(names), 'check': options.check,
+                'duplex': options.duplex}
+    # A pseudo-terminal has no speed of its own.
+    baud = options.baud or (None if all(map(is_pty, names)) else _DEFAULT_BAUD)
+    if baud is not None:
+        settings['baud'] = str(baud)
+    try:
+        tap = Tap(names, Network(baud=baud or _DEFAULT_BAUD, parity=options.parity))
+        _end_with(tap.stop)
+        with tap:
+            trace = Trace(options.save, settings, _say) if options.save else None
+            _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
+            return _print_heard(tap, trace, output, settings, options.seconds)
+    except OSError as error:
+        _raise_broken_pipe(error)
+        _say(reason_of(error.filename, error) if error.filename else str(error))
+        return EXIT_USAGE
+
+
+def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[str, str],
+                 seconds: float) -> int:
+    """Print what the tap hears, until the time is up, a signal, or a lost port."""
+    def idle() -> None:
+        output.show_progress('listening')
+
+    status = 0
+    try:
+        for chunk in tap.chunks(seconds, _PROGRESS_PERIOD, idle):
+            if trace:
+                trace.write(chunk)
+            output.take(chunk, settings)
+            sys.stdout.flush()
+            idle()
+    except OSError as error:
+        _raise_broken_pipe(error)
+        _say(f'a port was lost: {error}')
+        status = EXIT_LOST
+    if trace:
+        trace.close()
+    output.end()
+    return status
+
+
+def _raise_broken_pipe(error: Exception) -> None:
+    """Raise the one that is no fault of port or file: whoever reads us has seen enough."""
+    if isinstance(error, BrokenPipeError):
+        raise error
+
+
+def _end_with(end: Callable[[], None]) -> None:
+    """Let SIGINT and SIGTERM call ``end``."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: end())
+
+
+def _say(text: str) -> None:
+    print(f'sniff: {printable(text)}', file=sys.stderr, flush=True)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,263 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The monitor as a process, beside a bridge and its simulator."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import termios
+import time
+
+import pytest
+from std_msgs.msg import UInt16MultiArray
+from support.ros import Observer, PATIENCE, Process
+from support.simulator_process import Files, make_files, READS, STATUSES
+
+NODE = '/cell/line_a'
+ARGUMENTS = ('-r', '__ns:=/cell', '-r', '__node:=line_a')
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return make_files(tmp_path_factory.mktemp('monitor'))
+
+
+@pytest.fixture(scope='module')
+def simulator(files: Files) -> Iterator[Process]:
+    with files.start_simulator() as simulator, \
+            Process('node', *files.args(), *ARGUMENTS) as node:
+        yield simulator
+        node.end()
+
+
+def test_one_picture_shows_every_topic_and_status(simulator: Process) -> None:
+    with Process('monitor', '--node', NODE, '--once') as monitor:
+        assert monitor.result() == 0, monitor.text
+    assert NODE in monitor.lines
+    assert '\x1b' not in monitor.text  # no terminal, no colours
+    for topic, (_, address, values) in READS.items():
+        (line,) = [line for line in monitor.lines if line.split()[:1] == [topic]]
+        shown = f'"{values}"' if isinstance(values, str) else ' '.join(map(str, values))
+        assert line.endswith(shown.replace('.0', '')), line
+        assert address in line
+        assert ('no promise' if topic == 'recipe' else 'fresh') in line
+    for status in STATUSES:
+        assert any(re.match(f' *{status} +OK: ', line) for line in monitor.lines), status
+    assert re.search(r'settings 115200 baud, CRC, .*line load \d+ %', monitor.text)
+    assert 'active stations: 1, 2' in monitor.text
+    assert 'CNT_REPLY_MSGS_RCVD' in monitor.text
+
+
+def test_pictures_follow_the_loss_of_a_station(simulator: Process) -> None:
+    with Process('monitor', '--node', NODE, '--period', '0.2') as monitor:
+        monitor.wait_for('heartbeat', 'fresh')
+        simulator.say('silent 2')
+        after = len(monitor.lines)
+        monitor.wait_for('parts', 'STALE (>', after=after)
+        monitor.wait_for('ERROR: station 2 inactive', after=after)
+        monitor.wait_for('parts: ', 'failed: C5:2.ACC at station 2', after=after)
+        monitor.wait_for('active stations: 1', after=after)
+        after = len(monitor.lines)
+        simulator.say('normal 2')
+        monitor.wait_for('parts', 'fresh', after=after)
+        monitor.end(signal.SIGTERM)
+
+
+def test_it_ends_after_the_time_it_is_given(simulator: Process) -> None:
+    with Process('monitor', '--node', NODE, '--seconds', '2', '--period', '0.1') as monitor:
+        began = time.monotonic()
+        assert monitor.result() == 0
+        assert 1.5 < time.monotonic() - began < PATIENCE
+    assert monitor.lines.count(NODE) > 1
+
+
+def test_reader_that_has_seen_enough_ends_it_quietly(simulator: Process) -> None:
+    read, write = os.pipe()
+    with subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'monitor', '--node', NODE, '--period', '0.1'],
+            stdout=write, stderr=subprocess.PIPE, text=True) as process:
+        os.close(write)
+        assert os.read(read, 5)
+        os.close(read)
+        _, said = process.communicate(timeout=PATIENCE)
+        assert all('looking for' in line for line in said.splitlines()), said
+    assert process.returncode == 0
+
+
+# On a terminal
+
+PAGE_UP, PAGE_DOWN, CONTROL_L = '\x1b[5~', '\x1b[6~', '\x0c'
+
+
+class Terminal:
+    """A terminal that remembers what was drawn, and can press keys."""
+
+    def __init__(self, *args: str, term: str = 'xterm-256color') -> None:
+        self._ours, theirs = pty.openpty()
+        termios.tcsetwinsize(theirs, (60, 120))
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'monitor', *args], stdin=theirs, stdout=theirs,
+            stderr=theirs, env=os.environ | {'TERM': term})
+        os.close(theirs)
+        self.drawn = ''
+        self._decoder = codecs.getincrementaldecoder('utf-8')()
+
+    def _read(self) -> None:
+        # What is read may end within a character.
+        self.drawn += self._decoder.decode(os.read(self._ours, 65536))
+
+    def wait_for(self, text: str) -> None:
+        """Wait until ``text`` has been drawn after what has been waited for before."""
+        end = time.monotonic() + PATIENCE
+        while text not in self.drawn:
+            assert select.select([self._ours], [], [], end - time.monotonic())[0], self.drawn
+            self._read()
+        self.drawn = self.drawn.partition(text)[2]
+
+    def press(self, keys: str) -> None:
+        os.write(self._ours, keys.encode())
+
+    def resize(self, rows: int, columns: int) -> None:
+        termios.tcsetwinsize(self._ours, (rows, columns))
+        self.process.send_signal(signal.SIGWINCH)
+
+    def result(self) -> int:
+        """Read until the process closes the terminal; return its exit status."""
+        while select.select([self._ours], [], [], PATIENCE)[0]:
+            try:
+                self._read()
+            except OSError:  # nobody has the other end open any more
+                break
+        return self.process.wait(PATIENCE)
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        os.close(self._ours)
+
+
+@contextmanager
+def terminal(*args: str, term: str = 'xterm-256color') -> Iterator[Terminal]:
+    screen = Terminal(*args, term=term)
+    try:
+        yield screen
+    finally:
+        screen.close()
+
+
+def test_picture_is_drawn_in_place_and_q_ends(simulator: Process) -> None:
+    with terminal('--node', NODE) as screen:
+        screen.wait_for('\x1b[?1049h')  # the screen beside that of the shell
+        screen.wait_for('CRD_CHAR_RECV')
+        screen.resize(8, 60)
+        screen.wait_for(NODE)
+        screen.press(10 * PAGE_DOWN + CONTROL_L)
+        screen.wait_for('CRD_CHAR_RECV')
+        screen.press(10 * PAGE_UP + CONTROL_L)
+        screen.wait_for(NODE)
+        screen.resize(1, 1)
+        screen.resize(8, 60)
+        screen.press(CONTROL_L)
+        screen.wait_for(NODE)
+        screen.press('q')
+        assert screen.result() == 0
+        assert '\x1b[?1049l' in screen.drawn
+        assert 'Traceback' not in screen.drawn
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signals_give_the_terminal_back(simulator: Process, number: signal.Signals) -> None:
+    with terminal('--node', NODE) as screen:
+        screen.wait_for('1 0 0 1 1 0')
+        screen.process.send_signal(number)
+        assert screen.result() == 0
+        assert '\x1b[?1049l' in screen.drawn
+
+
+def test_terminal_that_cannot_move_its_cursor_gets_plain_pictures(simulator: Process) -> None:
+    with terminal('--node', NODE, '--period', '0.1', term='no-such-terminal') as screen:
+        screen.wait_for(f'\n{NODE}')
+        screen.process.send_signal(signal.SIGINT)
+        assert screen.result() == 0
+
+
+def test_one_picture_has_colours_on_a_terminal(
+        simulator: Process, monkeypatch: pytest.MonkeyPatch) -> None:
+    with terminal('--node', NODE, '--once') as screen:
+        assert screen.result() == 0
+        assert re.search(r'\x1b\[32m  link +OK: ', screen.drawn)
+    monkeypatch.setenv('NO_COLOR', '1')
+    with terminal('--node', NODE, '--once') as screen:
+        assert screen.result() == 0
+        assert 'OK: ' in screen.drawn
+        assert '\x1b' not in screen.drawn
+
+
+# What is refused
+
+
+def refused(status: int, *args: str) -> str:
+    with Process('monitor', *args) as monitor:
+        assert monitor.result() == status, monitor.text
+        assert 'Traceback' not in monitor.text
+        return monitor.lines[-1]
+
+
+def test_a_node_that_is_not_there_is_said_with_those_that_are(simulator: Process) -> None:
+    line = refused(1, '--node', '/abdf1', '--wait', '3')
+    assert line == 'monitor: there is no node /abdf1 within 3 s: --node may be one of ' + NODE
+
+
+def test_topics_without_a_node_that_is_heard_point_to_another_user() -> None:
+    with Observer() as observer:
+        observer.node.create_publisher(UInt16MultiArray, '/ghost/active_stations', 1)
+        assert refused(1, '--node', 'ghost', '--wait', '4') == (
+            'monitor: /ghost is seen, but nothing is heard of it within 4 s: programs of one '
+            'machine have to run as the same user')
+
+
+def test_progress_is_told_while_nothing_is_found(tmp_path: Path) -> None:
+    with Process('monitor', '--node', 'nowhere', '--wait', '2.4') as monitor:
+        monitor.wait_for('monitor: looking for /nowhere, 0 s more')
+        assert monitor.result() == 1
+
+
+@pytest.mark.parametrize(('args', 'text'), [
+    (('--node', 'a b'), 'it should be like /abdf1'),
+    (('--seconds', 'soon'), '"soon" should be a number of seconds above 0'),
+    (('--period', '0'), '"0" should be a number of seconds above 0'),
+    (('--wait', 'nan'), '"nan" should be a number of seconds above 0'),
+    (('--ros-args', '-p', 'x'), "Couldn't parse"),
+])
+def test_bad_options_are_refused_in_one_line(args: tuple[str, ...], text: str) -> None:
+    assert text in refused(2, *args)
+
+
+def test_help_has_examples_and_exit_statuses() -> None:
+    with Process('monitor', '--help') as monitor:
+        assert monitor.result() == 0
+    assert 'exit status: 0' in monitor.text
+    assert '  monitor --node /cell/line_1' in monitor.lines

@@ -1,0 +1,222 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the monitor hears, of a node that publishes as a bridge does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import time
+
+from abdf1_ros.cli.monitor.node import full_name, Watch
+from abdf1_ros.cli.monitor.view import Reading, Snapshot, Style
+from abdf1_ros.errors import FormatError
+from abdf1_ros.node_messages import latched_qos, new_message, read_qos
+from abdf1_ros.settings.mapping import Mapping
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import pytest
+from rclpy.node import Node
+from std_msgs.msg import Int16MultiArray, String, UInt16MultiArray
+from support.mappings import make_mapping
+from support.ros import Observer, PATIENCE
+
+NAME = '/cell/line_a'
+PROMISE = 30.0  # s; longer than any test
+
+
+class Bridge:
+    """A node that publishes what a test wants, under the names of a bridge."""
+
+    def __init__(self, observer: Observer, namespace: str = '/cell') -> None:
+        self.observer = observer
+        self.node = Node('line_a', namespace=namespace, context=observer.context)
+        self.active = self.node.create_publisher(
+            UInt16MultiArray, '~/active_stations', latched_qos())
+        self.diagnostics = self.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.results = self.node.create_publisher(DiagnosticStatus, '~/write_results', 10)
+
+    def read(self, row: Mapping, values: list[int] | str, topic: str = '') -> None:
+        """Publish on a read topic, with the quality of service that the node's has."""
+        message = new_message(row)
+        message.data = values
+        self.node.create_publisher(
+            type(message), topic or f'~/read/{row.topic}', read_qos(row, PROMISE)
+        ).publish(message)
+
+    def status(self, name: str, message: str, level: bytes, **values: str) -> None:
+        """Publish diagnostics of one status."""
+        pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+        self.diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(
+            name=name, message=message, level=level, values=pairs)]))
+
+
+@pytest.fixture
+def observer() -> Iterator[Observer]:
+    with Observer() as observer:
+        yield observer
+
+
+@pytest.fixture
+def bridge(observer: Observer) -> Iterator[Bridge]:
+    bridge = Bridge(observer)
+    yield bridge
+    bridge.node.destroy_node()
+
+
+@pytest.fixture
+def watch() -> Iterator[Watch]:
+    with Watch(NAME, []) as watch:
+        yield watch
+
+
+def until(watch: Watch, condition: Callable[[Snapshot], object]) -> Snapshot:
+    """Listen until the picture fulfils ``condition``; return it."""
+    end = time.monotonic() + PATIENCE
+    while not condition(watch.snapshot()):
+        assert time.monotonic() < end, watch.snapshot()
+        watch.spin(0.05)
+    return watch.snapshot()
+
+
+def heard(picture: Snapshot) -> dict[str, Reading]:
+    return {reading.topic: reading for reading in picture.readings if reading.values is not None}
+
+
+def test_values_come_with_address_and_promise(bridge: Bridge, watch: Watch) -> None:
+    bridge.read(make_mapping('N7:0', length=2, tag='speeds'), [1200, -800])
+    readings = heard(until(watch, lambda picture: len(heard(picture)) == 1))
+    speeds = readings['speeds']
+    assert (list(speeds.values or ()), speeds.address, speeds.promised) == (
+        [1200, -800], 'N7:0', PROMISE)
+    assert speeds.state(time.monotonic()) == ('fresh', Style.GOOD)
+
+
+def test_strings_and_topics_under_other_names_are_heard(bridge: Bridge, watch: Watch) -> None:
+    bridge.read(make_mapping('ST9:0', tag='name', kind='string'), 'Tank 4')
+    bridge.read(make_mapping('N7:0', tag='door'), [1], '/elsewhere/door')
+    readings = heard(until(watch, lambda picture: len(heard(picture)) == 2))
+    assert readings['name'].values == 'Tank 4'
+    assert list(readings['/elsewhere/door'].values or ()) == [1]
+
+
+def test_value_of_a_topic_that_promises_nothing_is_as_old_as_its_publishing(
+        bridge: Bridge) -> None:
+    published = time.monotonic()
+    bridge.read(make_mapping('N7:0', tag='ready', publish='Change'), [1])
+    bridge.observer.until(lambda: time.monotonic() - published > 0.3, 'it to become older')
+    with Watch(NAME, []) as watch:
+        picture = until(watch, lambda picture: len(heard(picture)) == 1)
+    assert heard(picture)['ready'].promised is None
+    assert heard(picture)['ready'].received == pytest.approx(published, abs=0.2)
+
+
+def test_complete_are_diagnostics_all_topics_and_every_promised_value(
+        bridge: Bridge, watch: Watch) -> None:
+    bridge.node.create_publisher(
+        Int16MultiArray, '~/read/later', read_qos(make_mapping('N7:0', publish='Change'), 1))
+    bridge.read(make_mapping('N7:1', tag='speeds'), [7])
+    until(watch, lambda picture: len(picture.readings) == 2 and heard(picture)
+          and bridge.diagnostics.get_subscription_count())
+    assert not watch.is_complete
+    bridge.status('line_a: mappings', 'OK: 3', DiagnosticStatus.OK, total='3')
+    until(watch, lambda picture: picture.told)
+    assert not watch.is_complete
+    bridge.status('line_a: mappings', 'OK: 2', DiagnosticStatus.OK, total='2')
+    until(watch, lambda picture: picture.statuses[0].message == 'OK: 2')
+    assert watch.is_complete
+    promised = make_mapping('N7:2', tag='promised')
+    bridge.node.create_publisher(
+        Int16MultiArray, '~/read/promised', read_qos(promised, PROMISE))
+    until(watch, lambda picture: len(picture.readings) == 3)
+    assert not watch.is_complete
+
+
+def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: Watch) -> None:
+    until(watch, lambda picture: picture.is_there and bridge.diagnostics.get_subscription_count())
+    link = DiagnosticStatus(
+        name='line_a: link', message='WARN: slow', level=DiagnosticStatus.WARN,
+        values=[KeyValue(key='settings', value='9600 baud')])
+    others = [DiagnosticStatus(name=name) for name in ('line_ab: link', 'a: line_a: link')]
+    bridge.diagnostics.publish(DiagnosticArray(status=[*others, link]))
+    bridge.diagnostics.publish(DiagnosticArray(status=others))
+    (found,) = until(watch, lambda picture: picture.statuses).statuses
+    assert (found.section, found.message, found.style, found.values) == (
+        'link', 'WARN: slow', Style.WARNING, {'settings': '9600 baud'})
+    bridge.status('line_a: station 1', 'ERROR: silent', DiagnosticStatus.ERROR)
+    (station,) = until(
+        watch, lambda picture: picture.statuses[0].section != 'link').statuses
+    assert (station.section, station.style) == ('station 1', Style.BAD)
+
+
+def test_stations_are_taken_from_the_bits_of_the_active_node_table(
+        bridge: Bridge, watch: Watch) -> None:
+    words = [0b110, 1, *[0] * 13, 1 << 15]
+    bridge.active.publish(UInt16MultiArray(data=words))
+    assert until(watch, lambda picture: picture.active).active == [1, 2, 16, 255]
+
+
+def test_results_of_writes_are_kept_newest_first(bridge: Bridge, watch: Watch) -> None:
+    until(watch, lambda picture: bridge.results.get_subscription_count())
+    for number in range(12):
+        bridge.results.publish(DiagnosticStatus(
+            name='recipe', message=f'number {number}', level=DiagnosticStatus.ERROR))
+    results = until(watch, lambda picture: picture.results
+                    and picture.results[0].message == 'number 11').results
+    assert [result.message for result in results] == [f'number {n}' for n in range(11, 3, -1)]
+    assert results[0].style is Style.BAD
+
+
+def test_node_that_ends_is_gone_and_may_come_back_with_another_map(
+        bridge: Bridge, watch: Watch) -> None:
+    bridge.read(make_mapping('N7:0', tag='one'), [1])
+    bridge.read(make_mapping('N7:1', tag='two'), [2])
+    until(watch, lambda picture: len(heard(picture)) == 2)
+    bridge.node.destroy_node()
+    picture = until(watch, lambda picture: not picture.is_there)
+    assert set(heard(picture)) == {'one', 'two'}
+    again = Bridge(bridge.observer)
+    again.read(make_mapping('ST9:0', tag='one', kind='string'), 'text')
+    picture = until(watch, lambda picture: set(heard(picture)) == {'one'}
+                    and heard(picture)['one'].values == 'text')
+    assert picture.is_there
+    assert [reading.topic for reading in picture.readings] == ['one']
+    again.node.destroy_node()
+
+
+def test_node_of_the_same_name_in_another_namespace_is_told(
+        bridge: Bridge, watch: Watch) -> None:
+    other = Bridge(bridge.observer, '/other')
+    (remark,) = until(watch, lambda picture: picture.remarks).remarks
+    assert remark.startswith('/other/line_a has the same name on /diagnostics')
+    until(watch, lambda picture: watch.bridges() == [NAME, '/other/line_a'])
+    other.node.destroy_node()
+
+
+def test_nothing_is_asked_of_the_publishers(bridge: Bridge, watch: Watch) -> None:
+    bridge.node.create_publisher(String, '~/read/label', 1)  # volatile: offers the least
+    until(watch, lambda picture: picture.readings)
+    names = bridge.observer.node.get_publisher_names_and_types_by_node('abdf1_monitor', '/')
+    assert not [name for name, _ in names if name != '/parameter_events']
+
+
+@pytest.mark.parametrize(('text', 'name'), [
+    ('abdf1', '/abdf1'), ('/abdf1', '/abdf1'), ('cell/line_a', NAME), ('/cell/line_a/', NAME)])
+def test_names_may_lack_the_slash_in_front(text: str, name: str) -> None:
+    assert full_name(text) == name
+
+
+@pytest.mark.parametrize('text', ['', '/', 'a b', '7up', 'a//b', '~/x', 'line-1'])
+def test_bad_names_are_refused_with_a_good_one(text: str) -> None:
+    with pytest.raises(FormatError, match='it should be like /abdf1 or /cell/abdf1'):
+        full_name(text)

@@ -1,0 +1,177 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lines that show a running bridge."""
+
+from __future__ import annotations
+
+from abdf1_ros.cli.monitor.view import (
+    Line,
+    Reading,
+    render,
+    Result,
+    show,
+    Snapshot,
+    Status,
+    Style,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+NOW = 1000.0
+WIDTH = 120
+
+
+def snapshot(**changes: object) -> Snapshot:
+    """Return a bridge of which nothing is wrong, changed as told."""
+    fields: dict[str, object] = {
+        'node': '/cell/abdf1', 'is_there': True, 'told': NOW - 0.4, 'statuses': [],
+        'readings': [Reading('speeds', [1200, -800], 'N7:0', NOW - 0.25, 0.5)],
+        'active': [1, 17], 'results': []}
+    return Snapshot(**fields | changes)  # type: ignore[arg-type]
+
+
+def lines(picture: Snapshot, width: int = WIDTH) -> list[str]:
+    return [line.text for line in render(picture, NOW, width)]
+
+
+def line_with(text: str, picture: Snapshot) -> Line:
+    (line,) = [line for line in render(picture, NOW, WIDTH) if text in line.text]
+    return line
+
+
+def test_a_reading_is_shown_with_address_age_state_and_values() -> None:
+    line = line_with('speeds', snapshot())
+    assert line.text.split() == ['speeds', 'N7:0', '0.2', 's', 'fresh', '1200', '-800']
+    assert line.style is Style.GOOD
+
+
+@pytest.mark.parametrize(('reading', 'state'), [
+    (Reading('a', [1], received=NOW - 0.5, promised=0.5), ('fresh', Style.GOOD)),
+    (Reading('a', [1], received=NOW - 0.51, promised=0.5), ('STALE (>0.5 s)', Style.BAD)),
+    (Reading('a', [1], received=NOW - 900, promised=None), ('no promise', Style.PLAIN)),
+    (Reading('a', None, promised=0.5), ('no value', Style.BAD)),
+    (Reading('a', None, promised=None), ('no value', Style.BAD)),
+])
+def test_what_a_value_is_worth_comes_from_its_age_and_the_promise(
+        reading: Reading, state: tuple[str, Style]) -> None:
+    assert reading.state(NOW) == state
+
+
+def test_columns_are_as_wide_as_the_longest_name() -> None:
+    picture = snapshot(readings=[
+        Reading('a', [1], 'N7:0', NOW, 1.0), Reading('longer/name', [2], 'N7:1', NOW, 1.0)])
+    rows = [line for line in lines(picture) if 'fresh' in line]
+    assert len({line.index('fresh') for line in rows}) == 1
+
+
+def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
+    picture = snapshot(
+        node='/n\x1b[2J', remarks=['\x07'],
+        readings=[Reading('na\nme', 'Tank\x1b[31m\n4', 'N7\r', NOW, 1.0)],
+        statuses=[Status('link', Style.GOOD, 'OK: \x1b]0;', {'settings': '\x9b1m'}),
+                  Status('counters', Style.GOOD, '', {'A\n': '\x00'}),
+                  Status('mappings', Style.GOOD, '', {'tag\n': 'x\u202e'}),
+                  Status('station 1\n', Style.GOOD, '', {'mode': '\x7f'})],
+        results=[Result('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
+    assert all(line.isprintable() for line in lines(picture))
+    assert r'"Tank\x1b[31m\n4"' in line_with('na\\nme', picture).text
+
+
+def test_link_shows_load_and_scan_time() -> None:
+    picture = snapshot(statuses=[Status(
+        'link', Style.WARNING, 'WARN: port open', {
+            'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
+            'scan time': '240 ms', 'last error': '2509 ERR'})])
+    assert line_with('WARN: port open', picture).style is Style.WARNING
+    assert line_with('line load', picture).text.strip() == \
+        'settings 19200 baud, CRC, line load 61 %, scan time 240 ms'
+    assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
+
+
+def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> None:
+    picture = snapshot(statuses=[Status(
+        'station 2', Style.BAD, 'ERROR: station 2 inactive', {'last answer': '4.7 s ago'})])
+    assert 'active stations: 1, 17' in '\n'.join(lines(picture))
+    assert line_with('station 2 ', picture).style is Style.BAD
+    assert line_with('last answer 4.7 s ago', picture).style is Style.PLAIN
+    assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
+    assert 'active stations' not in '\n'.join(lines(snapshot(active=None)))
+
+
+def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> None:
+    picture = snapshot(statuses=[Status('mappings', Style.BAD, 'ERROR: of 2 mappings 1 failed', {
+        'total': '2', 'failed': '1', 'part_counter': 'failed: C5:0.ACC at station 2'})])
+    assert line_with('part_counter: failed: C5:0.ACC', picture).style is Style.BAD
+    assert not [line for line in lines(picture) if 'total' in line]
+
+
+def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
+    picture = snapshot(results=[Result(
+        'recipe', Style.BAD, 'not written: refused', {'value': '[1, 2]', 'latency_ms': '0.3'},
+        NOW - 2)])
+    line = line_with('recipe', picture)
+    assert line.text.strip() == '2.0 s ago: recipe [1, 2] not written: refused (0.3 ms)'
+    assert line.style is Style.BAD
+
+
+def test_only_counters_that_have_counted_are_shown() -> None:
+    picture = snapshot(statuses=[Status(
+        'counters', Style.GOOD, 'OK: 3', {'CNT_A': '3', 'CNT_B': '0', 'CNT_C': '1'})])
+    (line,) = [line for line in lines(picture) if 'CNT' in line]
+    assert line.split() == ['CNT_A', '3', 'CNT_C', '1']
+
+
+@pytest.mark.parametrize(('changes', 'text', 'style'), [
+    ({'is_there': False}, 'the node is gone', Style.BAD),
+    ({'told': None}, 'no diagnostics yet', Style.WARNING),
+    ({'told': NOW - 5}, 'no diagnostics for 5.0 s', Style.BAD),
+    ({'readings': []}, 'no read topic found', Style.WARNING),
+    ({'remarks': ['another one']}, 'another one', Style.WARNING),
+])
+def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: Style) -> None:
+    assert line_with(text, snapshot(**changes)).style is style
+
+
+@pytest.mark.parametrize(('values', 'width', 'text'), [
+    ([1, 0, 1], 20, '1 0 1'),
+    ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
+    (range(100), 20, '0 1 2 3 and 96 more'),
+    ([123456789], 6, '123...'),
+    ('Tank 4', 20, '"Tank 4"'),
+    ('a' * 30, 10, '"aaaaaa...'),
+    ([], 5, ''),
+])
+def test_values_are_cut_to_what_fits(values: list[float], width: int, text: str) -> None:
+    assert show(values, width) == text
+
+
+@given(st.lists(st.integers() | st.floats(), max_size=50) | st.text(),
+       st.integers(min_value=3, max_value=60))
+def test_values_never_take_more_than_their_width(
+        values: list[float] | str, width: int) -> None:
+    text = show(values, width)
+    assert len(text) <= width
+    assert text.isprintable()
+
+
+@given(st.integers(min_value=10, max_value=250), st.text(max_size=60), st.text(max_size=400))
+def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) -> None:
+    picture = snapshot(
+        readings=[Reading(name, text, name, NOW, 1.0)], remarks=[text],
+        statuses=[Status('link', Style.GOOD, text, {'settings': text}),
+                  Status('mappings', Style.GOOD, text, {name: text})])
+    widths = [len(line) for line in lines(picture, max(width, 20))]
+    assert max(widths) <= max(width, 20)

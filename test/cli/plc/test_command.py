@@ -1,0 +1,416 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command ``plc`` on simulated lines: every subcommand, its output and exit status."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+import pty
+import signal
+import subprocess
+import sys
+
+from abdf1_ros.cli.plc.command import main
+import pytest
+from support.commands import call, running_simulator, Said
+from support.ptys import Pty
+from support.ros import Process, write_csv
+from support.simulator_process import Files, make_files
+
+FAST = ('--timeout', '250')
+
+Plc = Callable[..., Said]
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return make_files(tmp_path_factory.mktemp('line'))
+
+
+@pytest.fixture(scope='module')
+def simulator(files: Files) -> Iterator[Process]:
+    with files.start_simulator() as process:
+        yield process
+
+
+@pytest.fixture
+def line(simulator: Process, files: Files) -> str:
+    """Return the port of a line on which every station works."""
+    for station in (1, 2):
+        simulator.say(f'normal {station}')
+    return str(files.port)
+
+
+@pytest.fixture
+def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
+    return lambda *args: call(main, capsys, *args, '--port', line, *FAST)
+
+
+@pytest.mark.parametrize('station, address, options, lines', [
+    (1, 'B3:0/2', ('--length', '6'), ['B3:0/2 1 0 0 1 1 0']),
+    (1, 'I:017/12', (), ['I:017/12 1']), (1, 'I:017', (), ['I:017 1024']),
+    (1, 'N7:0', ('--length', '2'), ['N7:0 1200 -800']),
+    (1, 'F8:0', ('--length', '3'), ['F8:0 12.5 40.25 -3.5']),
+    (1, 'A10:0', ('--type', 'string', '--length', '3'), ["A10:0 'abc'"]),
+    (1, 'N7:6', ('--type', 'uint32', '--word-order', 'High'), ['N7:6 65538']),
+    (1, 'T4:1', ('--length', '3'), ['T4:1 8192 500 120']), (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
+    (1, 'T4:1/DN', (), ['T4:1/DN 1']), (2, 'C5:2.ACC', (), ['C5:2.ACC -17']),
+    (2, 'I:1.0', ('--length', '2'), ['I:1.0 5 40960']), (2, 'O:2.0/4', (), ['O:2.0/4 1']),
+    (2, 'L10:0', ('--length', '2'), ['L10:0 -70000 2000000000']),
+    (2, 'N7:40', ('--type', 'int32'), ['N7:40 131071']),
+    (2, 'N7:30', ('--type', 'bcd16', '--length', '2'), ['N7:30 1234 99']),
+    (2, 'ST9:1', (), ["ST9:1 'Tank 4'"]), (2, 'F8:4', (), ['F8:4 21.5'])])
+def test_read(plc: Plc, station: int, address: str, options: tuple[str, ...],
+              lines: list[str]) -> None:
+    said = plc('read', address, '--station', str(station), *options)
+    assert (said.status, said.lines, said.err) == (0, lines, '')
+
+
+def test_read_shows_rows_with_their_addresses(plc: Plc) -> None:
+    said = plc('read', 'N7:10', 'B3:0/15', '--length', '18', '--station', '2')
+    assert [line.split()[0] for line in said.lines] == ['N7:10', 'N7:20', 'B3:0/15', 'B3:1/15']
+    assert said.lines[0] == 'N7:10 101 102 103 104 0 0 0 0 0 0'
+
+
+def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
+    assert plc('read', 'N7:0', '--plc-type', 'plc5').lines == ['N7:0 1200']
+
+
+def test_read_goes_on_after_a_refusal(plc: Plc) -> None:
+    said = plc('read', 'N99:0', 'N7:0')
+    assert (said.status, said.lines) == (1, ['N7:0 1200'])
+    assert 'plc: station 1: STS F0 EXT STS' in said.err
+
+
+def test_read_over_a_net_file(line: str, files: Files,
+                              capsys: pytest.CaptureFixture[str]) -> None:
+    net = write_csv(files.folder / 'plc.csv', 'Com_Port,Baud,Timeout', [f'{line},115200,100'])
+    assert call(main, capsys, 'read', 'N7:0', '--net', str(net)).lines == ['N7:0 1200']
+
+
+@pytest.mark.parametrize('address, values, options, lines', [
+    ('N7:10', ('5', '-6', '0x10'), (), ['N7:10 5 -6 16']),
+    ('F8:6', ('-1.5', '2'), (), ['F8:6 -1.5 2']), ('ST9:0', ('Tank 5',), (), ["ST9:0 'Tank 5'"]),
+    ('B3:2/3', ('1', '0', '1'), (), ['B3:2/3 1 0 1']),
+    ('N7:50', ('70000',), ('--type', 'int32'), ['N7:50 70000']),
+    ('N7:52', ('abcde',), ('--type', 'string'), ["N7:52 'abcde'"]),
+    ('C5:2.PRE', ('9',), (), ['C5:2.PRE 9'])])
+def test_write(plc: Plc, address: str, values: tuple[str, ...], options: tuple[str, ...],
+               lines: list[str]) -> None:
+    said = plc('write', address, *values, '--yes', '--station', '2', *options)
+    assert (said.status, said.lines, said.err) == (0, ['written; now:', *lines], '')
+
+
+def test_write_without_yes_writes_nothing(plc: Plc) -> None:
+    before = plc('read', 'N7:20', '--length', '2', '--station', '2').lines
+    said = plc('write', 'N7:20', '55', '66', '--station', '2')
+    assert said.status == 2
+    assert said.lines == ['now:', *before, 'would write [55, 66] to N7:20 of station 2']
+    assert said.err == 'plc: nothing was written; --yes writes\n'
+    assert plc('read', 'N7:20', '--length', '2', '--station', '2').lines == before
+
+
+def _into(path: str, line: str, *args: str) -> tuple[int, str]:
+    """Run it with an output that takes nothing; return exit status and standard error."""
+    with open(path, 'w') as output:
+        said = subprocess.run(
+            [sys.executable, '-m', 'abdf1_ros', 'plc', *args, '--port', line], stdout=output,
+            stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, timeout=30, check=False)
+    return said.returncode, said.stderr
+
+
+def test_output_that_is_full_hides_no_write(plc: Plc, line: str) -> None:
+    write = 'write', 'N7:27', '71', '--station', '2'
+    assert _into('/dev/full', line, *write, '--yes') == (
+        0, 'plc: written, but that cannot be printed: No space left on device\n')
+    assert plc('read', 'N7:27', '--station', '2').lines == ['N7:27 71']
+    assert _into('/dev/full', line, 'read', 'N7:27', '--station', '2') == (
+        2, 'plc: cannot print: No space left on device\n')
+
+
+def test_write_of_which_nobody_reads_what_would_happen(line: str) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    said = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros', 'plc', 'write', 'N7:27', '72', '--station', '2', '--port',
+         line], stdout=writer, stdin=subprocess.DEVNULL, timeout=30, check=False)
+    os.close(writer)
+    assert said.returncode == 2
+
+
+@pytest.mark.parametrize('answer, status, value', [('y', 0, '61'), ('n', 2, '60'), ('', 2, '60')])
+def test_write_asks_who_sits_at_a_terminal(line: str, plc: Plc, answer: str, status: int,
+                                           value: str) -> None:
+    plc('write', 'N7:25', '60', '--yes', '--station', '2')
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'abdf1_ros', 'plc', 'write', 'N7:25', '61', '--station', '2',
+         '--port', line], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    os.write(ours, f'{answer}\n'.encode())
+    out, _ = process.communicate(timeout=20)
+    os.close(ours)
+    os.close(theirs)
+    assert process.returncode == status
+    assert 'N7:25  60\nwrite [61] to N7:25 of station 2? [y/N]' in out
+    assert plc('read', 'N7:25', '--station', '2').lines == [f'N7:25 {value}']
+
+
+@pytest.mark.parametrize('args, text', [
+    (('N7:0', '40000'), '"40000" is no int16'), (('N7:0', '1_000'), '"1_000" is no int16'),
+    (('N7:0', 'ten'), '"ten" is no int16'), (('N7:0', '1.5'), '"1.5" is no int16'),
+    (('B3:0/0', '2'), '"2" is no bool'),
+    (('ST9:0', 'Tank', '5'), 'ST9:0 takes one text; quote it if it has spaces'),
+    (('T4:0', '5'), 'belongs to the processor'), (('N7', '5'), 'ADDRESS "N7": an element is'),
+    (('N7:9999', '5'), 'ADDRESS "N7:9999": elements of N run from 0 to 255')])
+def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: str) -> None:
+    said = plc('write', *args, '--yes', '--station', '2')
+    assert said.status == 2
+    assert text in said.err
+
+
+def test_refused_write(plc: Plc, simulator: Process) -> None:
+    simulator.say('error 2 F0 0B')
+    said = plc('write', 'N7:0', '1', '--yes', '--station', '2', '--plc-type', 'SLC')
+    assert said.status == 1
+    assert 'not written: the PLC refused it: STS F0 EXT STS 0B' in said.err
+
+
+def test_write_without_a_reply_is_unknown(plc: Plc, simulator: Process) -> None:
+    simulator.say('slow 2 100000')
+    said = plc('write', 'N7:0', '1', '--yes', '--station', '2', '--plc-type', 'SLC')
+    assert said.status == 3
+    assert 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT' in said.err
+
+
+@pytest.mark.parametrize('count', [1, 3])
+def test_write_broken_off_is_unknown(tmp_path: Path, count: int) -> None:
+    line = Pty(tmp_path / 'line')
+    with Process('plc', 'write', 'N7:0', '1', '--yes', '--plc-type', 'SLC', '--port',
+                 str(line.name), '--timeout', '9000') as process:
+        line.read(10)  # the command is on its way
+        process.send(*[signal.SIGINT] * count)
+        assert process.result() == 3
+    line.close()
+    assert 'unknown whether written: port lost: ' in process.text
+    assert 'Traceback' not in process.text
+
+
+def test_status(plc: Plc) -> None:
+    said = plc('status', '2')
+    assert said.status == 0
+    assert said.lines[0].startswith('station 2: SLC 5/03')
+    assert 'mode REM RUN' in said.lines
+    assert 'faults none' in said.lines
+    assert plc('status').lines[0].startswith('station 1: PLC-5/40')
+
+
+def test_ping(plc: Plc) -> None:
+    said = plc('ping', '2', '--count', '3')
+    assert said.status == 0
+    assert len(said.lines) == 4
+    assert said.lines[0].startswith('station 2: ')
+    assert said.lines[3].startswith('3 sent, 3 answered; shortest ')
+
+
+def test_ping_of_nobody(plc: Plc) -> None:
+    said = plc('ping', '9', '--count', '2')
+    assert (said.status, said.lines) == (1, ['2 sent, 0 answered'])
+    assert said.err.count('2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive') == 2
+    assert 'not one character came' in said.err
+
+
+def test_scan(plc: Plc) -> None:
+    said = plc('scan', '0-2,9')
+    assert said.status == 0
+    assert [line.split()[0] for line in said.lines] == ['1', '2', '2']
+    assert 'PLC-5/40' in said.lines[0]
+    assert said.lines[2] == '2 of 4 stations answer'
+
+
+def test_scan_finds_who_does_not_say_what_it_is(plc: Plc, simulator: Process) -> None:
+    simulator.say('error 2 10')
+    said = plc('scan', '2')
+    assert said.status == 0
+    assert 'answers, but not who it is: STS 10' in said.lines[0]
+
+
+def test_scan_of_nobody(plc: Plc) -> None:
+    said = plc('scan', '8,9')
+    assert (said.status, said.lines) == (1, ['0 of 2 stations answer'])
+
+
+def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:
+    said = plc('watch', 'N7:0', 'F8:0', '--period', '0.05', '--count', '5')
+    assert said.status == 0
+    shown = [line.split(maxsplit=2)[1:] for line in said.lines]
+    assert sorted(map(tuple, shown)) == [('F8:0', '[12.5]'), ('N7:0', '[1200]')]
+
+
+def test_watch_tells_why_there_is_no_value(plc: Plc) -> None:
+    said = plc('watch', 'N99:0', 'N7:0', '--period', '0.05', '--count', '2')
+    assert said.status == 1
+    assert any('N99:0 no value: STS F0' in line for line in said.lines)
+    assert any(line.endswith('N7:0 [1200]') for line in said.lines)
+
+
+def test_watch_goes_on_until_it_is_interrupted(line: str) -> None:
+    with Process('plc', 'watch', 'N7:10', '--station', '2', '--period', '0.05', '--timeout',
+                 '5000', '--port', line) as process:
+        process.wait_for('N7:10  [')
+        process.send(signal.SIGINT)
+        assert process.result() == 0
+
+
+def test_ping_goes_on_until_it_is_interrupted(line: str) -> None:
+    with Process('plc', 'ping', '2', '--count', '1000000', '--timeout', '5000', '--port',
+                 line) as process:
+        process.wait_for('station 2: ')
+        process.send(signal.SIGINT)
+        assert process.result() == 0
+    assert ' answered; shortest ' in process.text
+
+
+def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'abdf1_ros', 'plc', 'watch', 'N7:0', '--count', '3', '--period',
+         '0.05', '--port', line], stdin=subprocess.DEVNULL, stdout=theirs, stderr=theirs,
+        env=os.environ | {'TERM': 'xterm', 'COLUMNS': '60', 'LINES': '10'})
+    os.close(theirs)
+    screen = b''
+    try:
+        while part := os.read(ours, 4096):
+            screen += part
+    except OSError:  # the other end is closed
+        pass
+    os.close(ours)
+    assert process.wait(20) == 0
+    assert b'\x1b[2A\x1b[Kaddress' in screen
+    assert screen.rstrip().endswith(b'[1200]')
+
+
+def test_full_duplex(tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'peer')
+    options = ('--pty', port, '--data', str(files.simulator), '--full-duplex', '2')
+    with running_simulator(*options, '--check', 'BCC'):
+        line = ('--port', port, '--peer', '--check', 'bcc', '--station', '2', *FAST)
+        assert call(main, capsys, 'write', 'N7:10', '7', '--yes', *line).status == 0
+        assert call(main, capsys, 'read', 'N7:10', *line).lines == ['N7:10 7']
+        found = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--baud', '9600')
+    assert (found.status, found.lines[0].partition(':')[0]) == (
+        0, '9600 baud, full duplex, BCC')
+
+
+def test_detect_tries_in_order_and_stops_at_the_first_answer(
+        tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'line')
+    with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
+        said = call(main, capsys, 'detect', '--port', port, '--stations', '9,2', '--timeout', '80')
+    assert said.status == 0
+    assert said.lines[0].startswith('19200 baud, half duplex, BCC: station 2 SLC 5/03')
+    assert said.lines[1:] == [
+        'net.csv:', 'Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout',
+        f'5,Master,BCC,{port},19200,None,300']
+
+
+def test_detect_of_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = Pty(tmp_path / 'line')
+    said = call(main, capsys, 'detect', '--port', str(line.name), '--stations', '1', '--timeout',
+                '30', '--baud', '9600')
+    line.close()
+    assert said.status == 1
+    assert said.err == ('plc: nothing answers with any of these settings\n'
+                        'plc: not one character came: cable, port, power?\n')
+
+
+def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'line')
+    with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
+        said = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--check', 'CRC',
+                    '--duplex', 'half', '--baud', '9600')
+    assert said.status == 1
+    assert said.err.splitlines() == ['plc: nothing answers with any of these settings',
+                                     'plc: 9600 baud, half duplex, CRC: 2 characters came']
+
+
+def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:
+        url = process.wait_for('socket://').partition(' on ')[2].partition(',')[0]
+        assert call(main, capsys, 'read', 'N7:0', '--port', url).lines == ['N7:0 1200']
+
+
+def test_lost_port(tmp_path: Path) -> None:
+    line = Pty(tmp_path / 'line')
+    with Process('plc', 'read', 'N7:0', '--port', str(line.name), '--plc-type', 'SLC',
+                 '--timeout', '5000') as process:
+        line.read(10)
+        line.close()
+        assert process.result() == 1
+    assert 'plc: port lost: ' in process.text
+
+
+@pytest.mark.parametrize('number, status', [(signal.SIGINT, 130), (signal.SIGTERM, 130)])
+def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> None:
+    line = Pty(tmp_path / 'line')
+    with Process('plc', 'status', '1', '--port', str(line.name), '--timeout',
+                 '9000') as process:
+        line.read(5)
+        process.send(number)
+        assert process.result() == status
+    line.close()
+    assert process.text == ''
+
+
+@pytest.mark.parametrize('args, text', [
+    (('read', 'N7:0'), 'name the port, such as --port /dev/ttyUSB0'),
+    (('read', 'N7:0', '--port', '/nowhere/tty'), '/nowhere/tty'),
+    (('read', 'N7:0', '--port', '/dev/null'), 'plc: /dev/null: '),
+    (('read', 'N7:0', '--port', 'x', '--peer', '--duplex', 'half'), 'not allowed with'),
+    (('read', 'N7:0', '--port', 'x', '--baud', '1'), '--baud: Baud = "1" should be one of 1200'),
+    (('read', 'N7:0', '--port', 'x'), '--port: Com_Port = "x" should be'),
+    (('read', 'N7:0', '--net', '/nowhere/net.csv'), '/nowhere/net.csv: cannot be read'),
+    (('scan', '0-300', '--port', 'x'), '"0-300" should be a station from 0 to 254'),
+    (('status', '1,2', '--port', 'x'), '"1,2" should be one station'),
+    (('ping', '1', '--count', '0', '--port', 'x'), '"0" should be a whole number from 1'),
+    (('watch', 'N7:0', '--period', 'x'), '"x" should be seconds from 0 to 86400'),
+    ((), 'the following arguments are required: COMMAND')])
+def test_wrong_options(args: tuple[str, ...], text: str,
+                       capsys: pytest.CaptureFixture[str]) -> None:
+    said = call(main, capsys, *args)
+    assert said.status == 2
+    assert text in said.err
+
+
+@pytest.mark.parametrize('command', [
+    '', 'read', 'write', 'watch', 'status', 'ping', 'scan', 'detect'])
+def test_help_has_examples_and_exit_statuses(command: str,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    said = call(main, capsys, *command.split(), '--help')
+    assert said.status == 0
+    assert 'exit status:' in said.out
+    assert f'plc {command}' in said.out.partition('example')[2]
+    assert 'watch and ping, once they have begun, end by it with 0 or 1' in said.out
+
+
+def test_process_needs_no_ros() -> None:
+    program = ('import sys; sys.modules["rclpy"] = None; '
+               'from abdf1_ros.cli.plc.command import main; sys.exit(main())')
+    said = subprocess.run([sys.executable, '-c', program, 'read', 'N7:0'], text=True,
+                          capture_output=True, timeout=30, check=False)
+    assert (said.returncode, said.stdout) == (2, '')
+    assert said.stderr.startswith('plc: --port: name the port')

@@ -1,0 +1,159 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Addresses and values of the command line."""
+
+from __future__ import annotations
+
+from array import array
+from concurrent.futures import Future
+from typing import cast
+
+from abdf1_ros.cli.plc.data import (
+    element,
+    length_of,
+    mapping_of,
+    parse_values,
+    processor_of,
+    rows,
+    Writing,
+)
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.transactions import Ending
+from abdf1_ros.errors import ConfigurationError, FormatError, PortLost
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.settings.mapping import Mapping
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+
+def make(address: str, **cells: str) -> Mapping:
+    common = {'Command': 'ReadWrite', 'Station': '1', 'PLC_Type': 'SLC'}
+    return mapping_of(address, common | cells)
+
+
+def test_columns_are_those_of_a_map_file() -> None:
+    mapping = make('N7:0', Length='4', Type='int32', Word_Order='High', Station='7')
+    assert (mapping.length, mapping.type.value, mapping.word_order.value, mapping.station) == (
+        4, 'int32', 'High', 7)
+
+
+@pytest.mark.parametrize(('address', 'cells', 'text'), [
+    ('N7', {}, 'ADDRESS "N7": an element is missing, as in N7:0'),
+    ('B3/4096', {}, 'ADDRESS "B3/4096": bits of B3 run from 0 to 4095'),
+    ('N7:0', {'Length': '0', 'Command': 'Read'},
+     '--length: "0" should be a whole number from 1 to 65535'),
+    ('N7:0', {'Length': '1_0', 'Command': 'Read'},
+     '--length: "1_0" should be a whole number from 1 to 65535'),
+    ('N7:250', {'Length': '9', 'Command': 'Read'},
+     '--length: 9 elements do not fit at N7:250; the last word there can be is N7:255'),
+    ('N7:250', {'Length': '9'},
+     'VALUE: 9 elements do not fit at N7:250; the last word there can be is N7:255'),
+    ('N7:0', {'Type': 'bool'}, '--type: N7:0 can be int16, uint16, bcd16, int32, uint32, '
+     'float32, string; a bool needs a bit address such as B3:0/5'),
+    ('N7:0', {'Access': 'Typed'}, '--access: "Typed" of a SLC should be one of Slot, Flat'),
+    ('N7:0', {'Station': 'x'}, 'Station: "x" should be a whole number from 0 to 254'),
+    ('N7:0', {'PLC_Type': 'PLC5', 'Processor': '5/02'}, '--processor: Processor is for PLCs of '
+     'type SLC that we read or write; leave --processor out')])
+def test_faults_name_the_argument(address: str, cells: dict[str, str], text: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        make(address, **cells)
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize('address, kind, number, expected', [
+    ('N7:5', '', 3, 'N7:8'), ('N7:5', 'int32', 3, 'N7:11'), ('F8:2', '', 2, 'F8:4'),
+    ('B3:0/5', '', 3, 'B3:0/8'), ('B3:0/5', '', 11, 'B3:1/0'), ('I:1.0/15', '', 1, 'I:1.1/0'),
+    ('T4:0.PRE', '', 1, 'T4:0.ACC')])
+def test_address_of_an_element(address: str, kind: str, number: int, expected: str) -> None:
+    assert str(element(make(address, Type=kind, Command='Read'), number)) == expected
+
+
+def test_rows_of_values() -> None:
+    mapping = make('N7:3', Length='12')
+    assert list(rows(mapping, array('h', [*range(11), -100]))) == [
+        ('N7:3', '   0     1     2     3     4     5     6     7     8     9'),
+        ('N7:13', '  10  -100')]
+    assert list(rows(make('F8:0'), array('f', [0.1]))) == [('F8:0', '0.1')]
+    assert list(rows(make('ST9:0'), 'a\nb')) == [('ST9:0', r"'a\nb'")]
+
+
+@pytest.mark.parametrize('address, kind, texts, values', [
+    ('N7:0', '', ['5', '-6', '0x1F', '0b11', '007'], [5, -6, 31, 3, 7]),
+    ('F8:0', '', ['1.5', '1e3', '2,5'], [1.5, 1000, 2.5]), ('B3:0/0', '', ['1', '0'], [1, 0]),
+    ('ST9:0', '', ['a b'], 'a b'), ('N7:0', 'bcd16', ['1234'], [1234])])
+def test_values(address: str, kind: str, texts: list[str], values: object) -> None:
+    assert parse_values(make(address, Type=kind), texts) == values
+
+
+@pytest.mark.parametrize('address, texts', [
+    ('N7:0', ['x']), ('N7:0', ['']), ('N7:0', ['0x']), ('N7:0', ['1.0']), ('F8:0', ['1.5.2']),
+    ('ST9:0', ['a', 'b']), ('N7:0', ['1_000']), ('N7:0', ['0x1_0']), ('N7:0', ['\u0661']),
+    ('N7:0', ['\uff11']), ('N7:0', [' 1']), ('F8:0', ['1_0.5']), ('F8:0', ['\u0661']),
+    ('F8:0', ['nan']), ('F8:0', ['1e39']), ('F8:0', ['1,000'])])
+def test_no_values(address: str, texts: list[str]) -> None:
+    with pytest.raises(FormatError):
+        parse_values(make(address), texts)
+
+
+@pytest.mark.parametrize('address, text, right', [
+    ('N7:0', '1_000', '"1_000" is no int16, a whole number from -32768 to 32767'),
+    ('B3:0/1', '2', '"2" is no bool, a whole number from 0 to 1'),
+    ('F8:0', '1_000', '"1_000" is no float32, a number such as -1.5 or 2e3'),
+    ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
+def test_value_that_is_none_says_what_would_be_right(address: str, text: str, right: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        parse_values(make(address), [text])
+    assert str(caught.value) == right
+
+
+class InterruptedSession:
+    """A session that is interrupted when its command is on the line already."""
+
+    def start(self, station: int, order: object, future: Future[Ending]) -> None:
+        self._future = future
+        raise KeyboardInterrupt
+
+    def close(self) -> None:
+        self._future.set_exception(PortLost('closed'))
+
+
+def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
+    ending = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession()))
+    assert (ending.outcome, ending.detail) == (Outcome.UNKNOWN, 'port lost: closed')
+
+
+@pytest.mark.parametrize('model, processor', [
+    ('SLC 5/02', '5/02'), ('SLC 5/03', ''), ('SLC 5/05', '5/05'), ('MicroLogix 1000', 'ML1000'),
+    ('MicroLogix 1500 LRP', 'ML1500'), ('SLC 500 fixed', ''), ('1763-LEC', '')])
+def test_processor_that_says_what_it_is(model: str, processor: str) -> None:
+    assert processor_of(Identity('SLC', model)) == processor
+
+
+@given(st.integers(-32768, 32767))
+def test_whole_numbers_in_every_notation(value: int) -> None:
+    mapping = make('N7:0')
+    assert parse_values(mapping, [str(value)]) == [value]
+    if value >= 0:
+        assert parse_values(mapping, [hex(value), bin(value), oct(value)]) == [value] * 3
+
+
+@pytest.mark.parametrize('address, kind, texts, length', [
+    ('N7:0', None, ['1', '2'], 2), ('ST9:0', 'string', ['Tank 5'], 1),
+    ('N7:0', 'string', ['abcde'], 3), ('A10:0', 'string', [''], 1), ('st9:0', None, ['a', 'b'], 1)
+])
+def test_length_of_a_write(address: str, kind: str | None, texts: list[str], length: int) -> None:
+    assert length_of(address, kind, texts) == length

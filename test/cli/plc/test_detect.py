@@ -1,0 +1,106 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The search for settings: what is tried, in which order, and when it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from abdf1_ros.cli.plc.detect import BAUD_RATES, Candidate, Search
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.settings import network as network_module
+from abdf1_ros.settings.network import Network
+from abdf1_ros.simulated_plc import SimulatedPlc
+import pytest
+from support.driver_bench import simulated_plc
+from support.ptys import Pty
+
+
+class Trying(list[str]):
+    """What a search has shown."""
+
+    def __call__(self, text: str) -> None:
+        self.append(text.removeprefix('trying '))
+
+
+@contextmanager
+def plc_on(path: Path, check: str, duplex: Duplex) -> Iterator[Network]:
+    """Put an SLC that is station 1 on a pseudo-terminal."""
+    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 10), checksum=check)
+    checksum = Network(error_code=check).checksum
+    line = PtyLine(str(path))
+    procedure = multidrop([plc]) if duplex is Duplex.HALF \
+        else _full_duplex(plc, PeerSettings(checksum))
+    link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
+    link.start()
+    try:
+        yield Network(com_port=str(path), timeout=250)
+    finally:
+        link.stop()
+        line.close()
+
+
+def _full_duplex(plc: SimulatedPlc,
+                 settings: PeerSettings) -> Callable[[Machine], Procedure]:
+    return lambda machine: FullDuplexPeer(
+        machine, settings, ActiveStationList(), plc.serve).run(plc)
+
+
+def test_usual_baud_rates_come_first_and_none_is_left_out() -> None:
+    assert BAUD_RATES[:3] == (19200, 9600, 38400)
+    assert sorted(BAUD_RATES) == sorted(network_module.BAUD_RATES)
+
+
+def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
+    line = Pty(tmp_path / 'line')
+    trying = Trying()
+    search = Search(Network(com_port=str(line.name), timeout=20), [3, 1], trying)
+    assert search.run((19200, 9600)) is None
+    line.close()
+    one_speed = ['full duplex, CRC, station 3', 'full duplex, BCC, station 3',
+                 'half duplex, CRC, station 3', 'half duplex, CRC, station 1']
+    assert trying == [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
+    assert search.traces == []
+
+
+@pytest.mark.parametrize('duplex, check, mode, tried', [
+    (Duplex.FULL, 'CRC', 'Peer', 1), (Duplex.FULL, 'BCC', 'Peer', 2),
+    (Duplex.HALF, 'CRC', 'Master', 4), (Duplex.HALF, 'BCC', 'Master', 5)])
+def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check: str, mode: str,
+                                           tried: int) -> None:
+    trying = Trying()
+    with plc_on(tmp_path / 'line', check, duplex) as network:
+        # In half duplex nobody is at 4; with the second check only who was heard is tried.
+        stations = [1] if duplex is Duplex.FULL else [4, 1]
+        found = Search(network, stations, trying).run(BAUD_RATES)
+    assert found is not None
+    assert found.candidate == Candidate(19200, mode, check)
+    assert found.presence.station == 1
+    assert len(trying) == tried
+
+
+def test_traces_of_the_wrong_settings(tmp_path: Path) -> None:
+    with plc_on(tmp_path / 'line', 'BCC', Duplex.HALF) as network:
+        search = Search(network, [1])
+        assert search.run([9600], checks=['CRC']) is None
+    assert search.traces == ['9600 baud, half duplex, CRC: 2 characters came']

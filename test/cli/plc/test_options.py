@@ -1,0 +1,94 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of ``plc``."""
+
+from __future__ import annotations
+
+import argparse
+
+from abdf1_ros.cli.plc.options import make_parser
+import pytest
+
+
+def parse(*args: str) -> argparse.Namespace:
+    return make_parser('').parse_args(args)
+
+
+def test_defaults() -> None:
+    read = parse('read', 'N7:0')
+    assert (read.command, read.addresses, read.length, read.station) == ('read', ['N7:0'], '1', 1)
+    assert read.plc_type is read.type is read.access is read.word_order is None
+    assert parse('status').station == 1
+    assert parse('ping', '3').count == 4
+    assert parse('watch', 'N7:0').period == 0.5
+    assert parse('watch', 'N7:0').count is None
+    assert not parse('write', 'N7:0', '1').yes
+
+
+def test_negative_values_are_no_options() -> None:
+    assert parse('write', 'F8:0', '-1', '-2.5', '--yes').values == ['-1', '-2.5']
+
+
+def test_value_that_looks_like_an_option_goes_last() -> None:
+    options = parse('write', 'F8:2', '--yes', '--net', 'x', '--', '-1.5e3')
+    assert (options.values, options.yes, options.net) == (['-1.5e3'], True, 'x')
+
+
+def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
+    with pytest.raises(SystemExit):
+        parse(*args, '--help')
+    return ' '.join(capsys.readouterr().out.split())
+
+
+def test_help_tells_where_such_a_value_goes(capsys: pytest.CaptureFixture[str]) -> None:
+    text = help_of(capsys, 'write')
+    assert 'one such as -1.5e3 goes last, behind all options and --' in text
+    assert 'plc write F8:2 --yes --net net.csv -- -1.5e3' in text
+
+
+def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[str]) -> None:
+    text = help_of(capsys, 'detect')
+    assert text.count('(default: all are tried') == 3
+    assert 'to wait for each answer (default: 200)' in text
+    assert 'take port, parity and own station from this net CSV' in text
+    text = help_of(capsys, 'scan')
+    for default in (9600, 'CRC', 'half', 300):
+        assert f'(default: {default})' in text
+    assert 'take the line from this net CSV' in text
+
+
+def test_detect_waits_for_a_short_time_only() -> None:
+    assert parse('detect').timeout == '200'
+    assert parse('detect').stations == tuple(range(8))
+    assert parse('detect', '--timeout', '500').timeout == '500'
+    assert parse('scan', '1').timeout is None
+
+
+def test_lists_of_stations() -> None:
+    assert parse('scan', '0-3,9').stations == (0, 1, 2, 3, 9)
+
+
+@pytest.mark.parametrize('args', [
+    ('scan', ''), ('scan', '300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
+    ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
+    ('watch', 'N7:0', '--count', '1.5'), ('watch', 'N7:0', '--count', '\u0661'),
+    ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'), ('read',),
+    ('scan', '1', '--peer', '--duplex', 'half'), ('scan', '1', '--duplex', 'half', '--peer'),
+    ('write', 'N7:0'), ('fly',),
+    ('read', 'N7:0', '--type', 'int8')])
+def test_wrong(args: tuple[str, ...]) -> None:
+    with pytest.raises(SystemExit) as ending:
+        parse(*args)
+    assert ending.value.code == 2

@@ -1,0 +1,76 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who is there: what is shown of a station, and what to look at when there is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import threading
+
+from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.errors import FormatError, StationInactive
+from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.settings.network import Network
+import pytest
+from support.ptys import Pty
+
+IDENTITY = Identity(
+    'SLC', 'SLC 5/03', 'B', '3', Mode.REMOTE_PROGRAM, 'REM PROG', ('major error 0x0021',),
+    ('forces active',), 'CELL_3', 0x1A2B, '16 K')
+
+
+def test_everything_a_station_has_said() -> None:
+    presence = Presence(2, 0.0312, IDENTITY, None, True, True)
+    assert describe(presence) == [
+        'station 2: SLC 5/03 series B revision 3, REM PROG',
+        '  mode      REM PROG', '  faults    major error 0x0021', '  remarks   forces active',
+        '  name      CELL_3', '  program   0x1A2B', '  memory    16 K',
+        '  answered  after 31 ms']
+
+
+def test_station_that_does_not_say_what_it_is() -> None:
+    presence = Presence(2, 0.1, None, FormatError('too short'), True, True)
+    assert describe(presence) == ['station 2 answers, but not who it is: too short']
+
+
+@pytest.mark.parametrize('mode', ['Master', 'Peer'])
+def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
+    line = Pty(tmp_path / 'line')
+    network = Network(com_port=str(line.name), timeout=20, mode=mode)
+    with Session(network, absent=[1]) as session:
+        presence = look_at(session, 1)
+        assert isinstance(presence.error, StationInactive)
+        assert not presence.is_there
+        assert not presence.takes_commands
+        assert 'not one character came' in hint(session, presence.error)
+        line.write(b'\x55\xaa\x00')
+        presence = look_at(session, 1)
+        assert presence.error is not None
+        assert hint(session, presence.error).startswith('3 characters came, but no answer')
+        assert hint(session, FormatError('x')) == ''
+    line.close()
+
+
+def test_poll_that_is_answered_is_a_station_though_it_takes_no_command(tmp_path: Path) -> None:
+    line = Pty(tmp_path / 'line')
+    network = Network(com_port=str(line.name), timeout=50, nak_retries=0)
+    answer = threading.Thread(target=lambda: (line.read(4), line.write(b'\x10\x04')))
+    answer.start()
+    presence, = scan(network, [1])
+    answer.join()
+    line.close()
+    assert presence.is_there
+    assert not presence.takes_commands

@@ -1,0 +1,105 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Values live, against PLCs on a pseudo-terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import threading
+
+from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.values import Values
+import pytest
+from support.driver_bench import store
+from support.mappings import make_mapping
+from support.ros import Plcs, write_csv
+
+SPEED = make_mapping('N7:0', item=1)
+NAME = make_mapping('ST9:0', item=2)
+
+
+@pytest.fixture
+def plcs(tmp_path: Path) -> Iterator[Plcs]:
+    path = write_csv(tmp_path / 'simulator.csv', 'Station,PLC_Type,Address,Length,Values',
+                     ['1,PLC5,N7:0,4,', '1,PLC5,ST9:0,1,Tank'])
+    with Plcs(path) as line:
+        yield line
+
+
+def network_on(plcs: Plcs) -> Network:
+    return Network(com_port=plcs.port, baud=115200, timeout=100, nak_retries=0)
+
+
+class Counting(Watch):
+    """A watch that raises N7:0 by one after each read, and loses the line after some."""
+
+    def __init__(self, plcs: Plcs, reads: int = 1000) -> None:
+        super().__init__(network_on(plcs), [SPEED], 0.01)
+        self._plcs = plcs
+        self._left = reads
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        super().read(mapping, values)
+        store(self._plcs[1], 'N7:0', [values[0] + 1])
+        self._left -= 1
+        if self._left == 0:
+            threading.Thread(target=self._plcs.lose).start()
+
+
+def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """Return the lines without their times."""
+    return [line.partition('  ')[2] for line in capsys.readouterr().out.splitlines()]
+
+
+def test_every_change_is_shown_with_its_time(plcs: Plcs,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    assert Counting(plcs).run(5) == 0
+    lines = shown(capsys)
+    assert lines[:5] == [f'N7:0  [{number}]' for number in range(5)]
+
+
+def test_what_stays_is_shown_once(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+    assert Watch(network_on(plcs), [SPEED, NAME], 0.01).run(4) == 0
+    assert sorted(shown(capsys)) == ['N7:0  [0]', "ST9:0  'Tank'"]
+
+
+def test_control_characters_of_a_plc_do_not_reach_the_screen(
+        plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+    store(plcs[1], 'ST9:0', 'a\x1b[2J\x9b')
+    assert Watch(network_on(plcs), [NAME], 0.01).run(1) == 0
+    assert shown(capsys) == [r"ST9:0  'a\x1b[2J\x9b'"]
+
+
+def test_lost_line_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+    assert Counting(plcs, reads=3).run(4) == 1  # the loss counts like a read that fails
+    lines = shown(capsys)
+    assert lines[:3] == [f'N7:0  [{number}]' for number in range(3)]
+    assert lines[3].startswith('N7:0  no value: ')
+    assert len(lines) == 4
+
+
+def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+    plcs.say('silent 1')
+    assert Watch(network_on(plcs), [SPEED], 0.01).run(2) == 1
+    assert shown(capsys) == [
+        'N7:0  no value: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
+
+
+def test_port_that_is_not_there() -> None:
+    with pytest.raises(OSError):
+        Watch(Network(com_port='/nowhere/tty'), [SPEED], 0.1)

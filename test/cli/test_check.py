@@ -1,0 +1,205 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command ``check``: every error of both files, the plan, and the exit status."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+import shlex
+import subprocess
+import sys
+from typing import Any
+
+from abdf1_ros.cli.check import main
+from abdf1_ros.paths import config_file
+import pytest
+from support.ros import write_csv
+
+NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout'
+MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
+GOOD_NET = '5,Master,9600,500'
+GOOD_ROW = 'speed,Read,N7:0,1,PLC5,2,1000'
+BAD_ROWS = ('a,Read,N7,1,PLC5,,', 'b,Rad,N7:1,256,PLC5,,', 'c,Serve,N7:0,6,PLC5,,',
+            'a,Read,N7:9999,1,PLC5,,')
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    return tmp_path / 'net.csv', tmp_path / 'map.csv'
+
+
+def check(files: tuple[Path, Path], net: str, rows: tuple[str, ...], *options: str) -> int:
+    write_csv(files[0], NET_HEADER, [net])
+    write_csv(files[1], MAP_HEADER, rows)
+    return main([*map(str, files), *options])
+
+
+def parsed(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return content
+
+
+def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(files, GOOD_NET, (GOOD_ROW,)) == 0
+    out = capsys.readouterr().out
+    assert 'error' not in out.replace('no errors', '')
+    assert 'Mode Master, 9600 baud' in out
+    cells = next(line.split() for line in out.splitlines() if line.endswith('speed'))
+    # 53 characters of 10 bits at 9600 baud, and two answers of 10 ms.
+    assert cells == ['1', 'PLC5', 'N7:0', 'N7:1', '2', '4', '1', '55.2', '75.2', '1000.0', 'speed']
+    assert 'expected scan time: 75.2 ms' in out
+    assert 'load of the line: 8%' in out
+    assert out.endswith('no errors, no warnings\n')
+
+
+@pytest.mark.parametrize('prefix', ['', 'peer_'])
+def test_files_of_the_package_are_good(prefix: str, capsys: pytest.CaptureFixture[str]) -> None:
+    names = [str(config_file(f'{prefix}{kind}.csv')) for kind in ('net', 'map')]
+    assert main([*names, '--json']) == 0
+    content = parsed(capsys)
+    assert content['errors'] == []
+    assert {block['station'] for block in content['blocks']} <= {1, 2}
+    # They ask for more than the line gives, which the demo does not mind.
+    assert {warning['kind'] for warning in content['warnings']} <= {'load'}
+
+
+def test_every_error_of_both_files_at_once(files: tuple[Path, Path],
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(files, '5,Mastr,9601,100', BAD_ROWS) == 2
+    lines = capsys.readouterr().out.splitlines()
+    net, rows = (str(path) for path in files)
+    beginnings = [
+        f'error: {net}:2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: ',
+        f'error: {net}:2:4 (Cmd_Timeout): 2559 CRT_BAD_CMD_TIMEOUT: ',
+        f'error: {net}:2:3 (Baud): Baud = "9601" should be one of 1200, ',
+        f'error: {rows}:2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, ',
+        f'error: {rows}:3:2 (Command): Item: 2, Command = "Rad" should be one of Read, ',
+        f'error: {rows}:3:4 (Station): 2501 ERR_BAD_STATION: Item: 2, ',
+        f'error: {rows}:5:3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 4, ']
+    for beginning, line in zip(beginnings, lines[:7], strict=True):
+        assert line.startswith(beginning)
+    assert lines[7:] == ['no plan without a good net file']
+
+
+def test_plan_of_the_good_rows(files: tuple[Path, Path],
+                               capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(files, GOOD_NET, (GOOD_ROW, *BAD_ROWS)) == 2
+    out = capsys.readouterr().out
+    assert f'error: {files[1]}:5: Item: 4, a Serve row has our own Station, which is 5' in out
+    assert 'the plan is that of the rows without errors' in out
+    assert '1 mapping is read with 1 block' in out
+
+
+def test_json_of_errors(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(files, '5,Mastr,9600,500', BAD_ROWS[:1], '--json') == 2
+    content = parsed(capsys)
+    mode, address = content['errors']
+    assert mode['file'] == str(files[0])
+    assert (mode['line'], mode['cell'], mode['column']) == (2, 2, 'Mode')
+    assert (mode['number'], mode['mnemonic']) == (2553, 'CRT_BAD_DRIVER_MODE')
+    assert (address['file'], address['number']) == (str(files[1]), 2503)
+    assert 'as in N7:0' in address['text']
+    assert content['network'] is content['load'] is content['scan_time_ms'] is None
+    assert content['blocks'] == content['warnings'] == []
+
+
+def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    rows = (GOOD_ROW, 'fast,Read,F8:0,5,SLC,,50')
+    assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0
+    content = parsed(capsys)
+    assert list(content) == [
+        'errors', 'warnings', 'network', 'mappings', 'blocks', 'scan_time_ms', 'load',
+        'needed_baud', 'response_time_ms']
+    assert content['blocks'][1]['last'] == 'F8:0'
+    assert content['blocks'][0] == {
+        'station': 1, 'plc_type': 'PLC5', 'first': 'N7:0', 'last': 'N7:1', 'words': 2,
+        'bytes': 4, 'packets': 1, 'line_ms': 55.208, 'total_ms': 95.208, 'period_ms': 1000.0,
+        'tags': ['speed']}
+    assert content['network']['baud'] == 9600
+    assert {warning['kind'] for warning in content['warnings']} == {'station', 'load', 'period'}
+    # One float of an SLC is 4 bytes as two words are: 45 characters, and 40 ms.
+    assert content['scan_time_ms'] == pytest.approx(95.208 + 86.875, abs=0.01)
+    assert content['load'] == pytest.approx(0.0952 + 1.7375, abs=0.001)
+    assert content['needed_baud'] == 115200
+
+
+def test_many_tags_of_a_block(files: tuple[Path, Path],
+                              capsys: pytest.CaptureFixture[str]) -> None:
+    rows = tuple(f't{number},Read,N7:{number},1,PLC5,,1000' for number in range(10))
+    assert check(files, GOOD_NET, rows) == 0
+    assert 't6, t7 and 2 more\n' in capsys.readouterr().out
+    assert check(files, GOOD_NET, rows, '--json') == 0
+    assert parsed(capsys)['blocks'][0]['tags'] == [f't{number}' for number in range(10)]
+
+
+def test_default_period(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    row = GOOD_ROW.removesuffix('1000')
+    check(files, GOOD_NET, (row,), '--json')
+    assert parsed(capsys)['blocks'][0]['period_ms'] == 100
+    check(files, GOOD_NET, (row,), '--json', '--default-period', '2000')
+    assert parsed(capsys)['blocks'][0]['period_ms'] == 2000
+
+
+def test_missing_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / 'a.csv'), str(tmp_path / 'b.csv')]) == 2
+    out = capsys.readouterr().out
+    assert 'a.csv: cannot be read' in out
+    assert 'b.csv: cannot be read' in out
+
+
+def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    row = '"a\x1b[2J\u2028error: x",Read,N7:0,5,PLC5,2,10'
+    assert check(files, GOOD_NET, (row,)) == 0
+    out = capsys.readouterr().out
+    assert '\x1b' not in out
+    assert '\u2028' not in out
+
+
+@pytest.mark.parametrize('option', ['--default-period', '--response-time'])
+@pytest.mark.parametrize('text', ['x', '-1', 'nan', '1e12', '1_0', '\u0661'])
+def test_bad_time(option: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ending:
+        main(['net.csv', 'map.csv', f'{option}={text}'])
+    assert ending.value.code == 2
+    assert f'"{text}" should be ms from 0 to 86400000' in capsys.readouterr().err
+
+
+def test_output_that_cannot_take_it_is_no_traceback(files: tuple[Path, Path]) -> None:
+    write_csv(files[0], NET_HEADER, ['5,Master,9600,500'])
+    write_csv(files[1], MAP_HEADER, [GOOD_ROW])
+    command = shlex.join([sys.executable, '-m', 'abdf1_ros', 'check', *map(str, files)])
+    closed = subprocess.run(f'{command} >&-', shell=True, text=True, capture_output=True,
+                            timeout=30, check=False)
+    assert (closed.returncode, closed.stderr) == (0, '')
+    full = subprocess.run(f'{command} >/dev/full', shell=True, text=True, capture_output=True,
+                          timeout=30, check=False)
+    assert (full.returncode, full.stderr) == (
+        2, 'check: cannot print: No space left on device\n')
+
+
+def test_process_needs_no_ros_and_tells_its_statuses(files: tuple[Path, Path]) -> None:
+    write_csv(files[0], NET_HEADER, ['5,Mastr,9600,500'])
+    write_csv(files[1], MAP_HEADER, [GOOD_ROW])
+    program = ('import sys; sys.modules["rclpy"] = None; '
+               'from abdf1_ros.cli.check import main; sys.exit(main())')
+    bad = subprocess.run([sys.executable, '-c', program, *map(str, files)], text=True,
+                         capture_output=True, timeout=30, check=False)
+    assert (bad.returncode, bad.stderr) == (2, '')
+    usage = subprocess.run([sys.executable, '-m', 'abdf1_ros', 'check', '--help'], text=True,
+                           capture_output=True, timeout=30, check=True)
+    assert 'exit status: 0' in usage.stdout
+    assert 'examples:' in usage.stdout

@@ -1,0 +1,78 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Signals that come while an executable still imports: a real process that is held there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+import pytest
+
+# Each with a module that it imports, and its status when it is interrupted.
+NAMES = {'node': ('rclpy', 0), 'monitor': ('rclpy', 0), 'demo': ('rclpy', 0),
+         'simulator': ('serial', 0), 'sniff': ('serial', 0), 'check': ('difflib', 130),
+         'plc': ('serial', 130)}
+
+# Stands in for a slow import: it says that it has begun, and does not end by itself soon.
+SLOW = "import select\nprint('importing', flush=True)\nselect.select([], [], [], 30)\n"
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('name', NAMES)
+def test_signal_during_the_imports_ends_quietly(
+        tmp_path: Path, name: str, number: signal.Signals) -> None:
+    slow, status = NAMES[name]
+    (tmp_path / f'{slow}.py').write_text(SLOW)
+    call = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+    with subprocess.Popen(
+            [sys.executable, '-c', call], text=True, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, env=os.environ | {'PYTHONPATH': str(tmp_path)}) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'importing\n'
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=10)
+    assert (process.returncode, output, errors) == (status, '', '')
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_signals_are_as_they_were_when_main_begins(tmp_path: Path, name: str) -> None:
+    (tmp_path / 'fake.py').write_text(
+        'import signal, sys, types\n'
+        'handlers = lambda: [*map(signal.getsignal, (signal.SIGINT, signal.SIGTERM))]\n'
+        'before = handlers()\n'
+        f'module = sys.modules["abdf1_ros.{name}"] = types.ModuleType("fake")\n'
+        'module.main = lambda: handlers() == before\n'
+        f'from abdf1_ros.cli.main import {name}\n'
+        f'print({name}())\n')
+    result = subprocess.run([sys.executable, tmp_path / 'fake.py'], capture_output=True,
+                            text=True, timeout=10, check=True)
+    assert result.stdout == 'True\n'
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
+    slow, _ = NAMES[name]
+    (tmp_path / f'{slow}.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n")
+    call = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+    result = subprocess.run([sys.executable, '-c', call], capture_output=True, text=True,
+                            timeout=10, check=False,
+                            env=os.environ | {'PYTHONPATH': str(tmp_path)})
+    assert result.returncode == 2
+    assert result.stderr == ('-c: the Python module rclpy is missing; is ROS 2 sourced, as by '
+                             '". /opt/ros/jazzy/setup.bash"?\n')

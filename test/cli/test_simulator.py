@@ -1,0 +1,397 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator as a process on a pseudo-terminal and on TCP, and its options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+import select
+import signal
+import socket
+import subprocess
+import sys
+import termios
+
+from abdf1_ros.cli.simulator import main
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+import pytest
+from support.commands import call
+from support.ptys import PATIENCE, read_exactly
+
+DATA = """\
+Station,PLC_Type,Address,Length,Values,Motion,Period
+1,PLC5,N7:0,10,4660 -2,,
+2,SLC,N7:0,10,4660 -2,,
+"""
+# Header and, with its FNC, what follows; then the reply to it.
+PLC5_READ = '01 05 0f 00 10 02 68 00 00 02 00 07 00 07 00 02 00'
+PLC5_REPLY = '05 01 4f 00 10 02 95 09 42 34 12 fe ff'
+SLC_READ = '02 05 0f 00 10 02 a2 04 07 89 00 00'
+SLC_REPLY = '05 02 4f 00 10 02 34 12 fe ff'
+CASES = [(1, PLC5_READ, PLC5_REPLY), (2, SLC_READ, SLC_REPLY)]
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    path = tmp_path / 'data.csv'
+    path.write_text(DATA, encoding='utf-8')
+    return path
+
+
+class Simulator:
+    """The simulator as a process."""
+
+    def __init__(self, *options: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'simulator', *options], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self._rest = b''
+
+    def line(self) -> str:
+        """Return the next line that it prints."""
+        assert self._process.stdout is not None
+        while b'\n' not in self._rest:
+            ready = select.select([self._process.stdout], [], [], PATIENCE)[0]
+            data = os.read(self._process.stdout.fileno(), 4096) if ready else b''
+            assert data, 'it prints nothing more'
+            self._rest += data
+        line, self._rest = self._rest.split(b'\n', 1)
+        return line.decode()
+
+    def type(self, text: str) -> None:
+        """Give it lines on standard input."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(text.encode())
+        self._process.stdin.flush()
+
+    def close_input(self) -> None:
+        """End its standard input."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    def close_output(self) -> None:
+        """Read nothing more of what it prints."""
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def end(self) -> tuple[int, str]:
+        """Return exit status and standard error at its end."""
+        assert self._process.stderr is not None
+        status = self._process.wait(PATIENCE)
+        return status, self._process.stderr.read().decode()
+
+    def clean_up(self) -> None:
+        """Leave nothing behind."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait(PATIENCE)
+        for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
+            assert stream is not None
+            stream.close()
+
+
+Start = Callable[..., Simulator]
+
+
+@pytest.fixture
+def start(data: Path) -> Iterator[Start]:
+    """Start simulators that end with the test."""
+    running: list[Simulator] = []
+
+    def starter(*options: str) -> Simulator:
+        running.append(Simulator('--data', str(data), *options))
+        return running[-1]
+
+    yield starter
+    for simulator in running:
+        simulator.clean_up()
+
+
+def _converse(descriptor: int, checksum: Checksum, tns: str = '10 02') -> None:
+    """Carry out a transaction with each station, byte by byte."""
+    for station, *messages in CASES:
+        command, reply = (text.replace('10 02', tns) for text in messages)
+        os.write(descriptor, frames.master_frame(station, bytes.fromhex(command), checksum))
+        assert read_exactly(descriptor, 2) == b'\x10\x06'
+        os.write(descriptor, frames.poll_frame(station))
+        expected = frames.message_frame(bytes.fromhex(reply), checksum)
+        assert read_exactly(descriptor, len(expected)) == expected
+        os.write(descriptor, b'\x10\x06')
+        os.write(descriptor, frames.poll_frame(station))
+        assert read_exactly(descriptor, 2) == b'\x10\x04'
+
+
+@pytest.fixture
+def descriptor() -> Iterator[Callable[[Path], int]]:
+    opened: list[int] = []
+
+    def opener(path: Path) -> int:
+        opened.append(os.open(path, os.O_RDWR | os.O_NOCTTY))
+        return opened[-1]
+
+    yield opener
+    for number in opened:
+        os.close(number)
+
+
+@pytest.mark.parametrize('check', list(Checksum))
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+def test_on_a_pty_until_a_signal(
+        start: Start, tmp_path: Path, descriptor: Callable[[Path], int], check: Checksum,
+        number: signal.Signals) -> None:
+    name = tmp_path / 'plc'
+    simulator = start('--pty', str(name), '--check', check.value)
+    assert simulator.line() == \
+        f'simulator: stations 1 (PLC5), 2 (SLC) on {name}, {check.value}'
+    line = descriptor(name)
+    assert not termios.tcgetattr(line)[3] & termios.ECHO
+    _converse(line, check)
+    simulator.signal(number)
+    assert simulator.end() == (0, '')
+    assert not name.is_symlink()
+
+
+@pytest.mark.parametrize('address', ['127.0.0.1:0', ':0'])
+def test_on_tcp_until_quit_one_client_after_the_other(start: Start, address: str) -> None:
+    simulator = start('--tcp', address)
+    where = simulator.line().removesuffix(', CRC').rpartition(':')[2]
+    for tns in ('10 02', '11 02'):
+        with socket.create_connection(('127.0.0.1', int(where)), PATIENCE) as client:
+            _converse(client.fileno(), Checksum.CRC, tns)
+    simulator.type('quit\n')
+    assert simulator.end() == (0, '')
+
+
+def test_end_after_seconds_with_its_input_closed(start: Start) -> None:
+    simulator = start('--seconds', '0.2')
+    simulator.close_input()
+    assert simulator.line().startswith('simulator: stations 1 (PLC5), 2 (SLC) on /dev/pts/')
+    assert simulator.end() == (0, '')
+
+
+def test_commands_on_input_several_at_once(
+        start: Start, tmp_path: Path, descriptor: Callable[[Path], int]) -> None:
+    simulator = start('--pty', str(tmp_path / 'plc'))
+    simulator.line()
+    simulator.type('error 2 50\n\nhush 1\nsilent 1\n')
+    assert simulator.line() == 'simulator: station 2: error 50'
+    assert simulator.line() == 'simulator: "hush 1" is no command'
+    while simulator.line() != 'simulator: station 1: silent':
+        pass
+    line = descriptor(tmp_path / 'plc')
+    for station, command, _ in CASES:
+        os.write(line, frames.master_frame(station, bytes.fromhex(command), Checksum.CRC))
+    assert read_exactly(line, 2) == b'\x10\x06'  # of station 2 only
+    os.write(line, frames.poll_frame(1) + frames.poll_frame(2))
+    reply = frames.message_frame(bytes.fromhex('05 02 4f 50 10 02'), Checksum.CRC)
+    assert read_exactly(line, len(reply)) == reply
+    simulator.type('normal 2\nqu')
+    simulator.type('it\n')
+    assert simulator.end() == (0, '')
+
+
+def test_last_command_without_line_end(start: Start) -> None:
+    simulator = start()
+    simulator.line()
+    simulator.type('silent 1\nquit')
+    simulator.close_input()
+    assert simulator.line() == 'simulator: station 1: silent'
+    assert simulator.end() == (0, '')
+
+
+def test_commands_by_the_clock(start: Start) -> None:
+    simulator = start('--at', '0.2 quit', '--at', '0.1 slow 1 2', '--at', '0 silent 2')
+    lines = [simulator.line() for _ in range(3)]
+    assert lines[1:] == ['simulator: station 2: silent', 'simulator: station 1: slow 2']
+    assert simulator.end() == (0, '')
+
+
+def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2) -> str:
+    said = call(main, capsys, *options)
+    assert (said.status, said.out) == (status, '')
+    assert said.err.startswith('simulator: ')
+    return said.err
+
+
+def test_commands_of_one_time_keep_their_order(start: Start) -> None:
+    simulator = start('--at', '0.1 quit', '--at', '0 slow 1 2', '--at', '0 delay 1 5')
+    lines = [simulator.line() for _ in range(3)]
+    assert lines[1:] == ['simulator: station 1: slow 2', 'simulator: station 1: delay 5']
+    assert simulator.end() == (0, '')
+
+
+@pytest.mark.parametrize('at', [
+    'soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1', 'inf silent 1',
+    '1_0 silent 1', '\u0661 silent 1', '5', '5 '])
+def test_bad_time(capsys: pytest.CaptureFixture[str], data: Path, at: str) -> None:
+    assert _refused(capsys, '--data', str(data), '--at', at) == \
+        f'simulator: --at "{at}" should be seconds from 0 and a command, as in "5 silent 1"\n'
+
+
+@pytest.mark.parametrize('command, text', [
+    ('hush 1', '--at: "hush 1" is no command'), ('silent 3', '--at: name a station (1, 2)'),
+    ('msg 1 N7:0 5', '--at: "msg 1 N7:0 5" is no command'),
+    ('slow 1 x', '--at: slow 1 x: "x" should be')])
+def test_command_for_later_is_looked_at_before(
+        capsys: pytest.CaptureFixture[str], data: Path, command: str, text: str) -> None:
+    assert text in _refused(capsys, '--data', str(data), '--at', f'5 {command}')
+
+
+def test_bad_data_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text(DATA + '3,PLC7,N7:0,,,,\n3,SLC,Q7:0,,,,\n', encoding='utf-8')
+    assert _refused(capsys, '--data', str(path)).splitlines() == [
+        f'simulator: {path}:4:2 (PLC_Type): PLC_Type = "PLC7" should be one of PLC2, PLC3, PLC5, '
+        'SLC',
+        f'{path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, N, F, ST, '
+        'A, D, L, PD, MG']
+
+
+def test_missing_data_file(capsys: pytest.CaptureFixture[str]) -> None:
+    assert _refused(capsys, '--data', '/nowhere') == \
+        'simulator: /nowhere: cannot be read: No such file or directory\n'
+
+
+def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        where = f'127.0.0.1:{server.getsockname()[1]}'
+        said = _refused(capsys, '--data', str(data), '--tcp', where, status=1)
+    assert said.startswith(f'simulator: --tcp "{where}": Address already in use')
+
+
+@pytest.mark.parametrize('where', [
+    '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80'])
+def test_bad_tcp_port(capsys: pytest.CaptureFixture[str], data: Path, where: str) -> None:
+    assert _refused(capsys, '--data', str(data), '--tcp', where) == \
+        f'simulator: --tcp "{where}" should be HOST:PORT\n'
+
+
+def test_name_of_a_pty_that_is_a_file_already(
+        capsys: pytest.CaptureFixture[str], data: Path) -> None:
+    assert _refused(capsys, '--data', str(data), '--pty', str(data), status=1) == (
+        f'simulator: {data} is there already, and no link that a simulator has left; give another '
+        'name\n')
+    assert data.read_text(encoding='utf-8') == DATA
+
+
+def test_link_of_somebody_else_is_left_alone(
+        capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path) -> None:
+    name = tmp_path / 'adapter'
+    name.symlink_to('/dev/ttyUSB0')
+    assert 'is there already' in _refused(
+        capsys, '--data', str(data), '--pty', str(name), status=1)
+    assert os.readlink(name) == '/dev/ttyUSB0'
+
+
+def test_two_simulators_do_not_share_a_name(
+        capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
+    name = tmp_path / 'plc'
+    simulator = start('--pty', str(name))
+    simulator.line()
+    before = os.readlink(name)
+    assert _refused(capsys, '--data', str(data), '--pty', str(name), status=1) == \
+        f'simulator: {name} is in use by another simulator or sniff\n'
+    assert os.readlink(name) == before
+    simulator.signal(signal.SIGKILL)
+    simulator.end()
+    assert os.path.lexists(name)
+    again = start('--pty', str(name))
+    assert again.line().startswith('simulator: stations')
+    assert 'is in use' in _refused(capsys, '--data', str(data), '--pty', str(name), status=1)
+    again.signal(signal.SIGTERM)
+    assert again.end() == (0, '')
+    assert not os.path.lexists(name)
+
+
+def test_folder_of_a_pty_that_is_missing(
+        capsys: pytest.CaptureFixture[str], data: Path) -> None:
+    assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc', status=1) == \
+        'simulator: /nowhere/plc cannot be made: No such file or directory\n'
+
+
+@pytest.mark.parametrize('name', ['/nowhere/tty', '/dev/null', 'socket://127.0.0.1:1'])
+def test_port_that_is_not_there_is_an_error_at_once(
+        capsys: pytest.CaptureFixture[str], data: Path, name: str) -> None:
+    said = call(main, capsys, '--data', str(data), '--port', name)
+    assert (said.status, said.out) == (1, '')
+    assert said.err.startswith('simulator: ')
+    assert name in said.err
+
+
+@pytest.mark.parametrize('option', [
+    '--check=XOR', '--baud=9601', '--baud=9_600', '--seconds=x', '--seconds=-1', '--what',
+    '--pty=', '--port='])
+def test_bad_option(capsys: pytest.CaptureFixture[str], option: str) -> None:
+    said = call(main, capsys, option)
+    assert said.status == 2
+    assert said.err.startswith('usage: simulator')
+
+
+def test_help(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(['--help'])
+    assert caught.value.code == 0
+    text = capsys.readouterr().out
+    assert all(word in text for word in (
+        '--pty', '--tcp', '--port', '--data', '--check', '--at', '--seconds', 'silent STATION'))
+
+
+def test_bad_data_file_of_the_process(start: Start, data: Path) -> None:
+    data.write_text('Station,PLC_Typ\n', encoding='utf-8')
+    status, text = start().end()
+    assert status == 2
+    assert text == f'simulator: {data}:1:2: unknown column "PLC_Typ"; did you mean PLC_Type?\n'
+
+
+def _awaken(descriptor: int) -> None:
+    """Poll until there is an answer: pyserial throws away what comes before it is ready."""
+    while not select.select([descriptor], [], [], 0.2)[0]:
+        os.write(descriptor, frames.poll_frame(1))
+    os.write(descriptor, frames.master_frame(1, bytes.fromhex(PLC5_READ), Checksum.CRC))
+    while read_exactly(descriptor, 2) == frames.EOT:
+        pass  # the answer to another poll; at last comes the ACK
+    os.write(descriptor, frames.poll_frame(1))
+    expected = frames.message_frame(bytes.fromhex(PLC5_REPLY), Checksum.CRC)
+    assert read_exactly(descriptor, len(expected)) == expected
+    os.write(descriptor, frames.ACK)
+
+
+def test_on_a_port_that_pyserial_opens(start: Start) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        server.settimeout(PATIENCE)
+        name = f'socket://127.0.0.1:{server.getsockname()[1]}'
+        simulator = start('--port', name, '--baud', '115200')
+        assert simulator.line() == f'simulator: stations 1 (PLC5), 2 (SLC) on {name}, CRC'
+        client, _ = server.accept()
+        with client:
+            _awaken(client.fileno())
+            _converse(client.fileno(), Checksum.CRC, '11 02')
+        simulator.signal(signal.SIGTERM)
+        assert simulator.end() == (0, '')
+
+
+def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(start: Start) -> None:
+    simulator = start()
+    simulator.line()
+    simulator.close_output()
+    simulator.type('silent 1\nnormal 1\nquit\n')
+    assert simulator.end() == (0, '')

@@ -1,0 +1,362 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command: files, a tap between the simulator and a master, and what it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+import os
+from pathlib import Path
+import re
+import resource
+import signal
+import subprocess
+import sys
+from typing import Any
+
+from abdf1_ros.cli import sniff
+from abdf1_ros.cli.sniff import main
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.ports.endpoints import PtyLine
+import pytest
+from support.ptys import PATIENCE, Pty, read_exactly
+
+COMMAND = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
+REPLY = COMMAND.reply(bytes.fromhex('34 12 FE FF'))
+SAID = (frames.master_frame(2, COMMAND.encode(), Checksum.CRC), frames.ACK,
+        frames.poll_frame(2), frames.message_frame(REPLY.encode(), Checksum.CRC), frames.ACK)
+WAYS = '><><>'
+LINES = [
+    '     0.000000 >   2 command  5 to 2, TNS 1234: protected typed logical read N7:0, 2 words '
+    '| CRC good',
+    '     0.010000 <   2 ACK',
+    '     0.020000 >   2 poll     BCC good',
+    '     0.030000 <   2 reply    2 to 5, TNS 1234: 4660 -2 | CRC good | 30.0 ms',
+    '     0.040000 >   2 ACK']
+
+
+@pytest.fixture(autouse=True)
+def _signal_handlers() -> Iterator[None]:
+    """Give the handlers back that ``main`` has replaced."""
+    numbers = signal.SIGINT, signal.SIGTERM
+    handlers = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, handlers):
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> str:
+    path = tmp_path / 'line.cap'
+    lines = ['# abdf1_ros capture 1', '# baud: 9600', '# check: CRC', '# duplex: half']
+    lines += [f'{count / 100:.6f} {way} {data.hex(" ")}'
+              for count, (way, data) in enumerate(zip(WAYS, SAID))]
+    path.write_text('\n'.join([*lines, '']), encoding='ascii')
+    return str(path)
+
+
+Output = pytest.CaptureFixture[str]
+
+
+def lines_of(capsys: Output, *args: str) -> list[str]:
+    assert main(args) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def refused(capsys: Output, *args: str) -> str:
+    assert main(args) == 2
+    return capsys.readouterr().err
+
+
+def test_capture(capsys: Output, capture: str) -> None:
+    lines = lines_of(capsys, capture)
+    assert lines[:5] == LINES
+    assert lines[5].startswith('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC')
+    assert lines[6] == '  seen: 1 commands, 1 replies, 1 polls, 2 ACK'
+    assert lines[7] == '  faults: none'
+
+
+def test_hex_and_binary_files_say_the_same_without_times(
+        capsys: Output, tmp_path: Path) -> None:
+    expected = [re.sub(r'^ +[0-9.]+| \| [0-9.]+ ms', '', line) for line in LINES]
+    (tmp_path / 'bin').write_bytes(b''.join(SAID))
+    (tmp_path / 'hex').write_text(b''.join(SAID).hex(' '), encoding='ascii')
+    for args in (('--binary', str(tmp_path / 'bin')), (str(tmp_path / 'hex'),)):
+        assert [re.sub(r'^ +-', '', line) for line in lines_of(capsys, *args)[:5]] == expected
+
+
+def test_json_has_one_object_a_line_and_the_summary_last(capsys: Output, capture: str) -> None:
+    objects = [json.loads(line) for line in lines_of(capsys, '--json', capture)]
+    assert [entry['kind'] for entry in objects] == [
+        'command', 'ACK', 'poll', 'reply', 'ACK', 'summary']
+    assert objects[3]['latency_ms'] == 30.0
+    assert objects[5]['counts'] == {'poll': 1, 'command': 1, 'reply': 1, 'ACK': 2}
+
+
+def test_summary_alone(capsys: Output, capture: str) -> None:
+    head, *_ = lines_of(capsys, '--summary', '--baud', '19200', capture)
+    assert head == ('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC, '
+                    'line load 58.6% at 19200 baud')
+
+
+def test_files_one_after_the_other(capsys: Output, capture: str) -> None:
+    assert lines_of(capsys, '--summary', capture, capture)[1] == \
+        '  seen: 2 commands, 2 replies, 2 polls, 4 ACK'
+
+
+def test_options_win_over_the_head_of_a_capture(capsys: Output, capture: str) -> None:
+    assert 'BCC BAD' in lines_of(capsys, '--check', 'bcc', capture)[0]
+    assert 'full duplex' in lines_of(capsys, '--summary', '--duplex', 'FULL', capture)[0]
+
+
+def test_bad_line_ends_with_file_and_line_and_the_summary_so_far(
+        capsys: Output, capture: str) -> None:
+    with open(capture, 'a', encoding='ascii') as file:
+        file.write('0.05 > 1\x1b\n')
+    assert main([capture]) == 2
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[:5] == LINES
+    assert 'summary: ' in captured.out
+    assert captured.err == (
+        f'sniff: {capture}:10: "0.05 > 1\\x1b" should be seconds, ">", "<" or "?", and bytes, '
+        'as in 0.004210 < 10 04\n')
+
+
+@pytest.mark.parametrize('options, status, err, ends_with_summary', [
+    ([], 2, 'sniff: /dev/zero:1: this is no text; for a file of raw bytes give --binary\n', False),
+    (['--binary', '--seconds', '1'], 0, '', True)])
+def test_endless_file_does_not_fill_the_memory(
+        options: list[str], status: int, err: str, ends_with_summary: bool) -> None:
+    limit = 400_000_000
+    said = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros', 'sniff', *options, '/dev/zero'], text=True,
+        capture_output=True, timeout=PATIENCE, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+    assert (said.returncode, said.stderr) == (status, err)
+    assert ('summary: ' in said.stdout) is ends_with_summary
+
+
+def test_progress_has_a_percentage_where_the_size_is_known(
+        capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sniff, '_PROGRESS_PERIOD', 0.0)
+    monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
+    assert main(['--summary', capture]) == 0
+    assert capsys.readouterr().err.splitlines()[-1] == \
+        f'sniff: {capture}: 100 %, 45 bytes so far'
+    assert main(['--summary', '--binary', '--seconds', '0.1', '/dev/zero']) == 0
+    assert re.match('sniff: /dev/zero, [0-9]+ bytes so far\n', capsys.readouterr().err)
+
+
+def test_file_that_cannot_be_read_is_an_error_without_an_empty_summary(
+        capsys: Output, tmp_path: Path, capture: str) -> None:
+    none = tmp_path / 'none'
+    for path, reason in ((none, 'No such file or directory'), (tmp_path, 'Is a directory')):
+        assert main([str(path)]) == 1
+        assert capsys.readouterr() == ('', f'sniff: {path}: cannot be read: {reason}\n')
+    assert main([capture, str(none)]) == 1
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[:5] == LINES
+    assert 'summary: 0.0 s, 45 bytes' in captured.out
+    assert captured.err.startswith(f'sniff: {none}: cannot be read: ')
+
+
+@pytest.mark.parametrize('text', ['', '# abdf1_ros capture 1\n# baud: 9600\n', '# a remark\n'])
+def test_file_without_bytes_is_told(capsys: Output, tmp_path: Path, text: str) -> None:
+    path = tmp_path / 'empty'
+    path.write_text(text, encoding='ascii')
+    assert main([str(path)]) == 0
+    assert capsys.readouterr().err == f'sniff: {path}: there are no bytes in it\n'
+
+
+def test_end_of_the_time_is_no_empty_file(capsys: Output, capture: str) -> None:
+    assert main(['--seconds', '1e-9', capture, capture]) == 0
+    captured = capsys.readouterr()
+    assert (captured.out.splitlines()[0], captured.err) == ('summary: 0 bytes', '')
+
+
+@pytest.mark.parametrize('baud', ['9' * 5000, '-9600', '\\u0661', '0', 'fast'])
+def test_speed_in_a_capture_that_is_none(capsys: Output, tmp_path: Path, baud: str) -> None:
+    path = tmp_path / 'line.cap'
+    path.write_text(f'# abdf1_ros capture 1\n# baud: {baud}\n0.0 > 10 05\n1.0 > 10 05\n',
+                    encoding='ascii')
+    assert not any('load' in line for line in lines_of(capsys, str(path)))
+
+
+def test_missing_ports(capsys: Output, tmp_path: Path) -> None:
+    none = tmp_path / 'none'
+    assert f'sniff: {none}: ' in refused(capsys, '--port', str(none))
+    assert f'sniff: {none}: ' in refused(capsys, '--tap', 'pty', str(none))
+    assert refused(capsys, '--port', 'pty', '--save', '/nowhere/x').endswith(
+        'sniff: /nowhere/x: No such file or directory\n')
+    assert 'is no capture; give another name' in refused(
+        capsys, '--port', 'pty', '--save', str(tmp_path))
+
+
+@pytest.mark.parametrize('args', [
+    [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
+    ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
+    ['x', '--check', 'md5'], ['x', '--baud', '7'],
+    ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
+def test_bad_options(capsys: Output, args: list[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(args)
+    assert caught.value.code == 2
+    assert 'sniff: error: ' in capsys.readouterr().err
+
+
+def test_help_has_examples_and_exit_status(capsys: Output) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(['--help'])
+    assert caught.value.code == 0
+    text = capsys.readouterr().out
+    assert 'examples:' in text
+    assert 'exit status: 0' in text
+
+
+class Command:
+    """A module of the package as a process; lines of its output are read as they come."""
+
+    def __init__(self, module: str, *args: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', f'abdf1_ros.{module}', *args], text=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+    def __enter__(self) -> Command:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def line(self, stream: Any) -> str:
+        """Return the next line of a stream of it."""
+        return str(stream.readline()).rstrip('\n')
+
+    def end(self, number: signal.Signals = signal.SIGINT) -> tuple[int, str, str]:
+        """End it; return exit status and what it has said besides."""
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=PATIENCE)
+        return self.process.returncode, out, err
+
+
+def test_tap_between_the_simulator_and_a_master(tmp_path: Path) -> None:
+    plc, tap, saved = (str(tmp_path / name) for name in ('plc', 'tap', 'saved'))
+    with Command('simulator', '--pty', plc) as simulator:
+        assert simulator.line(simulator.process.stdout).startswith('simulator: stations')
+        with Command('sniff', '--tap', f'pty:{tap}', plc, '--save', saved) as sniff:
+            assert sniff.line(sniff.process.stderr) == \
+                f'sniff: listening on {tap} and {plc}; Ctrl-C ends'
+            line = os.open(tap, os.O_RDWR | os.O_NOCTTY)
+            os.write(line, SAID[0])
+            assert read_exactly(line, 2) == frames.ACK
+            os.write(line, SAID[2])
+            reply = frames.message_frame(COMMAND.reply(bytes(4)).encode(), Checksum.CRC)
+            heard = read_exactly(line, len(reply))
+            os.write(line, frames.ACK)
+            live = [sniff.line(sniff.process.stdout) for _ in range(5)]
+            os.close(line)
+            status, out, err = sniff.end()
+    assert [entry.split()[1:4] for entry in live] == [
+        ['>', '2', 'command'], ['<', '2', 'ACK'], ['>', '2', 'poll'], ['<', '2', 'reply'],
+        ['>', '2', 'ACK']]
+    assert heard[:2] == frames.STX
+    assert (status, err) == (0, '')
+    assert '  seen: 1 commands, 1 replies, 1 polls, 2 ACK' in out
+    assert not os.path.lexists(tap)
+    again = subprocess.run([sys.executable, '-m', 'abdf1_ros', 'sniff', saved], text=True,
+                           capture_output=True, timeout=PATIENCE, check=True)
+    assert again.stdout.splitlines()[:5] == live
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_port_until_a_signal(tmp_path: Path, number: signal.Signals) -> None:
+    pty = Pty(tmp_path / 'line')
+    with Command('sniff', '--port', str(pty.name), '--json') as sniff:
+        sniff.line(sniff.process.stderr)
+        pty.write(b''.join(SAID))
+        kinds = [json.loads(sniff.line(sniff.process.stdout))['kind'] for _ in range(5)]
+        status, out, err = sniff.end(number)
+    pty.close()
+    assert kinds == ['command', 'ACK', 'poll', 'reply', 'ACK']
+    assert (status, err) == (0, '')
+    assert json.loads(out)['kind'] == 'summary'
+
+
+def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
+    name = tmp_path / 'pipe'
+    os.mkfifo(name)
+    with Command('sniff', str(name)) as sniff:
+        writer = os.open(name, os.O_WRONLY)  # waits until it is opened there
+        status, out, err = sniff.end()
+        os.close(writer)
+    assert (status, err) == (0, '')
+    assert out.startswith('summary: 0 bytes')
+
+
+def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
+    pty = Pty(tmp_path / 'line')
+    with Command('sniff', '--port', str(pty.name)) as sniff:
+        sniff.line(sniff.process.stderr)
+        pty.close()
+        out, err = sniff.process.communicate(timeout=PATIENCE)
+    assert sniff.process.returncode == 1
+    assert err.startswith('sniff: a port was lost: ')
+    assert out.startswith('summary: ')
+
+
+def test_reader_that_has_seen_enough(capture: str) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    result = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros', 'sniff', capture], stdout=writer,
+        stderr=subprocess.PIPE, timeout=PATIENCE, check=False)
+    os.close(writer)
+    assert (result.returncode, result.stderr) == (0, b'')
+
+
+def test_colour_is_for_terminals_only(capture: str) -> None:
+    line = PtyLine(None)
+    terminal = os.open(line.name, os.O_RDWR | os.O_NOCTTY)
+    environment = {name: value for name, value in os.environ.items() if name != 'NO_COLOR'}
+    try:
+        for variables, expected in ((environment, True), (environment | {'NO_COLOR': '1'}, False)):
+            subprocess.run([sys.executable, '-m', 'abdf1_ros', 'sniff', capture], stdout=terminal,
+                           timeout=PATIENCE, check=True, env=variables)
+            shown = line.open().read(PATIENCE, terminal)
+            assert (b'\x1b[2m' in shown) is expected
+    finally:
+        os.close(terminal)
+        line.close()
+
+
+def test_full_disk_is_no_traceback(capture: str) -> None:
+    with open('/dev/full', 'w') as full:
+        result = subprocess.run([sys.executable, '-m', 'abdf1_ros', 'sniff', capture], text=True,
+                                stdout=full, stderr=subprocess.PIPE, timeout=PATIENCE,
+                                check=False)
+    assert result.returncode == 2
+    assert result.stderr.splitlines()[-1] == 'sniff: cannot print: No space left on device'
+    assert 'Traceback' not in result.stderr
+
+
+def test_it_needs_no_ros(capture: str) -> None:
+    code = ('import sys; sys.modules["rclpy"] = None; from abdf1_ros.cli.sniff import main; '
+            f'sys.exit(main([{capture!r}]))')
+    result = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                            timeout=PATIENCE, check=True)
+    assert result.stdout.splitlines()[:5] == LINES

@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables, colours and progress."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+import io
+import signal
+import sys
+
+from abdf1_ros.cli import terminal
+from abdf1_ros.cli.terminal import (
+    colour,
+    interruptible,
+    is_terminal,
+    prepare_output,
+    Progress,
+    reason_of,
+    RED,
+    seconds_option,
+    table,
+    whole_option,
+)
+import pytest
+
+
+class Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture(autouse=True)
+def environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('TERM', 'xterm')
+    monkeypatch.delenv('NO_COLOR', raising=False)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    now = [0.0]
+    monkeypatch.setattr(terminal.time, 'monotonic', lambda: now[0])
+    return now
+
+
+def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert colour('bad', RED, Screen()) == '\x1b[31mbad\x1b[0m'
+    assert colour('bad', RED, io.StringIO()) == 'bad'
+    monkeypatch.setenv('NO_COLOR', '')
+    assert colour('bad', RED, Screen()) == 'bad'
+
+
+def test_dumb_terminal_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert is_terminal(Screen())
+    monkeypatch.setenv('TERM', 'dumb')
+    assert not is_terminal(Screen())
+
+
+def test_table() -> None:
+    assert table(('name', 'n'), [('a', '10'), ('long name', '5')], right=(1,)) == (
+        'name        n\n'
+        'a          10\n'
+        'long name   5')
+
+
+def test_progress_on_a_terminal_is_one_line(monkeypatch: pytest.MonkeyPatch,
+                                            clock: list[float]) -> None:
+    screen = Screen()
+    monkeypatch.setattr('sys.stderr', screen)
+    progress = Progress()
+    progress.show('1 of 9')
+    progress.clear()
+    assert screen.getvalue() == ''  # what takes no time needs none
+    clock[0] = 2.5
+    progress.show('2 of 9')
+    progress.show('3 of 9')
+    progress.clear()
+    progress.clear()
+    assert screen.getvalue() == '\r\x1b[K2 of 9\r\x1b[K3 of 9\r\x1b[K'
+
+
+def test_progress_elsewhere_comes_every_two_seconds(monkeypatch: pytest.MonkeyPatch,
+                                                    clock: list[float]) -> None:
+    file = io.StringIO()
+    monkeypatch.setattr('sys.stderr', file)
+    progress = Progress()
+    for tenth in range(50):
+        clock[0] = tenth / 10
+        progress.show(f'{tenth}')
+    progress.clear()
+    assert file.getvalue() == '20\n40\n'
+
+
+def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('sys.stdout', None)
+    monkeypatch.setattr('sys.stderr', None)
+    prepare_output()
+    for stream in (sys.stdout, sys.stderr):
+        print('text', file=stream, flush=True)
+        assert not is_terminal(stream)
+        stream.close()
+
+
+def test_output_that_knows_few_characters_shows_escapes(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr('sys.stdout', io.TextIOWrapper(raw, encoding='ascii'))
+    prepare_output()
+    print('h\xe9llo', flush=True)
+    assert raw.getvalue() == b'h\\xe9llo\n'
+
+
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def _interrupts(number: signal.Signals) -> bool:
+    try:
+        signal.raise_signal(number)
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.usefixtures('handlers')
+def test_only_the_first_signal_interrupts(number: signal.Signals) -> None:
+    with interruptible():
+        assert _interrupts(number)
+        assert not _interrupts(number)
+        assert not _interrupts(signal.SIGINT)
+    assert not _interrupts(number)
+
+
+@pytest.mark.usefixtures('handlers')
+def test_no_signal_interrupts_what_comes_after_the_block() -> None:
+    with interruptible():
+        pass
+    assert not _interrupts(signal.SIGINT)
+    assert not _interrupts(signal.SIGTERM)
+
+
+def test_seconds_of_an_option_are_above_0() -> None:
+    assert seconds_option('0.5') == 0.5
+    for text in ('0', '-1', 'nan', 'inf', 'soon', '1_0', '\u0661'):
+        with pytest.raises(argparse.ArgumentTypeError, match='a number of seconds above 0'):
+            seconds_option(text)
+
+
+def test_whole_numbers_of_options() -> None:
+    assert whole_option('9600') == 9600
+    for text in ('', '96.5', '9_600', '\u0661', '9' * 5000):
+        with pytest.raises(argparse.ArgumentTypeError, match='should be a whole number$'):
+            whole_option(text)
+
+
+@pytest.mark.parametrize(('error', 'text'), [
+    (OSError(2, 'No such file'), '/dev/x: No such file'), (OSError('taken'), '/dev/x: taken'),
+    (OSError(2, 'could not open port /dev/x: gone'), 'could not open port /dev/x: gone')])
+def test_reason_has_the_name_once(error: OSError, text: str) -> None:
+    assert reason_of('/dev/x', error) == text
