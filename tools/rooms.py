@@ -75,7 +75,7 @@ ROOMS = (
                         'port, serial port'),
     Room(('ports/trace.py', 'ports/tap.py'), 'recording and listening on ports'),
     Room(('node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
-    Room(('cli/simulator.py', 'simulator_commands.py', 'simulated_plc.py'),
+    Room(('cli/simulator.py', 'simulator/commands.py', 'simulator/simulated_plc.py'),
          'PLCs on a line, to test against'),
     Room(('commissioning', 'cli/plc/command.py'), 'single questions to PLCs: the command `plc`'),
     Room(('cli/sniff.py', 'cli/check.py'), 'the commands of these names'),

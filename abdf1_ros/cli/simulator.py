@@ -56,8 +56,8 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.ports.port import LinkThread, Port, PortState
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
-from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
-from abdf1_ros.simulator_commands import CommandError, COMMANDS, execute
+from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
+from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 
 EXIT_FAULT = 1
 EXIT_CONFIGURATION = 2

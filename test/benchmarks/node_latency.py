@@ -50,7 +50,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from node_rig import files, IN_A_FILE, rows, running_node, STATION
 from paced_line import answering_pty
 from std_msgs.msg import Int16MultiArray

@@ -53,7 +53,7 @@ from abdf1_ros.ports.port import DescriptorPort, LinkThread, Port
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values, ValueType
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 
 BITS = 10
 WORDS = 10

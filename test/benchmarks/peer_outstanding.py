@@ -53,7 +53,7 @@ from abdf1_ros.ports.port import Port  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import ValueType  # noqa: E402
-from abdf1_ros.simulated_plc import SimulatedPlc  # noqa: E402
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc  # noqa: E402
 from paced_line import BITS, Listener, paced_line  # noqa: E402
 
 BLOCKS = range(20, 30)  # file numbers

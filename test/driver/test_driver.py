@@ -33,7 +33,7 @@ from abdf1_ros.plan.forecast import block_time, longest_wait
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping

@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping

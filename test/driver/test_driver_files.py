@@ -24,7 +24,7 @@ from abdf1_ros.driver.transactions import REWRITTEN
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.slc import commands as slc
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc, store, stored
 from support.mappings import make_mapping

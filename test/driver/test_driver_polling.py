@@ -21,7 +21,7 @@ from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.settings.network import Network, POLLING_MODES
-from abdf1_ros.simulated_plc import Faults
+from abdf1_ros.simulator.simulated_plc import Faults
 import pytest
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import load_rows, make_mapping

@@ -27,7 +27,7 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, stored
 from support.mappings import make_mapping

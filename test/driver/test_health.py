@@ -28,7 +28,7 @@ from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulated_plc import Faults, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import Faults, SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc
 from support.mappings import make_mapping

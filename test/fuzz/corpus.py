@@ -24,13 +24,13 @@ from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
-from abdf1_ros import simulated_plc
 from abdf1_ros.df1.frames import ACK
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.network import FIELDS
+from abdf1_ros.simulator import simulated_plc
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from support.vectors import CAPTURED, commands, MESSAGES, VECTORS
 

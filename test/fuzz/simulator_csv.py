@@ -24,7 +24,7 @@ from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.settings.csv_table import read_rows
-from abdf1_ros.simulated_plc import COLUMNS, load_plcs
+from abdf1_ros.simulator.simulated_plc import COLUMNS, load_plcs
 from fuzz.files import path_of
 
 # Seconds after which the values have moved: never, a little, days.

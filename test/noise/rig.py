@@ -41,7 +41,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Codec, Values, ValueType
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from noise.judge import content_of, Ear, Judge
 from noise.wire import Kind, LISTED, Wire
 from support.mappings import make_mapping

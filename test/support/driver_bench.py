@@ -35,7 +35,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Codec, types_of, Values, ValueType
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.virtual_line import VirtualLine
 
 _WHOLE_FRAMES = 1000

@@ -39,8 +39,8 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.node_messages import latched_qos
 from abdf1_ros.ports.endpoints import PtyLine
 from abdf1_ros.ports.port import LinkThread
-from abdf1_ros.simulated_plc import load_plcs, SimulatedPlc
-from abdf1_ros.simulator_commands import execute
+from abdf1_ros.simulator.commands import execute
+from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context

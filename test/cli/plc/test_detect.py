@@ -30,7 +30,7 @@ from abdf1_ros.ports.endpoints import PtyLine
 from abdf1_ros.ports.port import LinkThread
 from abdf1_ros.settings import network as network_module
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulated_plc import SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
 from support.ptys import Pty

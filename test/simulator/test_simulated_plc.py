@@ -26,7 +26,7 @@ from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc, stored
 

@@ -22,8 +22,8 @@ from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import decode_identity
-from abdf1_ros.simulated_plc import Faults, SimulatedPlc
-from abdf1_ros.simulator_commands import CommandError, execute
+from abdf1_ros.simulator.commands import CommandError, execute
+from abdf1_ros.simulator.simulated_plc import Faults, SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
 

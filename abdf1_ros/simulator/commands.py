@@ -23,7 +23,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulated_plc import Faults, numbers, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import Faults, numbers, SimulatedPlc
 
 COMMANDS = """\
 commands, on standard input or with --at:
