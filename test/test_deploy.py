@@ -213,7 +213,7 @@ def test_all_that_is_installed_reaches_the_image() -> None:
     allowed = [line.removeprefix('!') for line in (
         DEPLOY / 'Dockerfile.dockerignore').read_text(encoding='utf-8').splitlines()
         if line.startswith('!')]
-    wanted = {'package.xml', 'setup.py', 'setup.cfg', 'LICENSE', 'abdf1_ros/node.py',
+    wanted = {'package.xml', 'setup.py', 'setup.cfg', 'LICENSE', 'abdf1_ros/ros/node.py',
               'abdf1_ros/df1/frames.py', 'abdf1_ros/py.typed', 'resource/abdf1_ros'}
     wanted |= {f'{folder}/x' for folder in re.findall(r"glob\('(\w+)/", SETUP)}
     for name in wanted:

@@ -28,7 +28,7 @@ import subprocess
 import sys
 
 from abdf1_ros.messages import Message
-from abdf1_ros.node_parameters import Parameters
+from abdf1_ros.ros.parameters import Parameters
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.network import FIELDS, load_network
 import pytest
@@ -43,7 +43,7 @@ OURS = re.compile(rf'(?:ros2 run abdf1_ros |python3? -m abdf1_ros\.|^(?:\$ )?)'
 PARAMETERS = {entry.name for entry in fields(Parameters)} | {
     entry.parameter for entry in FIELDS.values()}
 TOPICS = {'read', 'write', *re.findall(r"'~/(\w+)'", (
-    ROOT / 'abdf1_ros' / 'node.py').read_text('utf-8'))}
+    ROOT / 'abdf1_ros' / 'ros/node.py').read_text('utf-8'))}
 AT_HOME = {'fuzz'}  # folders that a page puts into the user's home
 TARGETS = set(re.findall(r'^([\w-]+):', (ROOT / 'Makefile').read_text('utf-8'), re.MULTILINE))
 VARIABLES = set(re.findall(r'^(\w+) \?=', (ROOT / 'Makefile').read_text('utf-8'), re.MULTILINE))

@@ -20,7 +20,7 @@ from contextlib import ExitStack
 from pathlib import Path
 import py_compile
 
-from abdf1_ros.node_parameters import Parameters
+from abdf1_ros.ros.parameters import Parameters
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.launch_stand_in import (

@@ -23,7 +23,7 @@ from tools.rooms import ALLOWED, imports, MODULES, PACKAGE, room_of
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
-_MAY_WAIT = ('ports/port.py', 'node.py', 'cli/simulator.py', 'cli/sniff.py', 'ports/tap.py',
+_MAY_WAIT = ('ports/port.py', 'ros/node.py', 'cli/simulator.py', 'cli/sniff.py', 'ports/tap.py',
              'cli/plc/watch.py')
 
 
@@ -33,7 +33,7 @@ def room(module: str) -> str:
 
 
 def _may_use_ros(module: str) -> bool:
-    return module in ('node.py', 'cli/demo.py', 'cli/monitor/command.py', 'cli/monitor/node.py') or (
+    return module in ('ros/node.py', 'cli/demo.py', 'cli/monitor/command.py', 'cli/monitor/node.py') or (
         module.startswith('node_') and '/' not in module)
 
 
@@ -95,7 +95,7 @@ def test_every_layer_is_looked_at() -> None:
     ('driver/scheduler.py', 'import time'),
     ('driver/scheduler.py', 'import select'),
     ('driver/scheduler.py', 'from abdf1_ros.ports.port import LinkThread'),
-    ('driver/scheduler.py', 'from abdf1_ros.node import Node'),
+    ('driver/scheduler.py', 'from abdf1_ros.ros.node import Node'),
     ('driver/scheduler.py', 'from std_msgs.msg import String'),
     ('driver/deep/inside.py', 'from abdf1_ros import port'),
     ('driver/deep/inside.py', 'from ...port import LinkThread'),
@@ -118,9 +118,9 @@ def test_every_layer_is_looked_at() -> None:
     ('cli/simulator.py', 'import serial'),
     ('cli/demo.py', 'from threading import Thread'),
     ('cli/monitor/view.py', 'import rclpy'),
-    ('cli/monitor/view.py', 'from abdf1_ros.node_messages import MESSAGES'),
+    ('cli/monitor/view.py', 'from abdf1_ros.ros.messages import MESSAGES'),
     ('cli/monitor/command.py', 'import threading'),
-    ('node_log.py', 'import threading'),
+    ('ros/log.py', 'import threading'),
     ('paths.py', 'import rclpy'),
     ('ports/port.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
     ('tools/node_helper.py', 'import rclpy'),
@@ -139,9 +139,9 @@ def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
     ('driver/scheduler.py', 'from abdf1_ros.df1.master import HalfDuplexMaster'),
     ('driver/scheduler.py', 'from abdf1_ros.pccc import dialects'),
     ('ports/port.py', 'import os, select, serial, threading, time'),
-    ('node.py', 'import rclpy\nfrom std_msgs.msg import String\nfrom abdf1_ros import port'),
-    ('node_parameters.py', 'from rcl_interfaces.msg import ParameterDescriptor\nimport rclpy'),
-    ('node_diagnostics.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
+    ('ros/node.py', 'import rclpy\nfrom std_msgs.msg import String\nfrom abdf1_ros import port'),
+    ('ros/parameters.py', 'from rcl_interfaces.msg import ParameterDescriptor\nimport rclpy'),
+    ('ros/diagnostics.py', 'from diagnostic_msgs.msg import DiagnosticStatus'),
     ('cli/monitor/node.py', 'import rclpy\nfrom std_msgs.msg import String'),
     ('cli/simulator.py', 'import os, time\nfrom abdf1_ros.ports.port import LinkThread'),
 ])

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from abdf1_ros.node import BridgeNode
+from abdf1_ros.ros.node import BridgeNode
 import pytest
 from rclpy.node import Node
 import rclpy.utilities

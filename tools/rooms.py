@@ -74,7 +74,7 @@ ROOMS = (
     Room(('ports/endpoints.py',), 'lines that we make or open ourselves: pseudo-terminal, listening TCP '
                         'port, serial port'),
     Room(('ports/trace.py', 'ports/tap.py'), 'recording and listening on ports'),
-    Room(('node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
+    Room(('ros/node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
     Room(('cli/simulator.py', 'simulator/commands.py', 'simulator/simulated_plc.py'),
          'PLCs on a line, to test against'),
     Room(('commissioning', 'cli/plc/command.py'), 'single questions to PLCs: the command `plc`'),

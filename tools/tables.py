@@ -107,7 +107,7 @@ def map_columns() -> str:
 
 def parameters() -> str:
     """Return the node's own parameters; needs rclpy."""
-    from abdf1_ros.node_parameters import Parameters
+    from abdf1_ros.ros.parameters import Parameters
     rows = []
     for entry in fields(Parameters):
         low, high = entry.metadata['low'], entry.metadata['high']
@@ -123,7 +123,7 @@ def _default(value: object) -> str:
 
 def addresses() -> str:
     """Return address, file, types and message of every kind of place; needs rclpy."""
-    from abdf1_ros.node_messages import MESSAGES as TOPIC_TYPES
+    from abdf1_ros.ros.messages import MESSAGES as TOPIC_TYPES
     rows = []
     for label, examples in PLACES:
         parsed = [Address.parse(text, plc_type) for plc_type, text in examples.items()]

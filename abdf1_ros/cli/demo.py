@@ -34,9 +34,9 @@ import time
 from typing import Any
 
 from abdf1_ros.cli.terminal import ignore_further, interruptible
-from abdf1_ros.node_messages import MESSAGES
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.paths import config_file
+from abdf1_ros.ros.messages import MESSAGES
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

@@ -68,7 +68,7 @@ class Publisher(Listener):
         super().__init__()
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         os.environ.setdefault('ROS_DOMAIN_ID', '83')
-        from abdf1_ros import node_messages
+        from abdf1_ros.ros import messages as node_messages
         import rclpy
         from rclpy.event_handler import PublisherEventCallbacks
         rclpy.init()

@@ -33,8 +33,8 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
-from abdf1_ros.node_diagnostics import Diagnostics
-from abdf1_ros.node_log import EventLog, LineLog
+from abdf1_ros.ros.diagnostics import Diagnostics
+from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values

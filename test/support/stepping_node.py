@@ -20,7 +20,7 @@ import signal
 import sys
 import time
 
-from abdf1_ros.node import main
+from abdf1_ros.ros.node import main
 
 _HOUR = 3600 * 10**9
 

@@ -23,7 +23,7 @@ from typing import Any
 
 from abdf1_ros.cli.monitor.view import Reading, Result, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
-from abdf1_ros.node_messages import latched_qos, MESSAGES
+from abdf1_ros.ros.messages import latched_qos, MESSAGES
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.duration import Infinite

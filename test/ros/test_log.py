@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.node_log import EventLog, LineLog, MOST_CAUSES, MOST_LINES
+from abdf1_ros.ros.log import EventLog, LineLog, MOST_CAUSES, MOST_LINES
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
 

@@ -29,8 +29,8 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.node_health import health_values, trouble
 from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ros.station_health import health_values, trouble
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 

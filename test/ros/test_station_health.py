@@ -23,9 +23,9 @@ import time
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.node_health import health_values, LinkCounterService, trouble
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ros.station_health import health_values, LinkCounterService, trouble
 from abdf1_ros.settings.network import Network
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest

@@ -28,8 +28,8 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.node_diagnostics import Diagnostics, NamesakeWatch, WriteLog
 from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch, WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network

@@ -40,10 +40,11 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, FormatError
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.node_diagnostics import Diagnostics, NamesakeWatch
-from abdf1_ros.node_health import LinkCounterService
-from abdf1_ros.node_log import EventLog, LineLog
-from abdf1_ros.node_messages import (
+from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
+from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch
+from abdf1_ros.ros.log import EventLog, LineLog
+from abdf1_ros.ros.messages import (
     encoder,
     latched_qos,
     MESSAGES,
@@ -51,9 +52,8 @@ from abdf1_ros.node_messages import (
     values_of,
     write_qos,
 )
-from abdf1_ros.node_parameters import Configuration, configure
-from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
-from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.parameters import Configuration, configure
+from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable

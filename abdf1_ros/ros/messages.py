@@ -21,16 +21,23 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from abdf1_ros.errors import FormatError
+from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.values import Values, ValueType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_msgs.msg import (
-    Float32MultiArray, Int16MultiArray, Int32MultiArray, MultiArrayDimension, MultiArrayLayout,
-    String, UInt16MultiArray, UInt32MultiArray, UInt8MultiArray)
-
-from abdf1_ros.settings.mapping import Mapping, Publish
-from abdf1_ros.settings.values import Values, ValueType
-from abdf1_ros.errors import FormatError
+    Float32MultiArray,
+    Int16MultiArray,
+    Int32MultiArray,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    String,
+    UInt8MultiArray,
+    UInt16MultiArray,
+    UInt32MultiArray,
+)
 
 MESSAGES: dict[ValueType, Any] = {
     ValueType.BOOL: UInt8MultiArray,

@@ -24,10 +24,10 @@ import signal
 import threading
 from typing import Any
 
-from abdf1_ros.node import BridgeNode, main
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.port import PortState
+from abdf1_ros.ros.node import BridgeNode, main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.node import Node
@@ -423,7 +423,7 @@ def test_argument_outside_of_ros_arguments(
 def test_namesake_is_told_and_forgotten(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.node_diagnostics._LOOKS_FOR_NAMESAKES', 1)
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics._LOOKS_FOR_NAMESAKES', 1)
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
     namesake = Node('abdf1', context=observer.context, use_global_arguments=False)

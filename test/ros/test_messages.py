@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.node_messages import (
+from abdf1_ros.ros.messages import (
     encoder,
     latched_qos,
     MESSAGES,
