@@ -48,13 +48,13 @@ setup(
     extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={
         'console_scripts': [
-            f'node = {PACKAGE}.executables:node',
-            f'simulator = {PACKAGE}.executables:simulator',
-            f'sniff = {PACKAGE}.executables:sniff',
-            f'check = {PACKAGE}.executables:check',
-            f'plc = {PACKAGE}.executables:plc',
-            f'monitor = {PACKAGE}.executables:monitor',
-            f'demo = {PACKAGE}.executables:demo',
+            f'node = {PACKAGE}.cli.main:node',
+            f'simulator = {PACKAGE}.cli.main:simulator',
+            f'sniff = {PACKAGE}.cli.main:sniff',
+            f'check = {PACKAGE}.cli.main:check',
+            f'plc = {PACKAGE}.cli.main:plc',
+            f'monitor = {PACKAGE}.cli.main:monitor',
+            f'demo = {PACKAGE}.cli.main:demo',
         ],
     },
 )

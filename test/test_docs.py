@@ -53,7 +53,7 @@ VARIABLES = set(re.findall(r'^(\w+) \?=', (ROOT / 'Makefile').read_text('utf-8')
 def help_of(*command: str) -> str:
     """Return what a command says with --help."""
     done = subprocess.run(
-        [sys.executable, '-m', f'abdf1_ros.{command[0]}', *command[1:], '--help'], text=True,
+        [sys.executable, '-m', 'abdf1_ros', *command, '--help'], text=True,
         capture_output=True, check=True, timeout=60, env=os.environ | {'COLUMNS': '200'})
     return done.stdout
 

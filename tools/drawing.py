@@ -25,8 +25,6 @@ def arrows() -> Arrows:
     """Return the rooms that each room imports."""
     found: Arrows = {room: set() for room in ROOMS}
     for module in MODULES:
-        if module == '__init__.py':
-            continue
         source = (PACKAGE / module).read_text(encoding='utf-8')
         for name in imports(module, source):
             top, _, inner = name.partition('.')

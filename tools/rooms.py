@@ -27,7 +27,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = Path(__file__).resolve().parent.parent / 'abdf1_ros'
-MODULES = sorted(path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob('*.py'))
+MODULES = sorted(path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob('*.py')
+                 if path != PACKAGE / '__init__.py')
 
 _BASE = ('errors', 'messages', 'counters')
 
@@ -37,17 +38,25 @@ class Room(NamedTuple):
     Folders or modules of one subject.
 
     ``paths`` may hold ``*``. ``allowed`` are the modules of the package that may be imported, by
-    the beginning of their dotted names, beside the room's own; None stands for all.
+    the beginning of their dotted names, beside the room's own; None stands for all. A room that
+    ``is_pure`` has to do without clock, threads, ports and ROS: it gets the time as an argument.
     """
 
     paths: tuple[str, ...]
     contents: str
     allowed: tuple[str, ...] | None = None
+    is_pure: bool = True
 
     @property
     def name(self) -> str:
         """Return what tables call it."""
         return ', '.join(path if path.endswith('.py') else f'{path}/' for path in self.paths)
+
+    def may_import(self, dotted: str) -> bool:
+        """Tell whether the rules let the room import a module of the package."""
+        own = (path.removesuffix('.py') for path in self.paths)
+        return self.allowed is None or any(
+            dotted == entry or dotted.startswith(f'{entry}.') for entry in (*self.allowed, *own))
 
     def has(self, module: str) -> bool:
         """Tell whether a module (a path inside the package) is in it."""
@@ -56,38 +65,29 @@ class Room(NamedTuple):
 
 
 ROOMS = (
-    Room(('messages.py',), 'numbered errors and notices', ()),
-    Room(('counters.py',), 'status counters', ()),
+    Room(('messages.py', 'counters.py'), 'numbered errors and notices; status counters', ()),
     Room(('text.py', 'numbers.py'), 'text and numbers from outside', ()),
     Room(('errors.py',), 'the exceptions', ('messages', 'text')),
-    Room(('df1',), 'data-link layer: frames, checksums, machine, stations; master, standard '
-                   'polling, slave, peer', _BASE),
-    Room(('pccc',), 'application layer: addresses, commands of each PLC family, data table, '
-                    'server', (*_BASE, 'text', 'df1.packet')),
-    Room(('driver',), 'both CSV files, points, read planner, scheduler, served words, driver',
-         (*_BASE, 'numerals', 'df1', 'pccc')),
-    Room(('sniffer/capture.py',), 'the format of recorded bytes', ('errors', 'text', 'numerals')),
-    Room(('sniffer/dumps.py',), 'recorded bytes from files of other kinds', ('errors', 'capture')),
-    Room(('sniffer',), 'traffic told to people', ('errors', 'capture', 'df1', 'pccc')),
-    Room(('cli/monitor/view.py',), 'the state of a running node as lines of text', ('text',)),
-    Room(('ports/port.py',), 'opens a port, runs a link in its thread'),
-    Room(('ports/endpoints.py',), 'lines that we make or open ourselves: pseudo-terminal, listening TCP '
-                        'port, serial port'),
-    Room(('ports/trace.py', 'ports/tap.py'), 'recording and listening on ports'),
-    Room(('ros/node.py', 'node_*.py'), 'the ROS node: parameters, messages, diagnostics, log'),
-    Room(('cli/simulator.py', 'simulator/commands.py', 'simulator/simulated_plc.py'),
-         'PLCs on a line, to test against'),
-    Room(('commissioning', 'cli/plc/command.py'), 'single questions to PLCs: the command `plc`'),
-    Room(('cli/sniff.py', 'cli/check.py'), 'the commands of these names'),
-    Room(('cli/monitor/command.py', 'cli/monitor/node.py'), 'the command `monitor`'),
-    Room(('cli/demo.py',), 'starts node and simulator together'),
-    Room(('cli/main.py',), 'entry points that end quietly while they still import'),
-    Room(('paths.py', 'cli/terminal.py'), 'installed files; what commands print on a terminal'),
+    Room(('df1',), 'the link: frames, checksums, machine, stations; master, standard polling, '
+                   'slave, peer', _BASE),
+    Room(('pccc',), 'the commands: addresses, data table, server; a folder for each PLC family',
+         (*_BASE, 'text', 'df1.packet')),
+    Room(('settings',), 'both CSV files and the values in them',
+         (*_BASE, 'numbers', 'df1', 'pccc')),
+    Room(('plan',), 'what is read together, what it costs, what comes of it',
+         ('df1', 'pccc', 'settings')),
+    Room(('driver',), 'carrying it out: who goes next, points, served words',
+         (*_BASE, 'numbers', 'df1', 'pccc', 'settings', 'plan')),
+    Room(('sniffer',), 'recorded bytes, and traffic told to people',
+         ('errors', 'text', 'numbers', 'df1', 'pccc')),
+    Room(('ports',), 'ports, the thread that runs a link on one, recording and listening',
+         ('errors', 'df1', 'settings', 'sniffer'), is_pure=False),
+    Room(('simulator',), 'simulated PLCs and the commands that they take',
+         (*_BASE, 'numbers', 'df1', 'pccc', 'settings')),
+    Room(('paths.py',), 'where installed files lie', (), is_pure=False),
+    Room(('ros',), 'the ROS node: parameters, messages, diagnostics, log', is_pure=False),
+    Room(('cli', '__main__.py'), 'the commands, one file or folder each', is_pure=False),
 )
-
-ALLOWED = {path: (*room.allowed, *room.paths) for room in ROOMS if room.allowed is not None
-           for path in room.paths}
-"""What may be imported, by folder or module; others may import everything."""
 
 
 def room_of(module: str) -> Room:

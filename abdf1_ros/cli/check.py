@@ -222,7 +222,3 @@ def _remark(remark: Remark) -> dict[str, Any]:
 
 def _ms(seconds: float) -> float:
     return round(seconds * 1000, 3)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

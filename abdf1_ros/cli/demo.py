@@ -334,7 +334,3 @@ def _tell(demo: Demo, seconds: float) -> int:
         ignore_further()  # or a process of ours might stay
         demo.close()
     return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

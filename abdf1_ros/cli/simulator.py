@@ -334,7 +334,3 @@ def _say(text: str) -> None:
 
 def _print_fault(error: Exception) -> None:
     traceback.print_exception(error)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

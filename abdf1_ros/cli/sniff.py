@@ -318,7 +318,3 @@ def _end_with(end: Callable[[], None]) -> None:
 
 def _say(text: str) -> None:
     print(f'sniff: {printable(text)}', file=sys.stderr, flush=True)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -435,7 +435,3 @@ def _spin(node: BridgeNode, ended: threading.Event) -> None:
         executor.spin_once(timeout_sec=_QUIET)
         is_idle = time.monotonic() - begun >= _QUIET
     executor.shutdown()
-
-
-if __name__ == '__main__':
-    sys.exit(main())

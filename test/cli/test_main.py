@@ -22,6 +22,7 @@ import signal
 import subprocess
 import sys
 
+from abdf1_ros.cli.main import COMMANDS
 import pytest
 
 # Each with a module that it imports, and its status when it is interrupted.
@@ -56,7 +57,7 @@ def test_signals_are_as_they_were_when_main_begins(tmp_path: Path, name: str) ->
         'import signal, sys, types\n'
         'handlers = lambda: [*map(signal.getsignal, (signal.SIGINT, signal.SIGTERM))]\n'
         'before = handlers()\n'
-        f'module = sys.modules["abdf1_ros.{name}"] = types.ModuleType("fake")\n'
+        f'module = sys.modules["{COMMANDS[name]}"] = types.ModuleType("fake")\n'
         'module.main = lambda: handlers() == before\n'
         f'from abdf1_ros.cli.main import {name}\n'
         f'print({name}())\n')

@@ -33,7 +33,7 @@ from support.simulator_process import make_files
 
 TOO_OLD = re.compile(
     r'not written: refused: it came \d+\.\d s after it was published, write_timeout is ')
-HERE = Path(__file__).resolve().parent
+HERE = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope='module')

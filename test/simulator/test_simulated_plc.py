@@ -209,7 +209,7 @@ def test_file_of_two_types(path: Path) -> None:
 
 
 def test_shipped_file_is_good(clock: Clock) -> None:
-    path = Path(__file__).resolve().parent.parent / 'config' / 'simulator.csv'
+    path = Path(__file__).resolve().parents[2] / 'config' / 'simulator.csv'
     plcs = load_plcs(str(path), Checksum.BCC, clock)
     assert [(plc.station, plc.table.plc_type.value) for plc in plcs] == [(1, 'PLC5'), (2, 'SLC')]
 

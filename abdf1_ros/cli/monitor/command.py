@@ -270,7 +270,3 @@ def _print(watch: Watch) -> None:
 
 def _say(text: str) -> None:
     print(f'monitor: {printable(text)}', file=sys.stderr, flush=True)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

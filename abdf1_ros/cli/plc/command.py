@@ -292,7 +292,3 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 def _complain(text: str) -> None:
     line = f'plc: {printable(text)}'
     print(colour(line, RED, sys.stderr), file=sys.stderr, flush=True)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -146,8 +146,8 @@ def test_write_of_which_nobody_reads_what_would_happen(line: str) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     said = subprocess.run(
-        [sys.executable, '-m', 'abdf1_ros', 'plc', 'write', 'N7:27', '72', '--station', '2', '--port',
-         line], stdout=writer, stdin=subprocess.DEVNULL, timeout=30, check=False)
+        [sys.executable, '-m', 'abdf1_ros', 'plc', 'write', 'N7:27', '72', '--station', '2',
+         '--port', line], stdout=writer, stdin=subprocess.DEVNULL, timeout=30, check=False)
     os.close(writer)
     assert said.returncode == 2
 
