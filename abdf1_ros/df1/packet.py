@@ -69,6 +69,16 @@ class Packet:
         return bool(self.cmd & REPLY_BIT)
 
     @property
+    def is_sound(self) -> bool:
+        """
+        Tell whether the header can be whole: a command has STS 0 (M 6-3..6-8).
+
+        A leading 00 that is lost or inserted is invisible to BCC and CRC, which both begin at 0.
+        All fields then move by one, and TNS or CMD stands where STS should.
+        """
+        return self.is_reply or self.sts == 0
+
+    @property
     def duplicate_key(self) -> tuple[int, int, int]:
         """Return SRC, CMD and TNS, by which a repeated message is known (M 3-4, 4-4)."""
         return self.src, self.cmd, self.tns

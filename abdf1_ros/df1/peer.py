@@ -276,6 +276,10 @@ class FullDuplexPeer:
             return b''
         packet = Packet.decode(frame.data)
         self._counters.messages_received += 1
+        if not packet.is_sound:
+            self._counters.invalid_messages += 1
+            self._report(wrong_message(packet, packet.src))
+            return self._respond(frames.NAK)
         if packet.duplicate_key == self._last_key:
             self._counters.duplicate_messages += 1
             self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)

@@ -34,6 +34,7 @@ from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.replies import wrong_message
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
 from abdf1_ros.messages import Event, Message
 
@@ -163,6 +164,10 @@ class HalfDuplexSlave:
             return b''
         packet = Packet.decode(frame.data)
         self.counters.messages_received += 1
+        if not packet.is_sound or frame.station == 0 != packet.dst:
+            self.counters.invalid_messages += 1
+            self._report(wrong_message(packet, packet.src))
+            return b''
         if packet.duplicate_key == self._last_key and self._settings.duplicate_detection:
             self.counters.duplicate_messages += 1
             self._report(Event(Message.NTC_DUPLICATE_MSG_RCVD, (packet.src,), packet.src))

@@ -58,6 +58,8 @@ class Server:
             return command.reply(data, refusal.sts)
 
     def _execute(self, command: Packet) -> bytes:
+        if not command.is_sound:
+            raise Refusal(status.STS_ILLEGAL_COMMAND)
         reader = Reader(command.data)
         cmd = command.cmd & ~PRIORITY_BIT
         try:

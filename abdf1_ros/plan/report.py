@@ -135,6 +135,11 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
             kinds = ', '.join(f'{name} ({_tags(group)})' for name, group in types.items())
             yield Remark(Kind.STATION, (
                 f'station {station} has more than one PLC_Type: {kinds}'), station)
+    if network.mode == 'Peer' and 0 in (network.station, *stations):
+        whose = 'our own Station is 0' if network.station == 0 else 'station 0 is in the map'
+        yield Remark(Kind.STATION, (
+            f'{whose}: a message to station 0 begins with 00, and neither BCC nor CRC notices '
+            'when that is lost on a full-duplex line; any other number is safe'), 0)
     if network.mode == 'Peer' and len(stations) > 1:
         listed = ', '.join(map(str, sorted(stations)))
         yield Remark(Kind.STATION, (

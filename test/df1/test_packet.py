@@ -99,3 +99,12 @@ def test_duplicate_key_passes_over_dst_sts_and_data() -> None:
 def test_header_of_a_good_reply_is_known_before_its_end(
         packet: Packet, size: int, begins: bool) -> None:
     assert begins_good_reply(packet.encode()[:size]) is begins
+
+
+def test_command_whose_fields_have_moved_is_not_sound() -> None:
+    for tns in range(1, 0x10000, 0x101):
+        command = replace(COMMAND, dst=0, tns=tns)
+        assert command.is_sound
+        assert command.reply(sts=0xF0).is_sound
+        assert not Packet.decode(command.encode()[1:]).is_sound  # its leading 00 is lost
+        assert not Packet.decode(b'\0' + command.encode()).is_sound  # or has come twice

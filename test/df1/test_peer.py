@@ -618,7 +618,7 @@ def test_duplicate_is_acknowledged_and_not_executed() -> None:
     peer = bench()
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
     assert peer.hear(ACK) == b''
-    assert peer.hear_packet(replace(THEIRS, dst=9, sts=1, data=b'other')) == ACK
+    assert peer.hear_packet(replace(THEIRS, dst=9, data=b'other')) == ACK
     assert peer.wait(60) == []
     assert peer.served == [THEIRS]
     assert peer.numbers() == [(2524, 1)]
@@ -754,6 +754,28 @@ def test_any_address_is_served_and_swapped(dst: int, src: int, checksum: Checksu
     command = replace(THEIRS, dst=dst, src=src)
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
     assert (command.reply().dst, command.reply().src) == (src, dst)
+
+
+@pytest.mark.parametrize('checksum', Checksum)
+def test_command_that_lost_its_leading_00_is_not_executed_and_comes_again(
+        checksum: Checksum) -> None:
+    peer = bench(checksum)
+    command = Packet(0, 1, 0x0F, 0, 0x0107, bytes.fromhex('AA 02 07 89 01 00 05 00'))
+    frame = peer.frame(command)
+    damaged = frame[:2] + frame[3:]  # both checks begin at 0 and do not see it
+    assert peer.hear(damaged) == NAK
+    assert peer.served == []
+    assert peer.numbers() == [(2510, 0x0F, 0x01, 0xAA01)]
+    assert peer.counts()['invalid_messages'] == 1
+    assert peer.hear(frame) == ACK + peer.frame(command.reply())
+    assert peer.served == [command]
+
+
+def test_command_with_a_status_gets_nak() -> None:
+    peer = bench()
+    assert peer.hear_packet(replace(THEIRS, sts=0x10)) == NAK
+    assert peer.hear(ENQ) == NAK
+    assert peer.served == []
 
 
 def test_error_replies_are_counted() -> None:

@@ -129,6 +129,24 @@ def test_bad_frame_is_met_with_silence(fault: Fault, checksum: Checksum, counter
     assert (bench.served, bench.counts()) == ([], {counter: 1})
 
 
+@pytest.mark.parametrize('checksum', Checksum)
+@pytest.mark.parametrize('tns', [0x0107, 0x0100])
+def test_command_that_lost_its_leading_00_is_met_with_silence(checksum: Checksum,
+                                                              tns: int) -> None:
+    bench = Bench(settings=SlaveSettings(0, checksum))
+    command = replace(COMMAND, dst=0, tns=tns)
+    moved = Frame(command.encode()[1:], 0)
+    assert bench.hear(moved, sent(command, 0)) == [b'', ACK]
+    assert bench.served == [command]
+    assert bench.counts()['invalid_messages'] == 1
+
+
+def test_command_with_a_status_is_met_with_silence() -> None:
+    bench = Bench()
+    assert bench.hear(sent(replace(COMMAND, sts=0x10)), sent(COMMAND)) == [b'', ACK]
+    assert bench.served == [COMMAND]
+
+
 def test_damaged_command_is_accepted_when_it_comes_again() -> None:
     bench = Bench()
     assert bench.hear(sent(COMMAND, fault=Fault.BAD_CHECK), sent(COMMAND)) == [b'', ACK]

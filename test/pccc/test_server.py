@@ -21,6 +21,7 @@ import traceback
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, OutOfRange
+from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Refusal, Server
 from hypothesis import given
@@ -80,6 +81,12 @@ def test_writes_of_the_vectors(name: str, words: DataTable, place: str, value: s
     assert words_at(words, place) == value
 
 
+def contents(words: DataTable, family: PlcType) -> list[bytes]:
+    """Return all words of a table that was made of FILES."""
+    return [words.read(Address.parse(name.replace('_', ':', 1).replace('_', '.'), family),
+                       len(bytes.fromhex(data)) // 2) for name, data in FILES[family].items()]
+
+
 def test_float_write_of_the_vectors() -> None:
     words = table(SLC, F8_0='00 00 00 00 00 00 00 00')
     assert Server(words).serve(pair('slc_AA_F8')[0]).sts == 0
@@ -103,6 +110,35 @@ def test_what_is_no_command_of_the_family(family: PlcType, cmd: int, data: str) 
 def test_families_do_not_take_each_others_commands() -> None:
     assert ask(table(SLC, N7_0='00 00'), '68 00 00 01 00 07 00 07 00 01 00') == (0x10, '')
     assert ask(table(PLC5, N7_0='00 00'), 'A2 02 07 89 00 00') == (0x10, '')
+
+
+@pytest.mark.parametrize('family', PlcType)
+@pytest.mark.parametrize('sts', [0x01, 0x10, 0xF0])
+def test_command_with_a_status_is_not_executed(family: PlcType, sts: int) -> None:
+    words = table(family, **FILES[family])
+    before = contents(words, family)
+    for cmd, data in ((0x00, '00 00 11 11'), (0x08, '00 00 11 11'), (0x05, '00 00 FF 00'),
+                      (0x0F, 'AA 02 07 89 00 00 11 11')):
+        command = Packet(1, 5, cmd, sts, 7, bytes.fromhex(data))
+        assert Server(words).serve(command) == command.reply(sts=0x10)
+    assert contents(words, family) == before
+
+
+@pytest.mark.parametrize('family', PlcType)
+@pytest.mark.parametrize('tns', [0x0000, 0x0100, 0x1234])
+def test_command_that_lost_its_leading_00_changes_nothing(family: PlcType, tns: int) -> None:
+    """Station 0 is asked; what stands where SRC should is CMD, and the command becomes 00."""
+    words = table(family, **FILES[family])
+    before = contents(words, family)
+    dialect = dialect_of(family)
+    kinds = ['010'] if family is PlcType.PLC2 else ['N7:1', 'N7:0']
+    for text in kinds:
+        place = Address.parse(text, family)
+        for cmd, body in (dialect.read(place, 2), dialect.write(place, b'\1\2\3\4'),
+                          dialect.write_bits(place, 0xFFFF, 0x0F0F)):
+            moved = Packet.decode(Packet(0, 5, cmd, 0, tns, body).encode()[1:])
+            assert Server(words).serve(moved).sts
+    assert contents(words, family) == before
 
 
 requests = st.one_of(

@@ -61,6 +61,20 @@ def test_map_without_a_row_is_odd() -> None:
     assert remark.text == 'the map has no usable row: nothing is read or written'
 
 
+@pytest.mark.parametrize(('own', 'station', 'begin'), [
+    (0, 1, 'our own Station is 0'), (5, 0, 'station 0 is in the map'), (5, 1, None)])
+@pytest.mark.parametrize('mode', ['Peer', 'Master'])
+def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: int,
+                                                begin: str | None) -> None:
+    report = report_of(make_mapping('N7:0', station=station), mode=mode, station=own)
+    found = texts(report, Kind.STATION)
+    if mode == 'Master' or begin is None:
+        assert found == []
+    else:
+        text, = found
+        assert text.startswith(f'{begin}: a message to station 0 begins with 00')
+
+
 def test_slower_plc_makes_everything_slower() -> None:
     report = report_of(make_mapping('N7:0', length=2), response=0.03)
     assert report.scan_time == pytest.approx(TWO_WORDS + 0.06)
