@@ -59,10 +59,10 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([
         DeclareLaunchArgument(
             'net_file', default_value='',
-            description='CSV file of the serial link; empty: that of the package'),
+            description='CSV file of the serial link; needed here or in params_file'),
         DeclareLaunchArgument(
             'map_file', default_value='',
-            description='CSV file of the mappings; empty: that of the package'),
+            description='CSV file of the mappings; needed here or in params_file'),
         DeclareLaunchArgument(
             'port', default_value='',
             description='serial device or pyserial URL; empty: Com_Port of the net file'),

@@ -18,7 +18,7 @@ from launch import LaunchDescription
 from launch.actions import ExecuteProcess, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import PathJoinSubstitution, ThisLaunchFileDir
-from launch_ros.substitutions import ExecutableInPackage
+from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
 PORT = '/tmp/abdf1_demo'
 
@@ -26,6 +26,7 @@ PORT = '/tmp/abdf1_demo'
 def generate_launch_description() -> LaunchDescription:
     """Start the simulator and the bridge; the bridge waits for the port by itself."""
     bridge = PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])
+    config = PathJoinSubstitution([FindPackageShare('abdf1_ros'), 'config'])
     return LaunchDescription([
         # No Node action: that would add --ros-args, and the simulator is no ROS node.
         ExecuteProcess(
@@ -36,6 +37,9 @@ def generate_launch_description() -> LaunchDescription:
         ),
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(bridge),
-            launch_arguments={'port': PORT}.items(),
+            launch_arguments={
+                'net_file': PathJoinSubstitution([config, 'net.csv']),
+                'map_file': PathJoinSubstitution([config, 'map.csv']),
+                'port': PORT}.items(),
         ),
     ])

@@ -21,7 +21,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.launch_stand_in import SOURCE
-from support.ros import EVERYTHING, Observer, Process, ros_args
+from support.ros import EVERYTHING, EXAMPLE_FILES, Observer, Process, ros_args
 from support.simulator_process import OFTEN
 import yaml
 
@@ -53,7 +53,7 @@ def test_entries_are_complete() -> None:
 def test_every_status_of_a_node_belongs_to_its_entry(node: str) -> None:
     with Observer() as observer:
         inbox = observer.listen(DiagnosticArray, '/diagnostics', EVERYTHING)
-        arguments = ros_args('port:=/dev/ttyS99', OFTEN)
+        arguments = ros_args(*EXAMPLE_FILES, 'port:=/dev/ttyS99', OFTEN)
         with Process('node', *arguments, '-r', f'__node:={node}') as process:
             names = [status.name for status in inbox.first().status]
             process.end()

@@ -98,8 +98,11 @@ def test_arguments_of_the_bridge_that_are_parameters_exist_in_the_node() -> None
 def test_bridge_starts_with_what_the_launch_file_says(tmp_path: Path) -> None:
     params = tmp_path / 'params.yaml'
     params.write_text('/**: {ros__parameters: {port: /dev/from_file, stale_after: 7.0}}\n')
-    node = bridge_node(params_file=str(params), port='/dev/ttyS99', namespace='cell',
-                       name='line', log_level='debug')
+    config = SOURCE / 'config'
+    node = bridge_node(
+        net_file=str(config / 'net.csv'), map_file=str(config / 'map.csv'),
+        params_file=str(params), port='/dev/ttyS99', namespace='cell', name='line',
+        log_level='debug')
     with Observer() as observer, Process('node', *node.command()) as process:
         process.wait_for('/dev/ttyS99: cannot open the port')
         assert get_parameters(observer, 'port', 'stale_after', node='/cell/line') == [
@@ -115,9 +118,12 @@ def test_demo_starts_a_simulator_and_a_bridge_on_its_port() -> None:
     assert isinstance(simulator, ExecuteProcess)
     assert isinstance(bridge, IncludeLaunchDescription)
     assert Path(str(bridge.source.location)) == LAUNCH / 'bridge.launch.py'
+    given = {name: str(value) for name, value in bridge.launch_arguments}
+    assert Path(given['net_file']).samefile(SOURCE / 'config' / 'net.csv')
+    assert Path(given['map_file']).samefile(SOURCE / 'config' / 'map.csv')
     executable, *rest = simulator.cmd
     assert (executable.executable, executable.package) == ('simulator', 'abdf1_ros')
-    assert rest == ['--pty', dict(bridge.launch_arguments)['port']]
+    assert rest == ['--pty', given['port']]
 
 
 # Three lines

@@ -27,7 +27,7 @@ from abdf1_ros.ros.node import BridgeNode
 import pytest
 from rclpy.node import Node
 import rclpy.utilities
-from support.ros import Observer, ros_args
+from support.ros import EXAMPLE_FILES, Observer, ros_args
 
 ROOT = Path(__file__).resolve().parent.parent
 POLICY = ROOT / 'config' / 'sros2' / 'policy.xml'
@@ -96,7 +96,7 @@ def graph() -> Iterator[Graph]:
     """Return what a running bridge publishes, subscribes to and serves, as the graph tells."""
     with Observer() as observer:
         node = BridgeNode(context=observer.context, use_global_arguments=False,
-                          cli_args=ros_args('port:=/nowhere/port'))
+                          cli_args=ros_args(*EXAMPLE_FILES, 'port:=/nowhere/port'))
         yield lambda what: _names(node, what)
         node.destroy_node()
 

@@ -81,13 +81,13 @@ _HELP = """\
 Read and write the data tables of PLCs over DF1, and show them as topics.
 
 parameters, behind --ros-args (docs/reference/parameters.md has all of them):
-  -p net_file:=PATH   the line; without it that of the package
-  -p map_file:=PATH   what is read and written
+  -p net_file:=PATH   the line, needed
+  -p map_file:=PATH   what is read and written, needed
   -p port:=DEVICE     a device path or URL instead of the file's Com_Port
 
 examples:
   node --ros-args -p net_file:=net.csv -p map_file:=map.csv
-  node --ros-args -p port:=/dev/ttyUSB0 -r __node:=line_1
+  node --ros-args --params-file line_1.yaml -r __node:=line_1
 
 exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty files or parameters,
 1 after internal errors
@@ -133,6 +133,7 @@ class BridgeNode(Node):
         except ConfigurationError:
             self.destroy_node()
             raise
+        self.get_logger().info(str(configuration))
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
         if not configuration.mappings:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 import difflib
+from pathlib import Path
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -46,8 +47,8 @@ def _parameter(default: bool | float | str, description: str, low: float | None 
 class Parameters:
     """The node's own parameters; those of the link (``net.*``) are the fields of Network."""
 
-    net_file: str = _parameter('', 'path of the net CSV; empty: the one of this package')
-    map_file: str = _parameter('', 'path of the map CSV; empty: the one of this package')
+    net_file: str = _parameter('', 'path of the net CSV, needed')
+    map_file: str = _parameter('', 'path of the map CSV, needed')
     port: str = _parameter('', 'device path or pyserial URL to use instead of Com_Port')
     low_latency: bool = _parameter(
         True, 'ask the driver of the port to hand on bytes at once, where it can')
@@ -102,6 +103,10 @@ Cell = tuple[str, str, str]
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
 
+# Shown as resolved paths, or nobody could tell which file it is.
+_PATHS = ('net_file', 'map_file')
+
+
 @dataclass(frozen=True, slots=True)
 class Configuration:
     """
@@ -118,6 +123,16 @@ class Configuration:
     polling: PollingSettings | None = None
     ignored: list[str] = field(default_factory=list)
 
+    def __str__(self) -> str:
+        """Return one line that tells what the node runs with."""
+        network, parameters = self.network, self.parameters
+        read = sum(mapping.reads for mapping in self.mappings)
+        written = len({mapping.topic for mapping in self.mappings if mapping.writes})
+        return (f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}: '
+                f'port {self.port}, Mode {network.mode}, {network.baud} baud, '
+                f'{network.error_code}; {len(self.mappings)} rows, topics: {read} to read, '
+                f'{written} to write')
+
 
 def configure(node: Node) -> Configuration:
     """
@@ -131,12 +146,12 @@ def configure(node: Node) -> Configuration:
     mappings: list[Mapping] = []
     map_problems: list[Problem] = []
     try:
-        from_file = load_network(parameters.net_file or str(config_file('net.csv')))
+        from_file = load_network(_needed('net_file', parameters.net_file, problems))
         network = _declare_network(node, from_file)
     except ConfigurationError as error:
         problems += error.problems
-    map_file = parameters.map_file or str(config_file('map.csv'))
     try:
+        map_file = _needed('map_file', parameters.map_file, problems)
         mappings, map_problems = load_mappings(map_file)
         for mapping, problem in line_problems(mappings, network, map_file):
             mappings.remove(mapping)
@@ -159,6 +174,22 @@ def configure(node: Node) -> Configuration:
         _declare_map(node, cells)
     return Configuration(parameters, network, port, mappings, map_problems, polling,
                          _ignored_overrides(node, cells))
+
+
+def _needed(name: str, path: str, problems: list[Problem]) -> str:
+    """Return the path of a file; raises ConfigurationError that tells how to start."""
+    if path:
+        return path
+    if any(problem.place.file == f'parameter {name}' for problem in problems):
+        raise ConfigurationError([])  # it is given, but not as a text
+    raise ConfigurationError([Problem(
+        f'parameter {name}', f'which file? Start with --ros-args -p net_file:=net.csv -p '
+        f'map_file:=map.csv; examples are in {config_file("net.csv").parent}, and "ros2 launch '
+        'abdf1_ros demo.launch.py" runs them with a simulated line')])
+
+
+def _resolved(path: str) -> str:
+    return str(Path(path).resolve()) if path else ''
 
 
 def _unknown_overrides(node: Node) -> list[Problem]:
@@ -217,8 +248,14 @@ def _declare(node: Node, name: str, default: Any, description: str, low: float |
     """
     Declare a parameter and return its value, whatever the user has given.
 
-    Types and ranges are shown to the user by rclpy and checked by us, who can say more.
+    Types and ranges are shown to the user by rclpy and checked by us, who can say more. A path
+    is shown resolved and returned as it was given.
     """
+    given = _overrides(node).get(name)
+    if name in _PATHS and given is not None and isinstance(given.value, str):
+        descriptor = ParameterDescriptor(description=description, read_only=True)
+        node.declare_parameter(name, _resolved(given.value), descriptor, ignore_override=True)
+        return given.value
     descriptor = ParameterDescriptor(
         description=description, read_only=True, dynamic_typing=True)
     if low is not None and high is not None:

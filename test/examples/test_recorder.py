@@ -24,10 +24,9 @@ import re
 import shlex
 import signal
 
-from abdf1_ros.paths import config_file
 import pytest
 from support.launch_stand_in import SOURCE
-from support.ros import Observer, Process, ros_args
+from support.ros import EXAMPLE_FILES, Observer, Process, ros_args
 from support.simulator_process import Files, make_files, READS
 
 EXAMPLE = SOURCE / 'examples' / 'recorder.py'
@@ -120,7 +119,7 @@ def test_topics_of_the_rosbag2_commands_exist() -> None:
                 for command in commands() if '--regex' in command]
     assert named
     assert patterns
-    arguments = ros_args(f'map_file:={config_file("map.csv")}', 'port:=/dev/ttyS99')
+    arguments = ros_args(*EXAMPLE_FILES, 'port:=/dev/ttyS99')
     with Observer() as observer, Process('node', *arguments) as node:
         def topics() -> set[str]:
             return {name for name, _ in observer.node.get_topic_names_and_types()}

@@ -35,6 +35,7 @@ from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt8MultiArray
 from support.ros import (
     details,
     ERROR,
+    EXAMPLE_FILES,
     Inbox,
     Observer,
     OK,
@@ -313,7 +314,8 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
     assert values_in(speed.first()) == [0, 0]
     # What only the PLC can know shows in the diagnostics, mapping by mapping, and in the log.
     status = until_status(bench.diagnostics, 'mappings', ERROR)
-    assert status.message == 'ERROR: of 2 mappings 1 failed, 1 fresh'
+    assert status.message.startswith(
+        'ERROR: of 2 mappings 1 failed, 1 fresh; 2 rows left out of the map, the first at ')
     reason = 'STS F0 EXT STS 06: address does not point to something usable'
     assert details(status)['missing'] == f'failed: N99:0 at station 1, never read; {reason}'
     errors = [line for line in ''.join(capfd.readouterr()).splitlines() if '[ERROR]' in line]
@@ -458,7 +460,7 @@ def test_map_without_a_row_is_told(
      'to 60')])
 def test_faulty_parameter_is_told_in_one_line(
         refusal: Callable[..., list[str]], assignment: str, expected: str) -> None:
-    (line,) = refusal(*ros_args(assignment))
+    (line,) = refusal(*ros_args(*EXAMPLE_FILES, assignment))
     level, _, name, text = line.split(' ', 3)
     assert (level, name, text) == ('[FATAL]', '[abdf1]:', expected)
 

@@ -80,14 +80,34 @@ def problems_of(node: Node) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
-def test_without_any_parameter_the_files_of_the_package_are_used(make_node: Nodes) -> None:
-    node = make_node()
-    configuration = configure(node)
-    assert configuration.parameters == Parameters()
-    assert not configuration.map_problems
-    assert configuration.mappings
-    assert node.get_parameter('net.timeout').value == configuration.network.timeout
-    assert config_file('net.csv').is_file()
+def test_without_files_the_node_says_how_to_start(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    examples = config_file('net.csv').parent
+    how = ('which file? Start with --ros-args -p net_file:=net.csv -p map_file:=map.csv; '
+           f'examples are in {examples}, and "ros2 launch abdf1_ros demo.launch.py" runs them '
+           'with a simulated line')
+    assert problems_of(make_node()) == [
+        f'parameter net_file: {how}', f'parameter map_file: {how}']
+    del files['map_file']
+    assert problems_of(make_node(files)) == [f'parameter map_file: {how}']
+
+
+def test_files_are_shown_as_resolved_paths(
+        make_node: Nodes, files: dict[str, str], monkeypatch: pytest.MonkeyPatch,
+        tmp_path: Path) -> None:
+    (tmp_path / 'elsewhere').mkdir()
+    monkeypatch.chdir(tmp_path / 'elsewhere')
+    node = make_node({'net_file': '../net.csv', 'map_file': files['map_file']})
+    configure(node)
+    assert node.get_parameter('net_file').value == files['net_file']
+    assert node.get_parameter('map_file').value == files['map_file']
+
+
+def test_one_line_tells_what_the_node_runs_with(
+        configured: Callable[..., Configuration], files: dict[str, str]) -> None:
+    assert str(configured(port='/dev/ttyUSB0')) == (
+        f'{files["net_file"]} and {files["map_file"]}: port /dev/ttyUSB0, Mode Master, 9600 '
+        'baud, CRC; 2 rows, topics: 2 to read, 1 to write')
 
 
 def test_defaults_are_those_of_the_contract() -> None:

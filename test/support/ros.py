@@ -36,6 +36,7 @@ from typing import Any, TypeVar
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.paths import config_file
 from abdf1_ros.ports.endpoints import PtyLine
 from abdf1_ros.ports.port import LinkThread
 from abdf1_ros.ros.messages import latched_qos
@@ -357,6 +358,10 @@ def write_csv(path: Path, header: str, rows: Iterable[str]) -> Path:
     """Write a CSV file and return its path."""
     path.write_text('\n'.join([header, *rows, '']), encoding='utf-8')
     return path
+
+
+# What makes the node run with the example of this package.
+EXAMPLE_FILES = tuple(f'{name}_file:={config_file(f"{name}.csv")}' for name in ('net', 'map'))
 
 
 def ros_args(*assignments: str) -> list[str]:
