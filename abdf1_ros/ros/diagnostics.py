@@ -120,6 +120,10 @@ class Diagnostics:
         """Count a write."""
         self._writes.add(result, now)
 
+    def lost(self, topic: str, count: int, now: float) -> None:
+        """Count messages to a write topic that never came."""
+        self._writes.lost(topic, count, now)
+
     def reset_counters(self) -> None:
         """Show every counter from zero again."""
         # The counters themselves belong to the link thread; only their origin moves.
@@ -298,11 +302,13 @@ class WriteLog:
     Counts of writes by how they ended.
 
     Refusals are counted in the thread of the requests, all else in that of the link: no count
-    has two writers.
+    has two writers. Messages that never came are counted in the former.
     """
 
     def __init__(self) -> None:
         self._counts: Counter[Outcome] = Counter()
+        self._lost = 0
+        self._last_loss: tuple[str, float] | None = None
         self._last_failure: tuple[WriteResult, float] | None = None
 
     def add(self, result: WriteResult, now: float) -> None:
@@ -311,13 +317,20 @@ class WriteLog:
         if result.outcome not in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED):
             self._last_failure = result, now
 
+    def lost(self, topic: str, count: int, now: float) -> None:
+        """Count messages that never came."""
+        self._lost += count
+        self._last_loss = f'{count} to ~/write/{topic}', now
+
     def judge(self, now: float) -> Verdict:
-        """Return WARN for a while after a write that was not confirmed."""
+        """Return WARN for a while after a write that was not confirmed, or never came."""
         total = self._counts.total()
         summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
         if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
             result = self._last_failure[0]
             return WARN, f'{summary}; {result.mapping.tag} {result}'
+        if self._last_loss and now - self._last_loss[1] < _WRITE_MEMORY:
+            return WARN, f'{summary}; {self._lost} messages were lost on their way here'
         return OK, summary
 
     def values(self, now: float) -> dict[str, str]:
@@ -335,6 +348,8 @@ class WriteLog:
             'unknown': str(counts[Outcome.UNKNOWN]),
             'superseded': str(counts[Outcome.SUPERSEDED]),
             'refused': str(counts[Outcome.REFUSED]),
+            'lost on their way': str(self._lost),
+            'last loss': _with_age(self._last_loss, now),
             'last failure': _with_age(last, now),
         }
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict, deque
 from collections.abc import Sequence
+from functools import partial
 import random
 import re
 import signal
@@ -38,7 +39,7 @@ from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
-from abdf1_ros.errors import ConfigurationError, FormatError
+from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
 from abdf1_ros.ports.trace import PortOpener
@@ -49,11 +50,11 @@ from abdf1_ros.ros.messages import (
     latched_qos,
     MESSAGES,
     read_qos,
-    values_of,
     write_qos,
 )
 from abdf1_ros.ros.parameters import Configuration, configure
 from abdf1_ros.ros.station_health import LinkCounterService
+from abdf1_ros.ros.writes import LossCounter, WriteTopic
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
@@ -153,11 +154,9 @@ class BridgeNode(Node):
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.driver = self._make_driver(configuration)
         self._create_reads()
-        self._create_writes()
         self._diagnostics = Diagnostics(
             self.get_name(), self.driver, configuration.port, configuration.map_problems)
         self._diagnostics_period = configuration.parameters.diagnostics_period
-        self._write_timeout = configuration.parameters.write_timeout
         # Every node has this service, and nobody gives it another name.
         service = f'{self.get_fully_qualified_name()}/get_parameters'
         self._namesakes = NamesakeWatch(lambda: self.count_services(service))
@@ -182,6 +181,7 @@ class BridgeNode(Node):
         self.link = LinkThread(
             self.driver.machine, self._opener.open, on_state=self._port_changed,
             on_fault=self._fault, while_sending=self._publish_later_values)
+        self._create_writes(configuration.parameters.write_timeout)
         self._diagnostics.attach(self.link)
         self._link_counters = LinkCounterService(self.driver, self.link)
         self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
@@ -224,38 +224,25 @@ class BridgeNode(Node):
                 read_qos(mapping, point.stale_time), event_callbacks=quiet)
             self._read_publishers[mapping.topic] = publisher, encoder(mapping)
 
-    def _create_writes(self) -> None:
+    def _create_writes(self, patience: float) -> None:
         topics = defaultdict(list)
         for mapping in self.driver.mappings:
             if mapping.writes:
                 topics[mapping.topic].append(mapping)
         for topic, mappings in topics.items():
+            name = f'~/write/{topic}'
+            writer: Any = WriteTopic(
+                topic, mappings, self.driver, patience, on_loss=self._lost,
+                losses=LossCounter(partial(self.count_publishers, name)),
+                wake=self.link.wake)
             self.create_subscription(
-                MESSAGES[mappings[0].message_type], f'~/write/{topic}',
-                self._writer(mappings), write_qos())
+                MESSAGES[mappings[0].message_type], name, writer.take, write_qos())
 
-    def _writer(self, mappings: Sequence[Mapping]) -> Any:
-        """Return the callback that writes a message to every mapping of its topic."""
-        def write(message: Any, info: Any) -> None:
-            # It may have waited, while this process was paused or the network was down.
-            now = time.time_ns()
-            stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
-            waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
-            requested = time.monotonic() - waited
-            for mapping in mappings:
-                try:
-                    self._check_age(waited)
-                    self.driver.write(mapping, values_of(message), requested)
-                except FormatError as error:
-                    self.driver.refuse(mapping, str(error), message.data)
-            self.link.wake()
-        return write
-
-    def _check_age(self, age: float) -> None:
-        if age > self._write_timeout:
-            raise FormatError(
-                f'it came {age:.1f} s after it was published, write_timeout is '
-                f'{self._write_timeout:g} s; or the clocks of the two hosts differ')
+    def _lost(self, topic: str, count: int) -> None:
+        self._diagnostics.lost(topic, count, time.monotonic())
+        self._lines.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
+                            'lost on their way here, and have no result: they come faster than '
+                            'they can be taken')
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""

@@ -412,6 +412,7 @@ def test_every_outcome_is_counted_in_its_place(
     log.add(result(bench, outcome, 'why'), NOW)
     values = log.values(NOW + 1)
     last = values.pop('last failure')
+    assert values.pop('last loss') == 'none'
     assert {key: value for key, value in values.items() if value != '0'} == expected
     is_failure = outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED)
     assert last == (f'level {outcome.value}: why (1.0 s ago)' if is_failure else 'none')
@@ -420,6 +421,17 @@ def test_every_outcome_is_counted_in_its_place(
 
 def test_writes_before_the_first(bench: Bench) -> None:
     assert bench.says('writes') == (OK, 'OK: 0 of 0 writes confirmed')
+
+
+def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> None:
+    bench.diagnostics.lost('level', 3, NOW)
+    bench.diagnostics.lost('pulses', 1, NOW + 1)
+    assert bench.says('writes', NOW + 10.9) == (
+        WARN, 'WARN: 0 of 0 writes confirmed; 4 messages were lost on their way here')
+    assert bench.says('writes', NOW + 11) == (OK, 'OK: 0 of 0 writes confirmed')
+    values = details(bench.status('writes', NOW + 11))
+    assert values['lost on their way'] == '4'
+    assert values['last loss'] == '1 to ~/write/pulses (10.0 s ago)'
 
 
 def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:

@@ -206,6 +206,21 @@ def test_every_pulse_of_a_burst_is_sent_in_order(make_bench: Benches) -> None:
     assert details(status)['accepted'] == '200'
 
 
+def test_messages_that_dds_drops_are_counted(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(RECIPE)
+    publish = bench.publisher(Int16MultiArray, 'recipe')
+    publish(0, 0)
+    bench.until_results(1)
+    for number in range(1200):  # while nobody takes them; 1000 are kept
+        publish(number, number)
+    bench.until_results(1001)
+    writes = until_status(bench.diagnostics, 'writes', WARN,
+                          lambda status: details(status)['lost on their way'] == '200')
+    assert writes.message.endswith('; 200 messages were lost on their way here')
+    assert '~/write/recipe: 200 messages were lost on their way here' in capfd.readouterr().err
+
+
 def test_waiting_words_are_superseded_by_newer_ones(make_bench: Benches) -> None:
     bench = make_bench(RECIPE, PULSES)
     bench.plcs.say('slow 1 10')
