@@ -233,7 +233,7 @@ class Command:
 
     def __init__(self, module: str, *args: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, '-m', f'abdf1_ros.{module}', *args], text=True,
+            [sys.executable, '-m', 'abdf1_ros', module, *args], text=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def __enter__(self) -> Command:

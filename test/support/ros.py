@@ -89,7 +89,7 @@ class Process:
     def __init__(self, module: str | Path, *args: str) -> None:
         self.lines: list[str] = []
         self._said = threading.Condition()
-        program = [module] if isinstance(module, Path) else ['-m', f'abdf1_ros.{module}']
+        program = [module] if isinstance(module, Path) else ['-m', 'abdf1_ros', module]
         self._process = subprocess.Popen(
             [sys.executable, *program, *args], text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
