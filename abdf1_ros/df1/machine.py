@@ -39,7 +39,7 @@ from typing import NamedTuple
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, FrameDecoder, Symbol
+from abdf1_ros.df1.frames import Code, Control, Duplex, FrameDecoder, Symbol
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 
 
@@ -61,8 +61,15 @@ class Step(NamedTuple):
 # What an operating system or a device server may hold bytes of a frame back (s).
 _HELD_BACK = 0.1
 
+# A message that has begun may take so many times as long as its bytes take at the set speed, and
+# two pauses besides. Without a limit a station that dribbles would keep the line from all others.
+_SLOWEST = 4
+
 # Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
 _LAST_CHARACTERS = 16
+
+# What nobody says in full duplex before he has heard a message or an ENQ to its end.
+_RESPONSES = (Control(Code.ACK), Control(Code.NAK))
 
 KEEP = -1.0
 LISTEN_ON = Step(b'', KEEP)
@@ -81,6 +88,19 @@ class LineTiming:
 
     char_time: float = 0.0
     tx_delay: float = 0.0
+
+
+class _Incoming(NamedTuple):
+    """
+    The message that is coming in: when its first bytes came, and how many had come by then.
+
+    ``is_in_time`` tells whether it has begun before the time for it was up.
+    """
+
+    number: int = 0
+    begun: float = 0.0
+    heard: int = 0
+    is_in_time: bool = False
 
 
 class Machine:
@@ -112,6 +132,7 @@ class Machine:
         self._timing = timing or LineTiming()
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
+        self._is_half_duplex = duplex is Duplex.HALF
         self._procedure: Procedure | None = None
         self._out = bytearray()
         self._pending: Step | None = None  # waits for its delay before it goes out
@@ -122,7 +143,7 @@ class Machine:
         self._echoes = False
         self._echo_due = 0
         self._due = -math.inf  # the deadline, before a message was heard out
-        self._message = 0
+        self._message = _Incoming()
 
     @property
     def char_time(self) -> float:
@@ -181,25 +202,28 @@ class Machine:
         if self._echoes:
             data = self._without_echo(data)
         is_listening = self._listening
-        if self._forget_on_send and not is_listening:
-            return
+        if self._forget_on_send and (self._out or not is_listening):
+            return  # it was said before what it would have to answer
         is_idle = self._resting or self.deadline is None
         if is_idle and is_listening and now - self._last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
         self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
-        if self.deadline is not None and not self._resting and self._listening:
-            self._hear_out(now, self.deadline)
+        if self.decoder.in_message:
+            self._hear_out(now)
 
-    def _hear_out(self, now: float, deadline: float) -> None:
-        """Let a message that has begun in time be heard to its end, unless it pauses."""
-        if not self.decoder.in_message:
+    def _hear_out(self, now: float) -> None:
+        """Let a message that has begun in time be heard to its end, unless it pauses or crawls."""
+        heard = self.counters.chars_received
+        if self._message.number != self.decoder.begun:
+            self._message = _Incoming(self.decoder.begun, now, heard, now <= self._due)
+        if self.deadline is None or self._resting or not self._message.is_in_time \
+                or not self._listening:
             return
-        if now <= self._due:
-            self._message = self.decoder.begun
-        if self.decoder.begun == self._message:
-            self.deadline = max(deadline, now + self._pause_limit)
+        needed = (heard - self._message.heard) * self._timing.char_time
+        limit = self._message.begun + 2 * self._pause_limit + _SLOWEST * needed
+        self.deadline = max(self.deadline, min(now + self._pause_limit, limit))
 
     def handle_timeout(self, now: float) -> None:
         """Take note that the clock reads ``now``; does nothing before the deadline."""
@@ -250,7 +274,13 @@ class Machine:
             symbol = self.decoder.next_symbol()
             if symbol is None:
                 return
+            if self._line_free > self.now and self._answers(symbol):
+                self._line_free = self.now  # the line is faster than it is set
             self._resume(symbol)
+
+    def _answers(self, symbol: Symbol) -> bool:
+        """Tell whether what comes now proves that what we have sent has left."""
+        return self._is_half_duplex or symbol in _RESPONSES
 
     def _resume(self, symbol: Symbol | None) -> None:
         """Run the procedure up to a step that has to wait."""

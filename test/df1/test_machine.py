@@ -21,7 +21,18 @@ from dataclasses import replace
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, NAK, Symbol
+from abdf1_ros.df1.frames import (
+    ACK,
+    Code,
+    Control,
+    Duplex,
+    EOT,
+    Frame,
+    message_frame,
+    NAK,
+    STX,
+    Symbol,
+)
 from abdf1_ros.df1.machine import KEEP, LineTiming, LISTEN_ON, Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
 import pytest
@@ -35,11 +46,12 @@ class Bench:
     """A machine that carries out a list of steps and notes what each of them brought."""
 
     def __init__(self, *steps: Step, timing: LineTiming | None = None,
-                 forget_on_send: bool = False) -> None:
+                 forget_on_send: bool = False, duplex: Duplex = Duplex.HALF) -> None:
         self.got: list[Symbol | None] = []
         self.error: Exception | None = None
         self.machine = Machine(
-            self._procedure, checksum=Checksum.CRC, timing=timing, forget_on_send=forget_on_send)
+            self._procedure, checksum=Checksum.CRC, duplex=duplex, timing=timing,
+            forget_on_send=forget_on_send)
         self._steps = steps
 
     def _procedure(self, machine: Machine) -> Procedure:
@@ -89,6 +101,23 @@ def test_deadline_after_an_idle_line_counts_from_now() -> None:
     assert bench.machine.deadline == pytest.approx(6.5)
     bench.machine.receive_data(ACK, 6.25)
     assert bench.machine.deadline == pytest.approx(6.25 + 0.1 + 1.0)
+
+
+def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_set() -> None:
+    bench = Bench(*[Step(FRAME, 1.0)] * 101, timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    for count in range(1, 101):
+        bench.machine.receive_data(EOT, 0.01 * count)
+        assert bench.machine.deadline == pytest.approx(0.01 * count + 0.1 + 1.0)
+
+
+def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
+    bench = Bench(*[Step(FRAME, 1.0)] * 3, timing=LineTiming(char_time=0.01), duplex=Duplex.FULL)
+    bench.machine.start(0.0)
+    bench.machine.receive_data(MESSAGE, 0.05)  # the other end speaks whenever it likes
+    assert bench.machine.deadline == pytest.approx(0.2 + 1.0)
+    bench.machine.receive_data(ACK, 0.06)
+    assert bench.machine.deadline == pytest.approx(0.06 + 0.1 + 1.0)
 
 
 def test_symbol_ends_a_step() -> None:
@@ -202,11 +231,24 @@ def test_listening_is_not_delayed() -> None:
 def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
     bench.machine.start(0.0)
+    assert bench.machine.data_to_send() == FRAME
     bench.machine.receive_data(ACK + EOT + NAK[:1], 0.5)
     assert bench.got == [SAID_ACK]
+    assert bench.machine.data_to_send() == FRAME
     bench.machine.receive_data(NAK[1:], 0.6)
     assert bench.got == [SAID_ACK]
-    assert bench.machine.data_to_send() == FRAME + FRAME
+
+
+def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
+    bench.machine.start(0.0)
+    bench.machine.data_to_send()
+    bench.machine.handle_timeout(10.0)  # after a pause of the process
+    bench.machine.receive_data(ACK, 10.0)
+    assert bench.got == [None]
+    assert bench.machine.data_to_send() == FRAME
+    bench.machine.receive_data(ACK, 10.1)
+    assert bench.got == [None, SAID_ACK]
 
 
 def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
@@ -214,6 +256,7 @@ def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
     bench.machine.start(0.0)
     bench.machine.receive_data(ACK + b'\x10', 0.1)
     bench.machine.handle_timeout(0.25)
+    assert bench.machine.data_to_send() == FRAME
     bench.machine.receive_data(b'\x06', 0.3)
     assert bench.got == []
     bench.machine.receive_data(EOT, 0.4)
@@ -284,10 +327,26 @@ def test_answer_that_has_begun_extends_the_deadline() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), forget_on_send=True)
     bench.machine.start(0.0)
     for number, byte in enumerate(MESSAGE):
-        bench.machine.receive_data(bytes((byte,)), 0.8 + 0.2 * number)
-        bench.machine.handle_timeout(0.8 + 0.2 * number)
+        bench.machine.data_to_send()
+        bench.machine.receive_data(bytes((byte,)), 0.9 + 0.04 * number)
+        bench.machine.handle_timeout(0.9 + 0.04 * number)
     assert len(bench.got) == 1
     assert bench.got[0] is not None
+
+
+@pytest.mark.parametrize('pause', [0.08, 0.2])
+def test_message_may_not_crawl_for_ever(pause: float) -> None:
+    """A byte takes 0.01 s at the set speed; none of the pauses alone would end the message."""
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    now = 1.0
+    bench.machine.receive_data(STX, now)
+    while not bench.got:
+        now += pause
+        bench.machine.handle_timeout(now)
+        bench.machine.receive_data(bytes(1), now)
+    assert bench.got == [None]
+    assert now - 1.0 < 0.6 / (1 - 0.04 / pause) + 2 * pause
 
 
 def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:

@@ -20,7 +20,7 @@ from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import master_frame
+from abdf1_ros.df1.frames import master_frame, Poll, STX, Symbol
 from abdf1_ros.df1.master_line import (
     BROADCAST_PAUSE,
     MasterSettings,
@@ -30,6 +30,7 @@ from abdf1_ros.df1.master_line import (
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.errors import StationInactive
 import pytest
 from support.multidrop import MasterBench, Slave
 from support.vectors import vector
@@ -427,3 +428,47 @@ def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
     assert rig.master.changes == []
     assert {number for number, *_ in rig.master.numbers()} == {2523}
     assert all(len(rig[number].served) > 50 for number in numbers)
+
+
+@BOTH
+def test_line_that_is_faster_than_set_waits_no_longer_for_a_silent_station(
+        standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig.line.char_time = 0.0  # as a network: what is written is there
+    rig.start()
+    for _ in range(500):
+        errand = rig.ask(7)
+        rig.line.run(lambda errand=errand: errand.result is not None, 1.0)
+    begun = rig.clock()
+    rig[7].silent = True
+    errand = rig.ask(7)
+    rig.line.run(lambda: errand.result is not None, 60.0)
+    assert isinstance(errand.result, StationInactive)
+    assert rig.clock() - begun < 2 * (SETTINGS.timeout + 0.05)
+
+
+class Dribbler(Slave):
+    """A station that answers each poll with a beginning and then a byte every 60 ms."""
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Begin a message."""
+        return STX if symbol == Poll(self.number, True) else super().handle(symbol)
+
+
+@BOTH
+def test_station_that_dribbles_does_not_keep_the_line(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    rig.slaves[7] = Dribbler(7, rig.clock)
+    rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+    rig.start()
+    waits = []
+    for _ in range(20):
+        rig.ask(7)
+        errand = rig.ask(8)
+        while errand.result is None:
+            rig.run(0.06)
+            rig.master.machine.receive_data(bytes(1), rig.clock())
+        assert isinstance(errand.result, Packet)
+        waits.append(errand.seconds)
+    # Two polls of the other one, each until its message is given up.
+    assert max(waits) < 2 * (SETTINGS.timeout + 0.5)

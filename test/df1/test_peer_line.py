@@ -267,3 +267,14 @@ def test_ack_that_waits_behind_a_long_message_is_awaited() -> None:
     assert_exact(rig)
     for end in rig.ends:
         assert all(isinstance(errand.result, Packet) for errand in end.all)
+
+
+def test_lost_frame_on_a_line_that_is_faster_than_set_costs_no_more_than_its_retries() -> None:
+    rig = Rig(SETTINGS)
+    rig.line.char_time = 0.0  # as a network: what is written is there
+    rig.run(500)
+    ours, theirs = rig.ends
+    begun = rig.line.now
+    rig.line.noise = Noise(lost=1.0)
+    rig.run(1)
+    assert rig.line.now - begun < rig.transfer_bound()
