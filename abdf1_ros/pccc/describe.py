@@ -116,7 +116,7 @@ def _typed_read(request: plc5.TypedRead) -> str:
 
 def _typed_write(request: plc5.TypedWrite) -> str:
     values = request.values
-    return (f'{notation.system_address(request.address, values.type_id)} = '
+    return (f'{notation.system_address(request.address, values)} = '
             f'{notation.typed_values(request.address, values) or "nothing"}'
             f'{part_of(request.offset, values.count, request.total)}')
 

@@ -119,7 +119,8 @@ class Layout:
         return not self.members or any(part.bit in (None, bit) for part in parts)
 
 
-_INTEGER, _BYTES = 4, 3
+# Data types of a PLC-5 (M 7-29). A file's own type has to be named when it is written.
+_CHARACTERS, _INTEGER, _BCD = 3, 4, 16
 _LAYOUTS: dict[PlcType, dict[FileType, Layout]] = {
     PlcType.PLC2: {FileType.BINARY: Layout()},
     PlcType.PLC3: {kind: Layout() for kind in (
@@ -128,14 +129,15 @@ _LAYOUTS: dict[PlcType, dict[FileType, Layout]] = {
         FileType.TIMER: Layout(3, members=members.PLC3_TIMER),
         FileType.COUNTER: Layout(3, members=members.PLC3_COUNTER)},
     PlcType.PLC5: {kind: Layout(code=_INTEGER) for kind in (
-        FileType.OUTPUT, FileType.INPUT, FileType.STATUS, FileType.BINARY, FileType.INTEGER,
-        FileType.ASCII, FileType.BCD)} | {
+        FileType.OUTPUT, FileType.INPUT, FileType.STATUS, FileType.BINARY, FileType.INTEGER)} | {
+        FileType.ASCII: Layout(code=_CHARACTERS),
+        FileType.BCD: Layout(code=_BCD),
         # The two words behind ACC are internal and have no address.
         FileType.TIMER: Layout(3, 5, members.TIMER, typed_words=5),
         FileType.COUNTER: Layout(3, 6, members.COUNTER),
         FileType.CONTROL: Layout(3, 7, members.CONTROL),
         FileType.FLOAT: Layout(2, 8),
-        FileType.STRING: Layout(42, _BYTES),
+        FileType.STRING: Layout(42, _CHARACTERS),
         FileType.PID: Layout(82, 0x15, members.PLC5_PID),
         FileType.MESSAGE: Layout(56, 0x16, members.PLC5_MESSAGE),
         FileType.SFC_STATUS: Layout(3, 0x1D, members.PLC5_SFC),

@@ -33,10 +33,12 @@ from abdf1_ros.pccc.typed_data import TypedData
 _BY_PLC5_FILE = {
     kind.default_file: kind for kind in file_types_of(PlcType.PLC5)
     if kind.default_file is not None}
-# Types that a typed command names; 4 may be N, B, A, D, S, I or O (M 7-29).
-_BY_PLC5_ID = {
-    layout_of(kind, PlcType.PLC5).code: kind for kind in file_types_of(PlcType.PLC5)
-    if kind.is_structure or kind in (FileType.FLOAT, FileType.STRING)}
+# Types that a typed command names, with their size; 4 may be N, B, S, I or O (M 7-29).
+_INTEGERS = (FileType.INTEGER, FileType.BINARY, FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
+_BY_PLC5_TYPE = {
+    (element.type_id, element.wire_size // element.parts): kind
+    for kind in file_types_of(PlcType.PLC5) if kind not in _INTEGERS
+    for element in (plc5.element_of(Address(PlcType.PLC5, kind, 0, 0), is_value=False),)}
 
 
 def count_of(number: int, name: str) -> str:
@@ -54,16 +56,16 @@ def hexadecimal(data: bytes) -> str:
     return data.hex(' ').upper()
 
 
-def system_address(address: plc5.SystemAddress, type_id: int | None = None) -> str:
+def system_address(address: plc5.SystemAddress, values: TypedData | None = None) -> str:
     """
     Return a PLC-5 address.
 
-    The type of a file above 8 is not in its address; where ``type_id`` of the data does not
-    tell it either, the file has its number only.
+    The type of a file above 8 is not in its address; where ``values`` do not tell it either,
+    the file has its number only.
     """
     kind = _BY_PLC5_FILE.get(address.file)
-    if kind is None and type_id is not None:
-        kind = _BY_PLC5_ID.get(type_id)
+    if kind is None and values is not None:
+        kind = _BY_PLC5_TYPE.get((values.type_id, values.element_size))
     if kind is not None:
         return _place(PlcType.PLC5, kind, address.file, address.element,
                       address.sub_element or 0)

@@ -145,16 +145,16 @@ def commands(text: str, values: list[float] | str, plc: str = 'PLC5', length: in
 
 @pytest.mark.parametrize('plc, text, length, values, expected', [
     # Typed write: FNC 67, offset, total, address 07 area file element, descriptor, data.
-    ('PLC5', 'N7:3', 1, [0x1234], ['67 00 00 01 00 07 00 07 03 93 09 42 34 12']),
+    ('PLC5', 'N7:3', 1, [0x1234], ['67 00 00 01 00 06 07 03 93 09 42 34 12']),
     ('PLC5', 'N7:300', 2, [1, -1],
-     ['67 00 00 02 00 07 00 07 ff 2c 01 95 09 42 01 00 ff ff']),
-    ('PLC5', 'F8:1', 1, [1.5], ['67 00 00 01 00 07 00 08 01 96 09 94 08 00 00 c0 3f']),
+     ['67 00 00 02 00 06 07 ff 2c 01 95 09 42 01 00 ff ff']),
+    ('PLC5', 'F8:1', 1, [1.5], ['67 00 00 01 00 06 08 01 96 09 94 08 00 00 c0 3f']),
     ('PLC5', 'PD12:10.SP', 1, [42.5],
-     ['67 00 00 01 00 0f 00 0c 0a 02 96 09 94 08 00 00 2a 42']),
+     ['67 00 00 01 00 0e 0c 0a 02 96 09 94 08 00 00 2a 42']),
     ('PLC5', 'PD12:10.KP', 2, [1.0, 2.0],
-     ['67 00 00 01 00 0f 00 0c 0a 04 96 09 94 08 00 00 80 3f',
-      '67 00 00 01 00 0f 00 0c 0a 06 96 09 94 08 00 00 00 40']),
-    ('PLC5', 'SC9:1.PRE', 1, [7], ['67 00 00 01 00 0f 00 09 01 01 93 09 42 07 00']),
+     ['67 00 00 01 00 0e 0c 0a 04 96 09 94 08 00 00 80 3f',
+      '67 00 00 01 00 0e 0c 0a 06 96 09 94 08 00 00 00 40']),
+    ('PLC5', 'SC9:1.PRE', 1, [7], ['67 00 00 01 00 0e 09 01 01 93 09 42 07 00']),
     # Protected typed logical write: FNC AA, size, file, type, element, sub-element, data.
     ('SLC', 'PD10:1.KC', 2, [1, 2],
      ['aa 02 0a 93 01 03 01 00', 'aa 02 0a 93 01 04 02 00']),
@@ -171,14 +171,14 @@ def test_bytes_of_a_write_of_words(
 
 @pytest.mark.parametrize('text, length, values, expected', [
     # FNC 26, address, AND mask, OR mask.
-    ('B3:1/5', 1, [1], ['26 07 00 03 01 df ff 20 00']),
-    ('B3:1/5', 1, [0], ['26 07 00 03 01 df ff 00 00']),
-    ('N7:0/4', 3, [1, 0, 1], ['26 07 00 07 00 8f ff 50 00']),
+    ('B3:1/5', 1, [1], ['26 06 03 01 df ff 20 00']),
+    ('B3:1/5', 1, [0], ['26 06 03 01 df ff 00 00']),
+    ('N7:0/4', 3, [1, 0, 1], ['26 06 07 00 8f ff 50 00']),
     ('B3:0/14', 4, [1, 1, 0, 1],
-     ['26 07 00 03 00 ff 3f 00 c0', '26 07 00 03 01 fc ff 02 00']),
-    ('I:017/12', 1, [1], ['26 07 00 01 0f ff fb 00 04']),
-    ('T4:7/DN', 1, [1], ['26 0f 00 04 07 00 ff df 00 20']),
-    ('MG9:3/TO', 1, [1], ['26 0f 00 09 03 00 ff fe 00 01']),
+     ['26 06 03 00 ff 3f 00 c0', '26 06 03 01 fc ff 02 00']),
+    ('I:017/12', 1, [1], ['26 06 01 0f ff fb 00 04']),
+    ('T4:7/DN', 1, [1], ['26 0e 04 07 00 ff df 00 20']),
+    ('MG9:3/TO', 1, [1], ['26 0e 09 03 00 ff fe 00 01']),
 ])
 def test_bits_of_a_plc5_are_a_read_modify_write(
         text: str, length: int, values: list[float], expected: list[str]) -> None:
@@ -203,8 +203,8 @@ def test_members_of_a_structure_are_written_one_by_one() -> None:
     assert commands('T4:2.PRE', [5, 6], 'SLC', 2) == [
         'aa 02 04 86 02 01 05 00', 'aa 02 04 86 02 02 06 00']
     first, second = commands('T4:2.PRE', [5, 6], 'PLC5', 2)
-    assert first == '67 00 00 01 00 0f 00 04 02 01 93 09 42 05 00'
-    assert second == '67 00 00 01 00 0f 00 04 02 02 93 09 42 06 00'
+    assert first == '67 00 00 01 00 0e 04 02 01 93 09 42 05 00'
+    assert second == '67 00 00 01 00 0e 04 02 02 93 09 42 06 00'
 
 
 @pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 117)])
@@ -300,7 +300,7 @@ def test_limit_in_the_message_is_the_limit_of_the_file() -> None:
 @pytest.mark.parametrize('plc, kind, expected', [
     ('SLC', 'int32', 'aa 04 07 89 00 00 01 00 02 00'),
     ('SLC', 'float32', 'aa 04 07 89 00 00 80 47 00 01'),
-    ('PLC5', 'uint32', '67 00 00 02 00 07 00 07 00 95 09 42 01 00 02 00')])
+    ('PLC5', 'uint32', '67 00 00 02 00 06 07 00 95 09 42 01 00 02 00')])
 def test_bytes_of_a_write_with_the_high_word_first(
         plc: str, kind: str, expected: str) -> None:
     mapping = make_mapping(command='Write', plc=plc, kind=kind, word_order='High')
@@ -310,7 +310,7 @@ def test_bytes_of_a_write_with_the_high_word_first(
 
 @pytest.mark.parametrize('plc, expected', [
     ('SLC', 'aa 06 0a 8e 02 00 44 4f 00 44 00 00'),
-    ('PLC5', '67 00 00 03 00 07 00 0a 02 97 09 42 44 4f 00 44 00 00')])
+    ('PLC5', '67 00 00 06 00 06 0a 02 97 09 31 44 4f 00 44 00 00')])
 def test_bytes_of_a_string_over_words(plc: str, expected: str) -> None:
     mapping = make_mapping('A10:2', 'Write', plc=plc, length=3, kind='string')
     (_, command), = Write(mapping, 'ODD', 0.0).commands

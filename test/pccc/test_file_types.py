@@ -24,7 +24,6 @@ from abdf1_ros.pccc.file_types import (
     layout_of,
     PlcType,
 )
-from abdf1_ros.pccc.typed_data import TypedData
 import pytest
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
@@ -51,20 +50,6 @@ def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
 
 def test_every_file_type_of_an_slc_has_its_own_code() -> None:
     assert len(BY_SLC_CODE) == len(file_types_of(SLC)) == 15
-
-
-@pytest.mark.parametrize(('letters', 'descriptor', 'words', 'size'), [
-    ('N', '42', 1, 2), ('B', '42', 1, 2), ('A', '42', 1, 2), ('D', '42', 1, 2),
-    ('S', '42', 1, 2), ('I', '42', 1, 2), ('O', '42', 1, 2), ('T', '59 0A', 3, 10),
-    ('C', '66', 3, 6), ('R', '76', 3, 6), ('F', '94 08', 2, 4), ('ST', '39 54', 42, 84),
-    ('PD', '99 15 A4', 82, 164), ('MG', '99 16 70', 56, 112), ('SC', '96 1D', 3, 6),
-    ('BT', '99 20 0C', 6, 12)])
-def test_plc5_descriptors_and_element_sizes(letters: str, descriptor: str, words: int,
-                                            size: int) -> None:
-    layout = layout_of(FileType(letters), PLC5)
-    assert (layout.words, 2 * layout.wire_words) == (words, size)
-    encoded = TypedData(layout.code, 2 * layout.wire_words, bytes(4 * size)).encode()
-    assert encoded.endswith(bytes.fromhex(descriptor) + bytes(4 * size))
 
 
 @pytest.mark.parametrize(('family', 'missing'), [

@@ -266,7 +266,7 @@ def test_message_of_the_plc(line: Line) -> None:
     command = client.hear()
     assert command[:4] == bytes((5, 1, 0x0F, 0))
     # Total 2, memory area 0, file 7, element 50, then an array of integers (M 7-30, 13-10).
-    assert command[6:] == bytes.fromhex('67 00 00 02 00 07 00 07 32 95 09 42 0B 00 16 00')
+    assert command[6:] == bytes.fromhex('67 00 00 02 00 06 07 32 95 09 42 0B 00 16 00')
     client.say(NAK)
     assert client.hear() == command
     client.say(ACK)

@@ -104,6 +104,18 @@ def vector(name: str) -> Vector:
     return next(entry for entry in VECTORS if entry.name == name)
 
 
+def without_area(data: bytes) -> bytes:
+    """
+    Return a PLC-5 command of a vector as we send it, with the shorter of two equal addresses.
+
+    The vectors spell the memory area out: 07 00, or 0F 00 with a sub-element (M 13-12).
+    """
+    at = 1 if data[0] in (0x02, 0x26) else 5
+    if data[at:at + 2] not in (b'\x07\0', b'\x0F\0'):
+        return data
+    return data[:at] + bytes((data[at] & 0x0E,)) + data[at + 2:]
+
+
 def commands(*functions: int) -> list[Vector]:
     """Return the good CMD 0F command vectors with one of the function codes."""
     return [entry for entry in MESSAGES

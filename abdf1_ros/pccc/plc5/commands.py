@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.fields import number, Reader, word
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.typed_data import FLOAT, INTEGER, TypedData
 
 CMD = 0x0F
@@ -34,8 +34,8 @@ TYPED_READ = 0x68
 MAX_REPLY = 240
 MAX_WRITE = 240
 MAX_INTEGERS = 110  # 118 would fit, but without room for descriptors that are padded
-# Mask and area, file and element in three bytes each (M 13-10..13-12).
-MAX_ELEMENT_ADDRESS = 8
+# Mask, file and element in three bytes each (M 13-10..13-12).
+MAX_ELEMENT_ADDRESS = 7
 
 _AREA, _FILE, _ELEMENT, _SUB_ELEMENT = 1, 2, 4, 8
 _ASCII_PREFIX = b'\x00$'
@@ -48,19 +48,26 @@ class Element:
     What a typed command counts.
 
     ``type_id`` is its data type (M 7-29), ``wire_size`` its bytes on the line, ``size`` those
-    of them that have an address.
+    of them that have an address. It travels as ``parts`` pieces of that type: a word of an A
+    file as two characters (publication 1785-6.5.9 6-12 gives the type one byte).
     """
 
     type_id: int
     wire_size: int
     size: int
+    parts: int = 1
+
+    def typed(self, data: bytes) -> TypedData:
+        """Return whole elements, as they stand on the line, with their type."""
+        return TypedData(self.type_id, self.wire_size // self.parts, data)
 
 
 def element_of(address: Address, is_value: bool) -> Element:
     """Return what is moved at ``address``: one value of a structure, or whole elements."""
     layout = address.layout
     if not is_value:
-        return Element(layout.code, 2 * layout.wire_words, 2 * layout.words)
+        parts = 2 if address.file_type is FileType.ASCII else 1
+        return Element(layout.code, 2 * layout.wire_words, 2 * layout.words, parts)
     is_float = layout.value_words(address.word) == 2
     return Element(FLOAT, 4, 4) if is_float else Element(INTEGER, 2, 2)
 
@@ -74,9 +81,14 @@ class SystemAddress:
     sub_element: int | None = None
 
     def encode(self) -> bytes:
-        """Return the logical binary form with the memory area spelled out (M 13-10..13-12)."""
-        mask = _AREA | _FILE | _ELEMENT
-        levels = number(0) + number(self.file) + number(self.element)
+        """
+        Return the logical binary form (M 13-10..13-12).
+
+        The memory area is left out: without it the data table is meant, and there are servers
+        that refuse an address which names it (``read`` takes both).
+        """
+        mask = _FILE | _ELEMENT
+        levels = number(self.file) + number(self.element)
         if self.sub_element is not None:
             mask |= _SUB_ELEMENT
             levels += number(self.sub_element)

@@ -52,7 +52,7 @@ class Plc5Dialect:
         """Return descriptors and elements of the reply's array."""
         element = _element(address, words)
         data = bytes(2 * words // element.size * element.wire_size)
-        return len(TypedData(element.type_id, element.wire_size, data).encode())
+        return len(element.typed(data).encode())
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Check type and length of a typed read's reply and return its words."""
@@ -77,7 +77,7 @@ class Plc5Dialect:
         """Return a typed write."""
         words = len(data) // 2
         element = _element(address, words)
-        values = TypedData(element.type_id, element.size, data)
+        values = element.typed(data)
         return plc5.CMD, plc5.TypedWrite(
             _system_address(address, words), values, 0, values.count).encode()
 

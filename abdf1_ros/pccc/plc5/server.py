@@ -24,7 +24,6 @@ from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
 from abdf1_ros.pccc.plc5 import commands as plc5
-from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.word_range.server import WordRangeService
 
 
@@ -56,7 +55,7 @@ class Plc5Commands:
         data = self._table.read(address, request.size * size // 2)
         padding = bytes(element.wire_size - size)
         elements = (data[at:at + size] + padding for at in range(0, len(data), size))
-        reply = TypedData(element.type_id, element.wire_size, b''.join(elements)).encode()
+        reply = element.typed(b''.join(elements)).encode()
         if len(reply) > plc5.MAX_REPLY:
             raise extended(status.EXT_TOO_LARGE)
         return reply
@@ -64,15 +63,16 @@ class Plc5Commands:
     def _typed_write(self, reader: Reader) -> bytes:
         request = plc5.TypedWrite.read(reader)
         values = request.values
-        if request.offset + values.count > request.total or values.count == 0:
-            raise extended(status.EXT_ILLEGAL_FIELD)
         if len(request.address.encode()) + len(values.encode()) > plc5.MAX_WRITE:
             raise extended(status.EXT_TOO_LARGE)
         address = self._address(request.address, request.offset)
         element = _element(address, request.address)
         step = element.wire_size
-        if (values.type_id, values.element_size) != (element.type_id, step):
+        if values.type_id != element.type_id or values.element_size * element.parts != step:
             raise extended(status.EXT_TYPE_MISMATCH)
+        count, left = divmod(len(values.data), step)
+        if left or count == 0 or request.offset + count > request.total:
+            raise extended(status.EXT_ILLEGAL_FIELD)
         elements = (values.data[at:at + element.size]
                     for at in range(0, len(values.data), step))
         self._table.write(address, b''.join(elements))

@@ -101,8 +101,8 @@ class _Plc5:
     """Read-modify-write for bits, as with typed commands."""
 
     plc_type = PlcType.PLC5
-    # Mask and area, file and element in three bytes each, sub-element (M 13-10..13-12).
-    address_size = 9
+    # Mask, file and element in three bytes each, sub-element (M 13-10..13-12).
+    address_size = 8
 
     def address(self, address: Address) -> SystemAddress:
         """Return the system address."""

@@ -17,9 +17,12 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.commands import (
     BitSet,
+    element_of,
     ReadModifyWrite,
     SystemAddress,
     TypedRead,
@@ -30,7 +33,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.properties import PROPERTY
-from support.vectors import commands, Vector
+from support.vectors import commands, Vector, without_area
 
 COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {
     0x68: TypedRead, 0x67: TypedWrite, 0x26: ReadModifyWrite}
@@ -48,18 +51,18 @@ def parameters(data: str | bytes) -> Reader:
 
 
 @pytest.mark.parametrize(('address', 'encoded'), [
-    (SystemAddress(7, 30), '07 00 07 1E'), (SystemAddress(3, 300), '07 00 03 FF 2C 01'),
-    (SystemAddress(4, 2, 2), '0F 00 04 02 02'), (SystemAddress(12, 10, 2), '0F 00 0C 0A 02'),
-    (SystemAddress(1, 10), '07 00 01 0A'), (SystemAddress(4, 2, 0), '0F 00 04 02 00'),
-    (SystemAddress(999, 255), '07 00 FF E7 03 FF FF 00')])
+    (SystemAddress(7, 30), '06 07 1E'), (SystemAddress(3, 300), '06 03 FF 2C 01'),
+    (SystemAddress(4, 2, 2), '0E 04 02 02'), (SystemAddress(12, 10, 2), '0E 0C 0A 02'),
+    (SystemAddress(1, 10), '06 01 0A'), (SystemAddress(4, 2, 0), '0E 04 02 00'),
+    (SystemAddress(999, 255), '06 FF E7 03 FF FF 00')])
 def test_address_in_logical_binary(address: SystemAddress, encoded: str) -> None:
     assert address.encode() == bytes.fromhex(encoded)
     assert SystemAddress.read(parameters(encoded)) == address
 
 
 @pytest.mark.parametrize(('encoded', 'address'), [
-    ('06 07 1E', SystemAddress(7, 30)), ('06 03 FF 2C 01', SystemAddress(3, 300)),
-    ('0E 04 02 02', SystemAddress(4, 2, 2)), ('02 07', SystemAddress(7, 0)),
+    ('07 00 07 1E', SystemAddress(7, 30)), ('07 00 03 FF 2C 01', SystemAddress(3, 300)),
+    ('0F 00 04 02 02', SystemAddress(4, 2, 2)), ('02 07', SystemAddress(7, 0)),
     ('07 FF 00 00 FF 07 00 FF 1E 00', SystemAddress(7, 30)),
     ('00 24 4E 31 30 3A 33 36 30 00', SystemAddress(10, 360)),
     ('00 24 54 34 3A 32 2E 41 43 43 00', SystemAddress(4, 2, 2)),
@@ -90,16 +93,31 @@ def test_address_without_a_file_is_refused(encoded: str) -> None:
         SystemAddress.read(parameters(encoded))
 
 
+@pytest.mark.parametrize(('letters', 'descriptor', 'words', 'size'), [
+    ('N', '42', 1, 2), ('B', '42', 1, 2), ('A', '31', 1, 2), ('D', '92 10', 1, 2),
+    ('S', '42', 1, 2), ('I', '42', 1, 2), ('O', '42', 1, 2), ('T', '59 0A', 3, 10),
+    ('C', '66', 3, 6), ('R', '76', 3, 6), ('F', '94 08', 2, 4), ('ST', '39 54', 42, 84),
+    ('PD', '99 15 A4', 82, 164), ('MG', '99 16 70', 56, 112), ('SC', '96 1D', 3, 6),
+    ('BT', '99 20 0C', 6, 12)])
+def test_descriptors_and_element_sizes(letters: str, descriptor: str, words: int,
+                                       size: int) -> None:
+    address = Address(PlcType.PLC5, FileType(letters), 9, 0)
+    element = element_of(address, is_value=False)
+    assert (element.size, element.wire_size) == (2 * words, size)
+    encoded = element.typed(bytes(4 * size)).encode()
+    assert encoded.endswith(bytes.fromhex(descriptor) + bytes(4 * size))
+
+
 def test_typed_read_of_the_manual() -> None:
     read = TypedRead(SystemAddress(7, 0), 40, 110, 150)
-    encoded = '68 6E 00 96 00 07 00 07 00 28 00'
+    encoded = '68 6E 00 96 00 06 07 00 28 00'
     assert read.encode() == bytes.fromhex(encoded)
     assert TypedRead.read(parameters(encoded[3:])) == read
 
 
 def test_typed_write_of_one_integer() -> None:
     write = TypedWrite(SystemAddress(7, 10), TypedData(4, 2, b'\x10\x10'), 0, 1)
-    encoded = '67 00 00 01 00 07 00 07 0A 93 09 42 10 10'
+    encoded = '67 00 00 01 00 06 07 0A 93 09 42 10 10'
     assert write.encode() == bytes.fromhex(encoded)
     assert TypedWrite.read(parameters(encoded[3:])) == write
 
@@ -107,21 +125,21 @@ def test_typed_write_of_one_integer() -> None:
 def test_read_modify_write_of_two_words() -> None:
     change = ReadModifyWrite((BitSet(SystemAddress(3, 4), 0xFFF7, 0x0100),
                               BitSet(SystemAddress(4, 2, 0), 0xFFFF, 1)))
-    encoded = '26 07 00 03 04 F7 FF 00 01 0F 00 04 02 00 FF FF 01 00'
+    encoded = '26 06 03 04 F7 FF 00 01 0E 04 02 00 FF FF 01 00'
     assert change.encode() == bytes.fromhex(encoded)
     assert ReadModifyWrite.read(parameters(encoded[3:])) == change
 
 
 def test_read_modify_write_takes_243_bytes() -> None:
     short, long = BitSet(SystemAddress(7, 0), 0, 0), BitSet(SystemAddress(300, 0, 0), 0, 0)
-    fits = (*[short] * 29, long)
-    assert len(ReadModifyWrite(fits).encode()) == 1 + 29 * 8 + 11
+    fits = (*[short] * 33, long)
+    assert len(ReadModifyWrite(fits).encode()) == 1 + 33 * 7 + 10
     with pytest.raises(FormatError, match='243'):
-        ReadModifyWrite((*[short] * 28, long, long)).encode()
+        ReadModifyWrite((*[short] * 32, long, long)).encode()
     body = b''.join(entry.encode() for entry in fits)
     assert ReadModifyWrite.read(Reader(body)).sets == fits
     with pytest.raises(FormatError, match='^244 bytes of words to modify, 243 are allowed$'):
-        ReadModifyWrite.read(Reader(body + b'\0'))
+        ReadModifyWrite.read(Reader(body + b'\0' * 3))
 
 
 @pytest.mark.parametrize('entry', commands(*COMMANDS), ids=lambda entry: entry.name)
@@ -130,12 +148,10 @@ def test_command_of_every_vector(entry: Vector) -> None:
     reader = Reader(data[1:])
     command = COMMANDS[data[0]].read(reader)
     assert reader.is_empty
+    # Logical ASCII and the memory area are read, and written as logical binary without it.
     again = command.encode()
-    if b'\x00$' in data:  # logical ASCII is read, and written as logical binary
-        assert again[:5] == data[:5]
-        assert COMMANDS[data[0]].read(Reader(again[1:])) == command
-    else:
-        assert again == data
+    assert COMMANDS[data[0]].read(Reader(again[1:])) == command
+    assert again == without_area(data) or b'\0$' in data
 
 
 def test_vectors_have_every_command() -> None:

@@ -24,7 +24,7 @@ from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
 import pytest
 from support.tables import replied
-from support.vectors import pair
+from support.vectors import pair, without_area
 
 PLC5 = PlcType.PLC5
 DIALECT = Plc5Dialect()
@@ -36,42 +36,42 @@ def at(text: str) -> Address:
 
 
 @pytest.mark.parametrize(('text', 'words', 'encoded'), [
-    ('N7:0', 10, '68 00 00 0A 00 07 00 07 00 0A 00'),
-    ('N7:30', 1, '68 00 00 01 00 07 00 07 1E 01 00'),
-    ('F8:0', 4, '68 00 00 02 00 07 00 08 00 02 00'),
-    ('T4:2', 3, '68 00 00 01 00 07 00 04 02 01 00'),
-    ('T4:2.ACC', 1, '68 00 00 01 00 0F 00 04 02 02 01 00'),
-    ('T4:2', 1, '68 00 00 01 00 0F 00 04 02 00 01 00'),
-    ('I:012', 2, '68 00 00 02 00 07 00 01 0A 02 00'),
-    ('ST9:1', 42, '68 00 00 01 00 07 00 09 01 01 00'),
-    ('PD12:10.SP', 2, '68 00 00 01 00 0F 00 0C 0A 02 01 00'),
-    ('PD12:10', 82, '68 00 00 01 00 07 00 0C 0A 01 00'),
-    ('PD12:10/INI', 1, '68 00 00 01 00 0F 00 0C 0A 01 01 00'),
-    ('MG9:1', 112, '68 00 00 02 00 07 00 09 01 02 00'),
-    ('BT9:1.DLEN', 1, '68 00 00 01 00 0F 00 09 01 02 01 00'),
-    ('SC9:1', 3, '68 00 00 01 00 07 00 09 01 01 00'),
+    ('N7:0', 10, '68 00 00 0A 00 06 07 00 0A 00'),
+    ('N7:30', 1, '68 00 00 01 00 06 07 1E 01 00'),
+    ('F8:0', 4, '68 00 00 02 00 06 08 00 02 00'),
+    ('T4:2', 3, '68 00 00 01 00 06 04 02 01 00'),
+    ('T4:2.ACC', 1, '68 00 00 01 00 0E 04 02 02 01 00'),
+    ('T4:2', 1, '68 00 00 01 00 0E 04 02 00 01 00'),
+    ('I:012', 2, '68 00 00 02 00 06 01 0A 02 00'),
+    ('ST9:1', 42, '68 00 00 01 00 06 09 01 01 00'),
+    ('PD12:10.SP', 2, '68 00 00 01 00 0E 0C 0A 02 01 00'),
+    ('PD12:10', 82, '68 00 00 01 00 06 0C 0A 01 00'),
+    ('PD12:10/INI', 1, '68 00 00 01 00 0E 0C 0A 01 01 00'),
+    ('MG9:1', 112, '68 00 00 02 00 06 09 01 02 00'),
+    ('BT9:1.DLEN', 1, '68 00 00 01 00 0E 09 01 02 01 00'),
+    ('SC9:1', 3, '68 00 00 01 00 06 09 01 01 00'),
 ])
 def test_read(text: str, words: int, encoded: str) -> None:
     assert DIALECT.read(at(text), words) == (0x0F, bytes.fromhex(encoded))
 
 
 @pytest.mark.parametrize(('text', 'data', 'encoded'), [
-    ('N7:10', '10 10', '67 00 00 01 00 07 00 07 0A 93 09 42 10 10'),
-    ('N7:10', '01 00 02 00', '67 00 00 02 00 07 00 07 0A 95 09 42 01 00 02 00'),
-    ('B3:0', '01 00', '67 00 00 01 00 07 00 03 00 93 09 42 01 00'),
-    ('F8:5', '00 00 2A 42', '67 00 00 01 00 07 00 08 05 96 09 94 08 00 00 2A 42'),
-    ('T4:0.PRE', '2C 01', '67 00 00 01 00 0F 00 04 00 01 93 09 42 2C 01'),
+    ('N7:10', '10 10', '67 00 00 01 00 06 07 0A 93 09 42 10 10'),
+    ('N7:10', '01 00 02 00', '67 00 00 02 00 06 07 0A 95 09 42 01 00 02 00'),
+    ('B3:0', '01 00', '67 00 00 01 00 06 03 00 93 09 42 01 00'),
+    ('F8:5', '00 00 2A 42', '67 00 00 01 00 06 08 05 96 09 94 08 00 00 2A 42'),
+    ('T4:0.PRE', '2C 01', '67 00 00 01 00 0E 04 00 01 93 09 42 2C 01'),
     ('PD12:10.SP', '00 00 2A 42',
-     '67 00 00 01 00 0F 00 0C 0A 02 96 09 94 08 00 00 2A 42'),
-    ('SC9:1.PRE', '07 00', '67 00 00 01 00 0F 00 09 01 01 93 09 42 07 00'),
+     '67 00 00 01 00 0E 0C 0A 02 96 09 94 08 00 00 2A 42'),
+    ('SC9:1.PRE', '07 00', '67 00 00 01 00 0E 09 01 01 93 09 42 07 00'),
 ])
 def test_write(text: str, data: str, encoded: str) -> None:
     assert DIALECT.write(at(text), bytes.fromhex(data)) == (0x0F, bytes.fromhex(encoded))
 
 
 @pytest.mark.parametrize(('text', 'encoded'), [
-    ('B3:4', '26 07 00 03 04 F7 FE 00 01'), ('T4:1', '26 0F 00 04 01 00 F7 FE 00 01'),
-    ('PD12:10.1', '26 0F 00 0C 0A 01 F7 FE 00 01'),
+    ('B3:4', '26 06 03 04 F7 FE 00 01'), ('T4:1', '26 0E 04 01 00 F7 FE 00 01'),
+    ('PD12:10.1', '26 0E 0C 0A 01 F7 FE 00 01'),
 ])
 def test_write_bits(text: str, encoded: str) -> None:
     request = DIALECT.write_bits(at(text), 0x0108, 0x0100)
@@ -79,8 +79,8 @@ def test_write_bits(text: str, encoded: str) -> None:
 
 
 @pytest.mark.parametrize(('letters', 'read', 'written'), [
-    ('N', 110, 110), ('B', 110, 110), ('F', 58, 56), ('T', 23, 22), ('C', 39, 38), ('R', 39, 38),
-    ('ST', 2, 2), ('PD', 1, 1), ('MG', 2, 2), ('BT', 19, 18), ('SC', 39, 37)])
+    ('N', 110, 110), ('B', 110, 110), ('F', 58, 57), ('T', 23, 22), ('C', 39, 38), ('R', 39, 38),
+    ('ST', 2, 2), ('PD', 1, 1), ('MG', 2, 2), ('BT', 19, 18), ('SC', 39, 38)])
 def test_limits_in_elements(letters: str, read: int, written: int) -> None:
     kind = FileType(letters)
     words = layout_of(kind, PLC5).words
@@ -162,7 +162,7 @@ def test_one_element_more_would_be_too_large(text: str) -> None:
 def test_float_of_a_pid_is_that_of_the_vectors() -> None:
     command, reply = pair('plc5_typed_read_PD_SP')
     address = at('PD12:10.SP')
-    assert DIALECT.read(address, 2) == (command.cmd, command.data)
+    assert DIALECT.read(address, 2) == (command.cmd, without_area(command.data))
     assert DIALECT.reply_size(address, 2) == len(reply.data)
     assert DIALECT.read_data(address, 2, reply.data) == bytes.fromhex('00 00 2A 42')
 
