@@ -26,6 +26,7 @@ import argparse
 from collections import defaultdict, deque
 from collections.abc import Sequence
 from functools import partial
+import os
 import random
 import re
 import signal
@@ -39,7 +40,7 @@ from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
 from abdf1_ros.ports.trace import PortOpener
@@ -66,6 +67,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -91,7 +93,7 @@ examples:
   node --ros-args --params-file line_1.yaml -r __node:=line_1
 
 exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty files or parameters,
-1 after internal errors
+1 after internal errors, and where ROS does not start (log directory, network)
 """
 
 # So many values of a reply are published while its ACK is on the line (two characters), the
@@ -113,6 +115,9 @@ _MOST_NAMES = 5  # in a line of the log
 
 # What rclpy's errors about the directory of the logs begin with.
 _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
+
+# What they hold that are about arguments.
+_BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
 
 _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
@@ -350,7 +355,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run the node until SIGINT, SIGTERM or SIGHUP.
 
-    Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors.
+    Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors and
+    where ROS does not start for a reason that may pass.
     """
     ended = threading.Event()
 
@@ -364,6 +370,7 @@ def main(args: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGHUP, end)
     try:
         _parse(remove_ros_args(given)[1:])
+        _check_log_directory()
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
         node = BridgeNode()
     except ConfigurationError as error:
@@ -372,9 +379,10 @@ def main(args: Sequence[str] | None = None) -> int:
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
     except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
-        print(f'{NODE_NAME}: {_refusal(str(error))}', file=sys.stderr)
+        status, text = _refusal(error)
+        print(f'{NODE_NAME}: {text}', file=sys.stderr)
         rclpy.try_shutdown()
-        return EXIT_CONFIGURATION
+        return status
     try:
         _spin(node, ended)
     finally:
@@ -391,12 +399,29 @@ def _few(names: Sequence[str]) -> str:
     return printable(', '.join(names[:_MOST_NAMES])) + more
 
 
-def _refusal(text: str) -> str:
-    """Return rclpy's own words for what it does not take, and what to look at."""
-    text = printable(' '.join(text.split()))
+def _check_log_directory() -> None:
+    """Raise ConfigurationError where rclpy would not find one, and say so in three errors."""
+    if not any(os.environ.get(name) for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')):
+        raise ConfigurationError([Problem('environment', (
+            'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to one that '
+            'this user may write to'))])
+
+
+def _refusal(error: Exception) -> tuple[int, str]:
+    """
+    Return exit status and text for what rclpy does not take.
+
+    What the user has given stays wrong. All else may pass, such as a disk or a network that is
+    not there yet while the machine starts: whoever supervises the node is to try again.
+    """
+    text = printable(' '.join(str(error).split()))
     if _LOG_FAILURES.match(text):
-        return f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
-    return f'bad arguments: {text}'
+        return EXIT_FAULT, f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
+    may_pass = isinstance(error, RuntimeError) and \
+        not isinstance(error, rclpy_implementation.UnknownROSArgsError)
+    if may_pass and not _BAD_ARGUMENTS.search(text):
+        return EXIT_FAULT, f'ROS does not start: {text}'
+    return EXIT_CONFIGURATION, f'bad arguments: {text}'
 
 
 def _parse(args: Sequence[str]) -> None:

@@ -418,9 +418,9 @@ def refusal(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., list[st
     """Return the lines that a node says which refuses to start."""
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
-    def start(*arguments: str) -> list[str]:
+    def start(*arguments: str, status: int = 2) -> list[str]:
         capfd.readouterr()
-        assert main(['node', *arguments]) == 2
+        assert main(['node', *arguments]) == status
         return ''.join(capfd.readouterr()).splitlines()
 
     yield start
@@ -493,3 +493,13 @@ def test_unusable_arguments_are_told_in_one_line(
     assert line.startswith('abdf1: bad arguments: ')
     assert expected in line
     assert 'Traceback' not in ' '.join(lines)
+
+
+def test_what_may_pass_at_the_start_has_the_status_of_a_fault(
+        refusal: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(**named: object) -> None:
+        raise RuntimeError('error creating participant:\n  no network')
+
+    monkeypatch.setattr('rclpy.init', refuse)
+    assert refusal(status=1) == [
+        'abdf1: ROS does not start: error creating participant: no network']

@@ -204,10 +204,10 @@ def test_leaves_nothing_behind_when_the_line_goes_away(
 # Starts
 
 
-def refused_start(*arguments: str) -> list[str]:
+def refused_start(*arguments: str, status: int = 2) -> list[str]:
     """Return the lines of a node that does not start."""
     with Process('node', *arguments) as node:
-        assert node.result() == 2, node.text
+        assert node.result() == status, node.text
         assert 'Traceback' not in node.text
         return node.lines
 
@@ -279,10 +279,18 @@ def test_malformed_arguments_end_with_one_clear_line() -> None:
 def test_unusable_log_directory_is_named(
         directory: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('ROS_LOG_DIR', directory)
-    (line,) = refused_start()
+    (line,) = refused_start(status=1)  # a disk may not be there yet
     assert directory in line
     assert line.endswith('; set ROS_LOG_DIR to a directory that this user may write to')
     assert 'arguments' not in line
+
+
+def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ('ROS_LOG_DIR', 'HOME'):
+        monkeypatch.delenv(name)
+    (line,) = refused_start()
+    assert fatal(line) == ('environment: HOME is not set, so there is no directory for the log; '
+                           'set ROS_LOG_DIR to one that this user may write to')
 
 
 def test_connects_when_the_port_appears(observer: Observer, files: Files) -> None:
