@@ -22,7 +22,6 @@ port and a clock; the tests give it a virtual line.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Container, Iterable, Sequence
 import math
 from typing import Protocol
@@ -33,6 +32,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.health import Health
+from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
@@ -52,6 +52,8 @@ from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
+
+_NOT_OPEN = 'the port is not open'
 
 
 class Listener(Protocol):
@@ -89,7 +91,7 @@ class Driver:
             timing=network.timing, counters=self.counters,
             forget_on_send=network.mode == 'Master')
         self.is_online = False
-        self._to_serve: deque[Write] = deque()
+        self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._has_begun_write = False
         self._tasks = JobTasks(network.station, settings.first_tns)
         self._settings = settings
@@ -132,26 +134,41 @@ class Driver:
         """Return what is read together."""
         return [job.block for job in self._scheduler.jobs]
 
-    def write(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
+    def write(self, mappings: Sequence[Mapping], values: Sequence[float] | str,
+              now: float) -> None:
         """
-        Ask for a write; may be called from any thread, followed by ``LinkThread.wake``.
+        Ask for values to be written to all ``mappings``, or to none if one of them refuses.
 
-        Exactly one WriteResult follows, at once when the request is refused.
+        May be called from any thread, followed by ``LinkThread.wake``. Exactly one WriteResult
+        follows for each mapping, at once when the request is refused.
         """
-        try:
-            if self._settings.read_only:
-                raise FormatError('this node is read_only')
-            if not self.is_online:
-                raise FormatError('the port is not open')
-            if self._scheduler.is_full or len(self._to_serve) >= MAX_WAITING_WRITES:
-                raise FormatError('too many writes are waiting')
-            write = Write(mapping, values, now)
-            if mapping.serves:
-                self._to_serve.append(write)
-            else:
-                self._scheduler.add_write(write)
-        except FormatError as error:
-            self.refuse(mapping, str(error), values)
+        reason = self._why_nothing_is_written(len(mappings))
+        if reason:
+            self.refuse(mappings, reason, values)
+            return
+        writes, reasons = [], {}
+        for mapping in mappings:
+            try:
+                writes.append(Write(mapping, values, now))
+            except FormatError as error:
+                reasons[mapping] = str(error)
+        if reasons:
+            tags = ', '.join(mapping.tag for mapping in reasons)
+            for mapping in mappings:
+                self.refuse([mapping], reasons.get(mapping, f'{tags} cannot take it'), values)
+            return
+        for write in writes:
+            if not self._inbox.put(write):
+                self.refuse([write.mapping], _NOT_OPEN, values)
+
+    def _why_nothing_is_written(self, count: int) -> str:
+        """Return why no value at all can be taken for ``count`` mappings now, empty if it can."""
+        if self._settings.read_only:
+            return 'this node is read_only'
+        if not self.is_online:
+            return _NOT_OPEN
+        waiting = len(self._inbox) + self._scheduler.waiting_writes
+        return 'too many writes are waiting' if waiting + count > MAX_WAITING_WRITES else ''
 
     def request_counters(self, station: int) -> None:
         """
@@ -159,13 +176,14 @@ class Driver:
 
         They come to ``health``; without a port nobody is asked.
         """
-        if self.is_online:
-            self.health.request_counters(station)
+        self.health.request_counters(station)
 
-    def refuse(self, mapping: Mapping, reason: str, values: Sequence[float] | str) -> None:
-        """Report that a request to write was not taken."""
-        self._listener.written(
-            WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
+    def refuse(self, mappings: Iterable[Mapping], reason: str,
+               values: Sequence[float] | str) -> None:
+        """Report that values were not taken for any of ``mappings``."""
+        for mapping in mappings:
+            self._listener.written(
+                WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
 
     def _make_points(self, blocks: Sequence[Block]) -> dict[Mapping, ReadPoint]:
         """Return the points of all mappings that read, in their order."""
@@ -237,7 +255,7 @@ class Driver:
 
     def expire(self, now: float) -> None:
         """Do what needs no line: store what we serve, end what has waited too long for it."""
-        self._store_waiting(now)
+        self._sort_inbox(now)
         self._scheduler.expire(now)
         self._read_backs.expire(now)
 
@@ -249,21 +267,24 @@ class Driver:
             self.health.went_away(station.number)
         self._listener.station_changed(station)
 
-    def _store_waiting(self, now: float) -> None:
-        """Put values where the other end reads them, but none that has become too old."""
+    def _sort_inbox(self, now: float) -> None:
+        """Put what is served where the other end reads it; let all else wait for the line."""
         timeout = self._settings.write_timeout
-        while self._to_serve:
-            write = self._to_serve.popleft()
-            if now - write.requested > timeout:
-                result = write.result(Outcome.NOT_SENT, waited_too_long(timeout), now)
+        for write in self._inbox.take():
+            if not write.mapping.serves:
+                self._scheduler.add_write(write, now)
+            elif now - write.requested > timeout:
+                self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
             else:
                 self._served.store(write.mapping, write.raw)
-                result = write.result(Outcome.WRITTEN, '', now)
-            self._listener.written(result)
+                self._end_write(write, Outcome.WRITTEN)
+
+    def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:
+        self._listener.written(write.result(outcome, detail, self.machine.now))
 
     def _serve(self, command: Packet) -> Packet:
         """Execute a command of the other end, on what has been asked for before it."""
-        self._store_waiting(self.machine.now)
+        self._sort_inbox(self.machine.now)
         return self._served.serve(command)
 
     def _serve_written(self, mapping: Mapping, words: bytes) -> None:
@@ -272,9 +293,9 @@ class Driver:
 
     def _run(self) -> Procedure:
         """Work as long as there is a port."""
-        self._drop_writes('requested while the port was not open')
         self._scheduler.begin(self.machine.now)
         self.health.begin(self.machine.now)
+        self._inbox.open()
         self.is_online = True
         reason = 'internal error, see the log'
         try:
@@ -295,16 +316,10 @@ class Driver:
         for mapping, point in self.points.items():
             if mapping.polls:
                 point.fail(str(error))
-        self._drop_writes(str(error))
+        for write in self._inbox.close():
+            self._end_write(write, Outcome.NOT_SENT, str(error))
+        self._scheduler.drop_writes(str(error), self.machine.now)
         self._read_backs.end(self.machine.now)
-
-    def _drop_writes(self, reason: str) -> None:
-        """End all writes that wait."""
-        now = self.machine.now
-        self._scheduler.drop_writes(reason, now)
-        while self._to_serve:
-            write = self._to_serve.popleft()
-            self._listener.written(write.result(Outcome.NOT_SENT, reason, now))
 
     def _read_steps(self, job: ReadJob, now: float) -> Steps:
         """Read one packet of a job."""
@@ -390,7 +405,7 @@ class Driver:
         if ending.is_unsure:
             self._read_backs.add(write, ending, self.blocks, self.machine.now)
         else:
-            self._listener.written(write.result(ending.outcome, ending.detail, self.machine.now))
+            self._end_write(write, ending.outcome, ending.detail)
         if isinstance(ending.error, LinkError):
             self._link_failed(station, (), ending.error)
             if station != BROADCAST and not self.stations[station].active:

@@ -20,7 +20,6 @@ It is the same link, with the same rules, that the driver reads and writes over.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Container, Generator, Iterable
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -30,6 +29,7 @@ from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
+from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
 from abdf1_ros.driver.served import Served
@@ -82,7 +82,7 @@ class Errands:
             timing=network.timing, counters=self.counters,
             forget_on_send=network.mode == 'Master')
         self._tasks = JobTasks(network.station, first_tns)
-        self._waiting: deque[_Errand] = deque()
+        self._waiting: Inbox[_Errand] = Inbox()
         served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = make_link(network, DriverSettings(nak_on_command_timeout=False),
@@ -95,17 +95,15 @@ class Errands:
 
         Exactly one of ``succeed`` and ``fail`` is called, in the link thread.
         """
-        self._waiting.append(_Errand(station, order, succeed, fail))
+        self._waiting.put(_Errand(station, order, succeed, fail))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command of the order under way, or the first of the next one."""
         under_way = self._tasks.waiting(busy)
         if under_way is not None:
             return self._tasks.take(under_way)
-        if not self._waiting:
-            return None
-        errand = self._waiting.popleft()
-        return self._tasks.start(errand.station, errand.steps())
+        errand = next(self._waiting.take(), None)
+        return self._tasks.start(errand.station, errand.steps()) if errand else None
 
     def next_due(self) -> float | None:
         """Return None: nothing comes by itself."""
@@ -124,7 +122,7 @@ class Errands:
     def _end(self, error: LinkError) -> None:
         """Leave no order without an end."""
         self._tasks.fail(error)
-        while self._waiting:
+        for errand in self._waiting.take():
             error = PortLost(*error.args)
             error.sent = False
-            self._waiting.popleft().fail(error)
+            errand.fail(error)

@@ -26,13 +26,13 @@ a station refuses is no fault of it.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.scheduler import Scheduler
 from abdf1_ros.driver.transactions import echo, identify
@@ -110,7 +110,7 @@ class Health:
         self._link_failed = link_failed
         self._clock = clock
         self._known: dict[int, StationHealth] = {}
-        self._requests: deque[int] = deque()
+        self._requests: Inbox[int] = Inbox(is_open=False)
         self._checks = [Check(station.number, Kind.STATUS, period)
                         for station in stations if period]
         self._checks += [Check(station.number, Kind.ECHO, ECHO_PERIOD)
@@ -129,10 +129,12 @@ class Health:
         It is in ``counters_wanted`` until there is an answer, or none to be expected.
         """
         self.counters_wanted.add(station)
-        self._requests.append(station)
+        if not self._requests.put(station):
+            self.counters_wanted.discard(station)
 
     def begin(self, now: float) -> None:
         """Ask everybody anew: the port has been opened."""
+        self._requests.open()
         for check in self._checks:
             check.due = now
         self._plan()
@@ -141,8 +143,7 @@ class Health:
         """Forget what depends on the port, which is lost."""
         for station in self._stations:
             self._forget(station.number, reason)
-        self._requests.clear()
-        for number in tuple(self.counters_wanted):
+        for number in {*self._requests.close(), *tuple(self.counters_wanted)}:
             self._take_counters(number, {}, reason)
 
     def came_back(self, station: int, now: float) -> None:
@@ -160,8 +161,8 @@ class Health:
 
     def next_check(self, now: float, busy: Container[int] = ()) -> Check | None:
         """Return the next check that is due and may go before a read, not of a busy station."""
-        while self._requests:
-            self._add_request(self._requests.popleft(), now)
+        for station in self._requests.take():
+            self._add_request(station, now)
         if now < self._next_due or self._scheduler.is_read_due(self._last_start):
             return None
         for check in sorted(self._checks, key=lambda check: check.due):

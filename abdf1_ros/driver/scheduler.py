@@ -52,7 +52,7 @@ class Scheduler:
 
     ``probe_time`` is the seconds that a probe of a silent station takes; a write that has
     waited longer than ``write_timeout`` seconds is not sent any more. ``report`` gets the
-    results of writes that end here. Only ``add_write`` may be called from another thread.
+    results of writes that end here. Only ``waiting_writes`` may be asked for by another thread.
     """
 
     def __init__(self, stations: ActiveStationList, *, probe_time: float, write_timeout: float,
@@ -61,7 +61,6 @@ class Scheduler:
         self._probe_interval = probe_time * _LIVING_SHARE
         self._write_timeout = write_timeout
         self._report = report
-        self._inbox: deque[Write] = deque()
         self._writes: deque[Write] = deque()
         self._writes_under_way: list[Write] = []
         self._writes_in_a_row = 0
@@ -77,9 +76,9 @@ class Scheduler:
         return frozenset(self._reads.jobs)
 
     @property
-    def is_full(self) -> bool:
-        """Tell whether so many writes wait that no more are taken."""
-        return len(self._inbox) + len(self._writes) >= MAX_WAITING_WRITES
+    def waiting_writes(self) -> int:
+        """Return how many writes wait."""
+        return len(self._writes)
 
     @property
     def scan_time(self) -> float | None:
@@ -105,10 +104,6 @@ class Scheduler:
         waiting = self._reads.jobs.difference(*self._parked.values())
         for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
             self._reads.put(job, now)
-
-    def add_write(self, write: Write) -> None:
-        """Queue a write; may be called from any thread."""
-        self._inbox.append(write)
 
     @property
     def is_turn_of_writes(self) -> bool:
@@ -154,10 +149,6 @@ class Scheduler:
 
     def expire(self, now: float) -> None:
         """End the writes that have waited too long."""
-        while self._inbox:
-            self._queue(self._inbox.popleft(), now)
-        if not self._writes:
-            return
         for write in list(self._writes):
             detail = self._hindrance(write, now)
             if detail:
@@ -254,13 +245,11 @@ class Scheduler:
 
     def drop_writes(self, detail: str, now: float) -> None:
         """End every waiting write without sending it."""
-        waiting = [*self._writes, *self._inbox]
-        self._writes.clear()
-        self._inbox.clear()
-        for write in waiting:
+        while self._writes:
+            write = self._writes.popleft()
             self._report(write.result(Outcome.NOT_SENT, detail, now))
 
-    def _queue(self, write: Write, now: float) -> None:
+    def add_write(self, write: Write, now: float) -> None:
         """
         Let a write wait, in the place of an older value of its mapping.
 

@@ -96,13 +96,14 @@ class WriteTopic:
         stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
         waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
         requested = time.monotonic() - waited
-        for mapping in self._mappings:
-            try:
-                self._check_age(waited)
-                self._driver.write(mapping, values_of(message), requested)
-            except FormatError as error:
-                self._driver.refuse(mapping, str(error), message.data)
-        self._wake()
+        try:
+            self._check_age(waited)
+            values = values_of(message)
+        except FormatError as error:
+            self._driver.refuse(self._mappings, str(error), message.data)
+        else:
+            self._driver.write(self._mappings, values, requested)
+            self._wake()
 
     def _check_age(self, age: float) -> None:
         if age > self._patience:

@@ -137,7 +137,7 @@ def on_paced_line(rows: Sequence[Mapping], network: Network, seconds: float) -> 
         begun = time.monotonic()
         for when in moments(seconds):
             time.sleep(max(0.0, begun + when - time.monotonic()))
-            driver.write(WRITTEN, [1], time.monotonic())
+            driver.write([WRITTEN], [1], time.monotonic())
             link.wake()
         time.sleep(max(0.0, begun + seconds - time.monotonic()))
     return watch

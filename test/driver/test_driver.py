@@ -272,7 +272,7 @@ def test_refused_when_too_many_wait() -> None:
     bench, _ = make_bench(mapping)
     bench.open()
     for _ in range(MAX_WAITING_WRITES + 2):
-        bench.driver.write(mapping, [1], bench.clock())
+        bench.driver.write([mapping], [1], bench.clock())
     assert write_results(bench) == ['not written: refused: too many writes are waiting'] * 2
     bench.lose_port()
     assert len(bench.listener.results) == MAX_WAITING_WRITES + 2

@@ -86,7 +86,7 @@ class Bench:
 
     def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
         """Ask for a write, as the node does."""
-        self.driver.write(mapping, values, self.line.now)
+        self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
 
     def message(self, text: str, *values: float) -> None:
@@ -366,7 +366,7 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
     machine.start(0.0)
     assert machine.data_to_send()
     machine.receive_data(ACK, 0.1)  # and its reply takes its time
-    bench.driver.write(words, [7], 0.2)
+    bench.driver.write([words], [7], 0.2)
     machine.wake(0.2)
     dialect = dialect_of(PlcType.PLC5)
     place = Address.parse('N7:50', PlcType.PLC5)

@@ -76,7 +76,7 @@ class Bench:
 
     def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
         """Ask for a write, as the node does."""
-        self.driver.write(mapping, values, self.line.now)
+        self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
 
     def ask(self, request: Request, station: int = US) -> Errand:
@@ -120,7 +120,7 @@ def test_served_words_are_stored_although_the_line_is_never_still() -> None:
     words = serve_row('N7:50')
     bench = Bench([words], polled=(PLC,))
     bench.run(1.0)
-    bench.driver.write(words, [5], bench.clock())  # nobody wakes the machine
+    bench.driver.write([words], [5], bench.clock())  # nobody wakes the machine
     bench.run(0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
 
@@ -245,7 +245,7 @@ def test_served_value_is_stored_before_a_command_that_came_after_it() -> None:
     words = serve_row('N7:50')
     bench = Bench([words])
     bench.run(0.1)
-    bench.driver.write(words, [5], bench.clock())  # nobody wakes the machine
+    bench.driver.write([words], [5], bench.clock())  # nobody wakes the machine
     assert bench.master_reads('N7:50', 1) == b'\5\0'
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
 
@@ -255,7 +255,7 @@ def test_served_value_that_has_become_too_old_is_not_stored() -> None:
     bench = Bench([words])
     bench.write(words, [5])
     bench.run(0.1)
-    bench.driver.write(words, [6], bench.clock() - 2.1)
+    bench.driver.write([words], [6], bench.clock() - 2.1)
     assert bench.master_reads('N7:50', 1) == b'\5\0'
     assert [str(result) for result in bench.listener.results] == [
         'written', 'not written: not sent: waited longer than 2 s for the line']

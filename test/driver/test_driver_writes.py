@@ -16,15 +16,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 import itertools
 import math
+import sys
+import threading
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -148,6 +152,61 @@ def test_refused_before_the_line(text: str, values: list[float], reason: str) ->
     assert result.outcome is Outcome.REFUSED
     assert reason.lower() in result.detail.lower()
     assert executed.writes == []
+
+
+def test_one_message_for_several_rows_is_written_to_all_or_none() -> None:
+    wide = make_mapping('N7:0', 'Write', tag='wide', maximum=100.0)
+    narrow = make_mapping('N7:1', 'Write', tag='narrow', maximum=10.0)
+    flag = make_mapping('N7:2', 'Write', tag='upper', minimum=20.0)
+    bench, plc = bench_of(wide, narrow, flag)
+    executed = Executed(plc)
+    bench.driver.write([wide, narrow, flag], [15], bench.clock())
+    bench.driver.write([wide, narrow], [5], bench.clock())
+    bench.run(2.0)
+    assert [(result.mapping.tag, str(result)) for result in bench.listener.results] == [
+        ('wide', 'not written: refused: narrow, upper cannot take it'),
+        ('narrow', 'not written: refused: value 15 at index 0 is outside Min -inf, Max 10'),
+        ('upper', 'not written: refused: value 15 at index 0 is outside Min 20, Max inf'),
+        ('wide', 'written'), ('narrow', 'written')]
+    assert len(executed.writes) == 2
+    assert stored(plc, 'N7:0', 3) == b'\5\0\5\0\0\0'
+
+
+def test_message_for_several_rows_waits_as_a_whole_or_not_at_all() -> None:
+    rows = [make_mapping(f'B3:0/{bit}', 'Write') for bit in range(3)]
+    bench, _ = bench_of(*rows)
+    for _ in range(MAX_WAITING_WRITES // 3):
+        bench.driver.write(rows, [1], bench.clock())
+    assert bench.listener.results == []
+    bench.driver.write(rows, [1], bench.clock())
+    assert [str(result) for result in bench.listener.results] == [
+        'not written: refused: too many writes are waiting'] * 3
+
+
+def test_every_write_has_one_result_while_the_port_comes_and_goes() -> None:
+    rows = [make_mapping('N7:0', 'Write'), make_mapping('B3:0/1', 'Write'),
+            make_mapping('N9:0', 'Serve', station=5)]
+    bench, _ = bench_of(*rows)
+    before, count = sys.getswitchinterval(), 1000
+
+    def ask(mapping: Mapping) -> None:
+        for number in range(count):
+            bench.driver.write([mapping], [number % 2], bench.clock())
+
+    senders = [threading.Thread(target=ask, args=(mapping,)) for mapping in rows]
+    sys.setswitchinterval(1e-6)
+    try:
+        for sender in senders:
+            sender.start()
+        while any(sender.is_alive() for sender in senders):
+            bench.run(0.01)
+            bench.lose_port()
+            bench.open()
+    finally:
+        sys.setswitchinterval(before)
+    bench.run(10.0)
+    assert Counter(result.mapping for result in bench.listener.results) == dict.fromkeys(
+        rows, count)
 
 
 def test_read_only_refuses_before_the_line() -> None:

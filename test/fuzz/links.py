@@ -96,7 +96,7 @@ class _Line:
         mapping = _MAPPINGS[number % len(_MAPPINGS)]
         values: Values = 'ab' if mapping.type.value == 'string' else [value % 2] * mapping.length
         self.accepted += 1
-        self.driver.write(mapping, values, self.now)
+        self.driver.write([mapping], values, self.now)
         self.driver.machine.wake(self.now)
         self._settle()
 

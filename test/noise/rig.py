@@ -131,7 +131,7 @@ class DriverEnd:
         content = _CODEC.encode(values)
         self._texts[show(values)] = content
         self._rig.judge.asked(content)
-        self.driver.write(mapping, values, self._rig.clock())
+        self.driver.write([mapping], values, self._rig.clock())
         self._rig.line.wake(self.driver.machine)
 
     def read(self, mapping: Mapping, values: Values) -> None:

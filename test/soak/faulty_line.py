@@ -237,7 +237,7 @@ class FaultyLine:
             if mapping.writes:
                 values = [self._random.randrange(2) for _ in range(mapping.length)]
                 self.asked += 1
-                self.driver.write(mapping, values, self.clock())
+                self.driver.write([mapping], values, self.clock())
 
     def _hear(self, data: bytes) -> None:
         machine = self.driver.machine

@@ -191,7 +191,7 @@ class DriverBench:
 
     def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
         """Ask for a write, as the node does."""
-        self.driver.write(mapping, values, self.line.now)
+        self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
 
     def run(self, seconds: float) -> None:

@@ -1,0 +1,70 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The one way from other threads into that of the link."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+_Item = TypeVar('_Item')
+
+
+class Inbox(Generic[_Item]):
+    """
+    Hand items from any number of threads to the one that takes them, in order, each once.
+
+    A closed inbox takes nothing. It holds no lock: every step is one operation of a deque, which
+    no other thread can divide. Nothing is ever copied and then cleared, because what another
+    thread had added in between would be lost.
+    """
+
+    def __init__(self, is_open: bool = True) -> None:
+        self._items: deque[_Item] = deque()
+        self._is_open = is_open
+
+    def __len__(self) -> int:
+        """Return how many items wait."""
+        return len(self._items)
+
+    def open(self) -> None:  # noqa: A003
+        """Take items from now on."""
+        self._is_open = True
+
+    def close(self) -> Iterator[_Item]:
+        """Take no more items; return those that wait."""
+        self._is_open = False
+        return self.take()
+
+    def put(self, item: _Item) -> bool:
+        """Add an item; return False when the inbox is closed, and nobody will take it."""
+        self._items.append(item)
+        if self._is_open:
+            return True
+        # It was closed before, or just now. In that case the other thread may have taken it.
+        try:
+            self._items.remove(item)
+        except ValueError:
+            return True
+        return False
+
+    def take(self) -> Iterator[_Item]:
+        """Yield and remove what waits, also what is added meanwhile."""
+        while True:
+            try:
+                yield self._items.popleft()
+            except IndexError:
+                return
