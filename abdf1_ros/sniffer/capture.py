@@ -115,6 +115,7 @@ class CaptureWriter:
     def _begin(self) -> TextIO:
         if self.path.exists():
             self.path.replace(f'{self.path}.1')
+        self.path.touch(0o640)  # what is on a line is not for everyone
         self._file = self.path.open('w', encoding='ascii', buffering=1)
         self._written = 0
         self._put(self._head)

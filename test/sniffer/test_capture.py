@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+import stat
 
 from abdf1_ros.errors import Problem
 from abdf1_ros.sniffer.capture import (
@@ -109,6 +111,15 @@ def test_older_capture_is_put_aside(tmp_path: Path) -> None:
         writer.close()
     assert chunks_of(path) == CHUNKS[2:]
     assert chunks_of(tmp_path / 'x.1') == CHUNKS[1:2]
+
+
+def test_others_cannot_read_a_capture(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        CaptureWriter(tmp_path / 'x').close()
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / 'x').stat().st_mode) == 0o640
 
 
 def test_other_files_are_left_alone(tmp_path: Path) -> None:

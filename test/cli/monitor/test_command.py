@@ -132,7 +132,8 @@ class Terminal:
         """Wait until ``text`` has been drawn after what has been waited for before."""
         end = time.monotonic() + PATIENCE
         while text not in self.drawn:
-            assert select.select([self._ours], [], [], end - time.monotonic())[0], self.drawn
+            left = max(0.0, end - time.monotonic())
+            assert select.select([self._ours], [], [], left)[0], self.drawn
             self._read()
         self.drawn = self.drawn.partition(text)[2]
 
