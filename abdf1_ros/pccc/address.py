@@ -34,6 +34,7 @@ from dataclasses import dataclass, replace
 import re
 
 from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address_advice import advice
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_types import file_types_of, FileType, Layout, layout_of, PlcType
 from abdf1_ros.pccc.plc2 import address as plc2_address
@@ -103,6 +104,8 @@ class Address:
             return cls(plc_type, FileType.BINARY, 0, word, 0, bit_number)
         if plc_type is PlcType.PLC3:
             return cls(plc_type, *plc3_address.parse(text))
+        if found := advice(text, plc_type):
+            raise AddressSyntaxError(found)
         match = _FORM.fullmatch(text)
         if match is None:
             raise AddressSyntaxError(

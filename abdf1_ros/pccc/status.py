@@ -51,7 +51,7 @@ _LOCAL = {
 }
 
 _REMOTE = {
-    0x10: 'illegal command, format or length',
+    0x10: 'illegal command, format or length, or the file does not exist',
     0x20: 'host has a problem and does not communicate',
     0x30: 'remote host is missing, disconnected or shut down',
     0x40: 'hardware fault in the host',

@@ -49,6 +49,9 @@ _LONGEST_LINE = 131_072
 _SHOWN = 100
 # How much a wrong name is like the column that may be meant, from 0 to 1.
 _ALIKE = 0.7
+# How files of other kinds begin that are given a name on .csv: packed, and old ones of Windows.
+_WORKBOOKS = (b'PK\x03\x04', bytes.fromhex('D0CF11E0A1B11AE1'))
+_LIKE_AN_ADDRESS = re.compile(r'[A-Z]{1,3}\d*:\d+\S*', re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +86,24 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
     """
     Read all data rows of a file whose header uses ``known`` column names.
 
-    Raises ConfigurationError with every fault of the file as a whole.
+    Raises ConfigurationError with every fault of the file.
+    """
+    rows, problems = read_good_rows(path, known)
+    if problems:
+        raise ConfigurationError(problems)
+    return rows
+
+
+def read_good_rows(path: str, known: Sequence[str]) -> tuple[list[Row], list[Problem]]:
+    """
+    Read the data rows of a file that are cells under columns, and tell what the others are.
+
+    Raises ConfigurationError with every fault of the file as a whole. So it does when fewer
+    rows are good than not: then the good ones may be shifted too.
     """
     try:
         (first, header), *others = _read_lines(path, known)
+        _check_text(Place(path, first), header)
         delimiter = max(_DELIMITERS, key=header.count)
         names = _cells(Place(path, first), header, delimiter)
     except Problem as problem:
@@ -94,21 +111,26 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
     columns = _columns(Place(path, first), names, known)
     rows: list[Row] = []
     problems: list[Problem] = []
+    item = 0
     for line, text in others:
         place = Place(path, line)
+        item += 1
         try:
+            _check_text(place, text)
             cells = _cells(place, text, delimiter)
-            _check_cells(place, cells, columns, delimiter)
+            _check_cells(place, cells, names, columns, delimiter)
         except Problem as problem:
             problems.append(problem)
             continue
         if any(cells):
             content = {name: cells[number - 1] for name, number in columns.items()
                        if number <= len(cells)}
-            rows.append(Row(path, len(rows) + 1, line, content, columns))
-    if problems:
+            rows.append(Row(path, item, line, content, columns))
+        else:
+            item -= 1
+    if len(problems) > len(rows):
         raise ConfigurationError(problems)
-    return rows
+    return rows, problems
 
 
 def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
@@ -133,20 +155,25 @@ def _read_text(path: str) -> str:
             raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
     except OSError as error:
         raise Problem(path, f'cannot be read: {error.strerror or error}') from None
+    if raw.startswith(_WORKBOOKS):
+        raise Problem(path, 'is a workbook or a project of some program, not text; save what is '
+                            'in it as "CSV UTF-8"')
     if len(raw) > _LARGEST:
         raise Problem(path, f'larger than {_LARGEST // 1_000_000} MB; is it a CSV file?')
+    return raw.decode(errors='surrogateescape')
+
+
+def _check_text(place: Place, line: str) -> None:
+    """Raise Problem where a line has bytes that are no text, or a zero as UTF-16 has."""
+    raw = line.encode(errors='surrogateescape')
     try:
-        text = raw.decode()
-        bad = raw.find(0)  # as in UTF-16 without a byte order mark
+        raw.decode()
+        bad = raw.find(0)
     except UnicodeDecodeError as error:
         bad = error.start
-    if bad < 0:
-        return text
-    before = raw[:bad].replace(b'\r\n', b'\n').replace(b'\r', b'\n')
-    number = len(before) - before.rfind(b'\n')
-    raise Problem(Place(path, before.count(b'\n') + 1),
-                  f'byte {number} of this line, 0x{raw[bad]:02X}, is no text in UTF-8; save the '
-                  'file as "CSV UTF-8"')
+    if bad >= 0:
+        raise Problem(place, f'byte {bad + 1} of this line, 0x{raw[bad]:02X}, is not text in '
+                             'UTF-8; save the file as "CSV UTF-8"')
 
 
 def _cells(place: Place, line: str, delimiter: str) -> list[str]:
@@ -168,8 +195,8 @@ def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, 
     meant = [spelling.get(name.lower()) for name in names]
     if not any(meant):
         raise ConfigurationError([Problem(
-            place, 'no column is named here; the first row names them, with comma, semicolon or '
-                   f'tab between: {", ".join(known)}')])
+            place, f'no column is named here{_kind(names)}; the first row names them, with '
+                   f'comma, semicolon or tab between: {", ".join(known)}')])
     free = [name.lower() for name in known if name not in meant]
     listing = f'; known: {", ".join(known)}'
     columns: dict[str, int] = {}
@@ -193,9 +220,23 @@ def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, 
     return columns
 
 
-def _check_cells(place: Place, cells: list[str], columns: dict[str, int],
+def _kind(names: list[str]) -> str:
+    """Return what a first row seems to be that names no column."""
+    if names[0].startswith('//'):
+        return ', and a comment begins with #'
+    if any(_LIKE_AN_ADDRESS.fullmatch(name.upper()) for name in names):
+        return (', it has an address, as in an export of symbols from a programming software or '
+                'a map without its first row')
+    return ''
+
+
+def _check_cells(place: Place, cells: list[str], names: list[str], columns: dict[str, int],
                  delimiter: str) -> None:
     """Raise Problem where the cells of a row do not lie under the columns."""
+    if cells[0].startswith('//'):
+        raise Problem(place, 'a comment begins with #')
+    if len(columns) > 1 and [cell.lower() for cell in cells] == [name.lower() for name in names]:
+        raise Problem(place, 'the names of the columns stand here again; once is enough')
     if len(cells) == 1 < len(columns) and any(sign in cells[0] for sign in _DELIMITERS):
         raise Problem(place, 'this row is one cell; its cells need a '
                              f'{_DELIMITERS[delimiter]} between them, outside of quotes')

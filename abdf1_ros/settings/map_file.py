@@ -21,7 +21,7 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.columns import COLUMNS
-from abdf1_ros.settings.csv_table import read_rows, shown
+from abdf1_ros.settings.csv_table import read_good_rows, shown
 from abdf1_ros.settings.map_row import Fault, RowReader
 from abdf1_ros.settings.mapping import Mapping
 
@@ -33,9 +33,9 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
     Raises ConfigurationError when the file as a whole cannot be used.
     """
     mappings: list[Mapping] = []
-    problems: list[Problem] = []
+    rows, problems = read_good_rows(path, COLUMNS)
     clashes = _Clashes()
-    for row in read_rows(path, COLUMNS):
+    for row in rows:
         reader = RowReader(row)
         mapping = reader.read()
         faults = reader.faults if mapping is None else clashes.add(mapping)

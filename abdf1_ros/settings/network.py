@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields
+import re
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -31,6 +33,10 @@ from abdf1_ros.settings.csv_table import read_rows, shown
 
 MODES = ('Master', 'Slave', 'Peer')
 SUPPORTED_MODES = MODES
+_MODE_WORDS = {
+    'fullduplex': 'Peer', 'full': 'Peer', 'df1fullduplex': 'Peer', 'peertopeer': 'Peer',
+    'halfduplex': 'Master, or Slave where another is the master', 'df1halfduplexmaster': 'Master',
+    'halfduplexmaster': 'Master', 'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave'}
 POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
@@ -47,6 +53,7 @@ class NetField:
     A number lies from ``low`` to ``high`` or is one of ``choices``; a text is one of
     ``choices`` in any letter case, or anything where there are none. A bad value is reported
     with ``message``, whose places after the value are filled from ``message_args``.
+    ``other_words`` are what others call a choice, in small letters alone, and what it is here.
     """
 
     column: str
@@ -57,6 +64,7 @@ class NetField:
     choices: tuple[int | str, ...] = ()
     message: Message | None = None
     message_args: tuple[Any, ...] = ()
+    other_words: MappingType[str, str] = field(default_factory=dict)
 
     @property
     def parameter(self) -> str:
@@ -77,7 +85,9 @@ class NetField:
             right = f'one of {", ".join(map(str, self.choices))}'
         else:
             right = f'a whole number from {self.low} to {self.high}'
-        return f'{self.column} = "{shown(text)}" should be {right}'
+        meant = self.other_words.get(re.sub(r'[\W_]', '', text).lower())
+        hint = f'; "{shown(text)}" is {meant}' if meant else ''
+        return f'{self.column} = "{shown(text)}" should be {right}{hint}'
 
     def _number(self, text: str) -> int | None:
         value = whole_number(text)
@@ -95,8 +105,10 @@ class NetField:
 
 def _net(column: str, default: int | str, description: str, *, low: int | None = None,
          high: int | None = None, choices: tuple[int | str, ...] = (),
-         message: Message | None = None, message_args: tuple[Any, ...] = ()) -> Any:
-    entry = NetField(column, default, description, low, high, choices, message, message_args)
+         message: Message | None = None, message_args: tuple[Any, ...] = (),
+         other_words: MappingType[str, str] = MappingProxyType({})) -> Any:
+    entry = NetField(column, default, description, low, high, choices, message, message_args,
+                     other_words)
     return field(default=default, metadata={'net': entry})
 
 
@@ -109,7 +121,7 @@ class Network:
         message=Message.CRT_BAD_STATION_ID, message_args=(255,))
     mode: str = _net(
         'Mode', 'Master', 'driver mode', choices=MODES,
-        message=Message.CRT_BAD_DRIVER_MODE, message_args=MODES)
+        message=Message.CRT_BAD_DRIVER_MODE, message_args=MODES, other_words=_MODE_WORDS)
     plc_type: str = _net(
         'PLC_Type', 'PLC5', 'PLC that this node emulates', choices=PLC_TYPES,
         message=Message.CRT_BAD_PLC_TYPE, message_args=PLC_TYPES)

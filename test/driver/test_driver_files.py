@@ -140,7 +140,8 @@ def test_packets_of_a_5_03_are_too_long_for_an_old_slc() -> None:
     old_plc(bench)
     bench.run(1.0)
     assert bench.listener.values(mapping) == []
-    assert bench.listener.reasons == [('N7:0', 'STS 10: illegal command, format or length')]
+    assert bench.listener.reasons == [
+        ('N7:0', 'STS 10: illegal command, format or length, or the file does not exist')]
 
 
 def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:

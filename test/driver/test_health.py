@@ -174,7 +174,7 @@ def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
     bench.run(2.2 * PERIOD)
     assert len(ears.times(STATUS)) == 3
     assert bench.driver.health.known(1).processor == \
-        'unknown (STS 10: illegal command, format or length)'
+        'unknown (STS 10: illegal command, format or length, or the file does not exist)'
     station = bench.driver.stations[1]
     assert (station.active, station.remote_errors, station.failures) == (True, 0, 0)
     assert bench.driver.points[bench.driver.mappings[0]].freshness(bench.clock()) \
@@ -389,7 +389,7 @@ def test_refused_counters() -> None:
     bench.run(1.0)
     known = bench.driver.health.known(1)
     assert (known.counters, known.no_counters) == (
-        {}, 'STS 10: illegal command, format or length')
+        {}, 'STS 10: illegal command, format or length, or the file does not exist')
     assert bench.driver.health.counters_wanted == set()
 
 

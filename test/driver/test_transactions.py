@@ -184,7 +184,8 @@ def test_reason_for_a_word_that_cannot_be_read_names_both_refusals() -> None:
     _, ending = converse(carry_out(bit_write()), [REFUSED, reply(sts=0x50)])
     assert isinstance(ending, Ending)
     assert ending.detail == (
-        'STS 10: illegal command, format or length; its word cannot be read to be written back: '
+        'STS 10: illegal command, format or length, or the file does not exist; its word '
+        'cannot be read to be written back: '
         'STS 50: address not there, or memory protected')
 
 

@@ -54,7 +54,7 @@ from support.simulator_process import (
 )
 
 REFUSED = 'not written: the PLC refused it: '
-NOT_UNDERSTOOD = 'STS 10: illegal command, format or length'
+NOT_UNDERSTOOD = 'STS 10: illegal command, format or length, or the file does not exist'
 
 US, OTHER_MASTER = 5, 6
 

@@ -40,10 +40,10 @@ def test_success_returns_the_data() -> None:
 
 
 @pytest.mark.parametrize(('sts', 'data', 'ext_sts', 'text'), [
-    (0x10, b'', None, 'STS 10: illegal command, format or length'),
+    (0x10, b'', None, 'STS 10: illegal command, format or length, or the file does not exist'),
     (0x50, b'\x01', None, 'STS 50: address not there, or memory protected'),
     (0x05, b'', None, 'STS 05: no reply in time (application timeout)'),
-    (0x15, b'', None, 'STS 15: illegal command, format or length; '
+    (0x15, b'', None, 'STS 15: illegal command, format or length, or the file does not exist; '
                       'no reply in time (application timeout)'),
     (0xF0, b'\x17', 0x17, 'STS F0 EXT STS 17: type mismatch'),
     (0xF0, b'\x06\x00', 0x06, 'STS F0 EXT STS 06: address does not point to something usable'),

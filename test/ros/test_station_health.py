@@ -238,7 +238,8 @@ def test_service_tells_of_a_refusal(bridge: Bridge) -> None:
     assert not response.success
     first, second = response.message.split('; ')
     assert first.startswith('station 1: modem lines')
-    assert second == 'station 2: STS 10: illegal command, format or length'
+    assert second == ('station 2: STS 10: illegal command, format or length, or the file does '
+                      'not exist')
 
 
 def test_service_without_a_port(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ import os
 from pathlib import Path
 
 from abdf1_ros.errors import ConfigurationError, Place
-from abdf1_ros.settings.csv_table import read_rows, Row
+from abdf1_ros.settings.csv_table import read_good_rows, read_rows, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -150,12 +150,56 @@ def test_every_fault_of_the_header_is_reported(path: Path) -> None:
 
 
 @pytest.mark.parametrize('content', [
-    'a,N7:0,2\nb,N7:1,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
+    'a,b,2\nb,c,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
     '<!DOCTYPE html>\n<html>\n', 'Tag Address Length\na N7:0 2\n'])
 def test_file_without_a_header_is_one_fault(path: Path, content: str) -> None:
     assert problems_of(path, content) == [
         'FILE:1: no column is named here; the first row names them, with comma, semicolon or tab '
         'between: Tag, Address, Length']
+
+
+@pytest.mark.parametrize('content', [
+    'N7:0,"SPEED","Line speed"\n', 'a,n7:0/3,2\n', 'I:1.0/3,Global\n'])
+def test_export_of_symbols_is_told_from_a_map(path: Path, content: str) -> None:
+    problem, = problems_of(path, content)
+    assert problem.startswith(
+        'FILE:1: no column is named here, it has an address, as in an export of symbols from a '
+        'programming software or a map without its first row; the first row names them')
+
+
+@pytest.mark.parametrize('head', [b'PK\x03\x04\x14\0', b'\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1\0'])
+def test_workbook_that_is_called_csv(path: Path, head: bytes) -> None:
+    assert problems_of(path, head + bytes(100)) == [
+        'FILE: is a workbook or a project of some program, not text; save what is in it as "CSV '
+        'UTF-8"']
+
+
+def test_comment_of_another_language_is_told(path: Path) -> None:
+    assert problems_of(path, 'Tag,Address\na,N7:0\n// pumps, all of them\n') == [
+        'FILE:3: a comment begins with #']
+    problem, = problems_of(path, '// made by hand\nTag,Address\na,N7:0\n')
+    assert problem.startswith('FILE:1: no column is named here, and a comment begins with #; ')
+
+
+def test_header_that_stands_there_twice(path: Path) -> None:
+    assert problems_of(path, 'Tag,Address\na,1\ntag,ADDRESS\nb,2\n') == [
+        'FILE:3: the names of the columns stand here again; once is enough']
+    assert cells_of(path, 'Tag\nTag\n') == [['Tag', '', '']]
+
+
+def test_row_that_cannot_be_read_leaves_the_others_as_they_are(path: Path) -> None:
+    path.write_bytes(b'# f\xfcr alle\nTag,Address\na,1\nb\xe4,2\nc,"3\nd,4,5\ne,5\nf,6\n')
+    rows, problems = read_good_rows(str(path), KNOWN)
+    assert [(row.item, row.get('Tag')) for row in rows] == [(1, 'a'), (5, 'e'), (6, 'f')]
+    assert [str(problem).removeprefix(f'{path}:').partition(': ')[0] for problem in problems] == [
+        '4', '5:2', '6:3']
+
+
+def test_file_of_which_most_rows_are_shifted_is_refused_as_a_whole(path: Path) -> None:
+    path.write_text('Tag,Address\na,1\nb,2,5\nc,3,5\n', encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        read_good_rows(str(path), KNOWN)
+    assert len(caught.value.problems) == 2
 
 
 @pytest.mark.parametrize('content, places', [
@@ -211,7 +255,7 @@ def test_folder_in_place_of_a_file(tmp_path: Path) -> None:
 def test_byte_that_is_no_text(path: Path, content: bytes, where: str, byte: str) -> None:
     line, number = where.split(':')
     assert problems_of(path, content) == [
-        f'FILE:{line}: byte {number} of this line, 0x{byte}, is no text in UTF-8; save the file '
+        f'FILE:{line}: byte {number} of this line, 0x{byte}, is not text in UTF-8; save the file '
         'as "CSV UTF-8"']
 
 

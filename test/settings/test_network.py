@@ -190,6 +190,18 @@ def test_every_numbered_fault_is_critical(path: Path) -> None:
         2552, 2553, 2555, 2556, 2557, 2558, 2559]
 
 
+@pytest.mark.parametrize('mode, meant', [
+    ('Full Duplex', 'Peer'), ('full-duplex', 'Peer'), ('DF1 Full Duplex', 'Peer'),
+    ('Half Duplex', 'Master, or Slave where another is the master'),
+    ('DF1 HALF-DUPLEX SLAVE', 'Slave')])
+def test_mode_in_the_words_of_other_programs_is_translated(
+        path: Path, mode: str, meant: str) -> None:
+    problem, = faults(path, 'Mode', mode)
+    assert problem.startswith('FILE:2:1 (Mode): 2553 CRT_BAD_DRIVER_MODE: ')
+    assert problem.endswith(
+        f'; Mode = "{mode}" should be one of Master, Slave, Peer; "{mode}" is {meant}')
+
+
 def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
     header = 'Baud,Station,Com_Port,Parity,Timeout'
     path.write_text(f'# a comment\n\n{header}\n\n1,999,x,y,-5\n', encoding='utf-8')
