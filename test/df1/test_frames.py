@@ -256,11 +256,15 @@ def test_longest_message(fill: int) -> None:
 
 
 @pytest.mark.parametrize('fill', [0x10, 0x55])
+@pytest.mark.parametrize('size', [262, 263, 1000])
+@pytest.mark.parametrize('checksum', Checksum)
 @pytest.mark.parametrize('chunk', [None, 1])
-def test_message_longer_than_the_longest(fill: int, chunk: int | None) -> None:
-    first, *rest = decode(message_frame(bytes((fill,)) * 262, CRC), chunk=chunk)
-    assert first == Frame(bytes((fill,)) * 262, None, Fault.TOO_LONG)
-    assert not any(isinstance(symbol, Frame) for symbol in rest)
+def test_message_longer_than_the_longest_is_one_up_to_its_end(
+        fill: int, size: int, checksum: Checksum, chunk: int | None) -> None:
+    good = message_frame(DATA, checksum)
+    line = message_frame(bytes((fill,)) * size, checksum) + good
+    assert decode(line, checksum, chunk=chunk) == [
+        Frame(bytes((fill,)) * 262, None, Fault.TOO_LONG), *decode(good, checksum)]
 
 
 def test_largest_reply_of_any_command_fits() -> None:
@@ -268,9 +272,10 @@ def test_largest_reply_of_any_command_fits() -> None:
 
 
 @pytest.mark.parametrize('chunk', [None, 1, 100])
-def test_message_without_end_is_cut_at_the_same_byte_in_any_chunks(chunk: int | None) -> None:
-    assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == [
-        Frame(bytes(262), None, Fault.TOO_LONG)]
+def test_message_without_end_is_told_with_what_breaks_it_off(chunk: int | None) -> None:
+    assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == []
+    assert decode(b'\x10\x02' + bytes(1000) + EOT, chunk=chunk) == [
+        Frame(bytes(262), None, Fault.NO_ETX), Control(Code.EOT)]
 
 
 @pytest.mark.parametrize('duplex', Duplex)

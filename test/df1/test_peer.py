@@ -606,8 +606,10 @@ def test_longest_message() -> None:
 def test_message_too_long(byte: int, more: int) -> None:
     peer = bench()
     command = replace(THEIRS, data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more))
-    assert peer.hear_packet(command) == NAK
-    assert (2512, MAX_LINK_DATA) in peer.numbers()
+    frame = peer.frame(command)
+    assert peer.hear(*single_bytes(frame[:-1])) == b''  # not in its middle (M 4-8)
+    assert peer.hear(frame[-1:]) == NAK
+    assert peer.numbers() == [(2512, MAX_LINK_DATA)]
     assert peer.counts()['invalid_messages'] == 1
     assert peer.hear(ENQ) == NAK
     assert peer.served == []
