@@ -41,7 +41,6 @@ from abdf1_ros.df1.frames import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import CAPTURED, Captured, MESSAGES, Vector, vector, VECTORS
 
 HALF, FULL, CRC, BCC = Duplex.HALF, Duplex.FULL, Checksum.CRC, Checksum.BCC
@@ -316,7 +315,6 @@ def test_in_message_from_stx_to_the_last_check_byte() -> None:
     assert len(symbols) == 1
 
 
-@PROPERTY
 @given(st.binary(max_size=MAX_LINK_DATA), st.sampled_from(Checksum), st.sampled_from(Duplex))
 def test_stuffing_round_trip(data: bytes, checksum: Checksum, duplex: Duplex) -> None:
     check = checksum.of_message(data)
@@ -325,7 +323,6 @@ def test_stuffing_round_trip(data: bytes, checksum: Checksum, duplex: Duplex) ->
     assert stuff(data).count(b'\x10') == 2 * data.count(b'\x10')
 
 
-@PROPERTY
 @given(st.binary(min_size=6, max_size=100), st.integers(0, 255), st.sampled_from(Checksum))
 def test_master_frame_round_trip(data: bytes, station: int, checksum: Checksum) -> None:
     check = checksum.of_message(data, station)
@@ -333,7 +330,6 @@ def test_master_frame_round_trip(data: bytes, station: int, checksum: Checksum) 
         Frame(data, station, None, check, check)]
 
 
-@PROPERTY
 @given(line_bytes, st.sampled_from(Checksum), st.sampled_from(Duplex), st.data())
 def test_any_chunking_gives_the_same_symbols(data: bytes, checksum: Checksum, duplex: Duplex,
                                              draw: st.DataObject) -> None:
@@ -349,7 +345,6 @@ def test_any_chunking_gives_the_same_symbols(data: bytes, checksum: Checksum, du
     assert symbols == decode(data or b'\x00', checksum, duplex, 1)
 
 
-@PROPERTY
 @given(decoders, st.lists(st.one_of(line_bytes, st.binary(max_size=400)), max_size=10))
 def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: list[bytes]) -> None:
     for part in parts:
@@ -371,7 +366,6 @@ def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
     assert drain(decoder) == [Control(Code.EOT)]
 
 
-@PROPERTY
 @given(decoders, line_bytes)
 def test_frame_is_read_behind_any_garbage_after_a_reset(decoder: FrameDecoder,
                                                         garbage: bytes) -> None:

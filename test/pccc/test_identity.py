@@ -21,7 +21,6 @@ from abdf1_ros.pccc.identity import decode_identity, Identity, Mode
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import pair
 
 SLC = bytes.fromhex('00 EE 34 49 22') + b'5/03'.ljust(11) + bytes.fromhex('0000 06 00 3412 20 FC')
@@ -198,7 +197,6 @@ _DATA = st.one_of(
 
 
 @given(data=_DATA)
-@PROPERTY
 def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
     try:
         identity = decode_identity(data)

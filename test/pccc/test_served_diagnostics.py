@@ -28,7 +28,6 @@ from abdf1_ros.pccc.server import Server
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import pair
 
 REFUSED = 0x10
@@ -66,7 +65,6 @@ def test_echo_of_the_vectors(plc_type: PlcType) -> None:
 
 
 @given(data=st.binary(max_size=236))
-@PROPERTY
 def test_echo_of_anything(data: bytes) -> None:
     assert answer(PlcType.SLC, b'\0' + data).data == data
 
