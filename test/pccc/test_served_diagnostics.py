@@ -19,10 +19,11 @@ from __future__ import annotations
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.diagnostics import max_echo, ReadCounters, RESET_REQUEST, STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import decode_identity, Mode
+from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.pccc.link_counters import Layout, ServedCounters
 from abdf1_ros.pccc.server import Server
 from hypothesis import given
