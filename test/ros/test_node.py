@@ -462,6 +462,15 @@ def test_namesake_is_told_and_forgotten(
     assert 'no other node is called /abdf1 any more' in told
 
 
+def test_odd_settings_are_told_in_the_log_but_not_without_end(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    make_bench(*(f'N7:{number},Read,N7:{number},1,PLC5,1,' for number in range(23)))
+    warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
+    assert warnings[0].endswith('map.csv:2:1 (Tag): Tag "N7:0" becomes the topic N7_0')
+    assert len(warnings) == 21
+    assert warnings[-1].endswith('and 3 more remarks; "check" has them all')
+
+
 def test_map_without_a_row_is_told(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     make_bench()
