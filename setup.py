@@ -45,7 +45,7 @@ setup(
     zip_safe=False,
     install_requires=['setuptools', 'pyserial'],
     # Not tests_require: newer setuptools ignores it, and colcon test would then run no pytest.
-    extras_require={'test': ['hypothesis', 'pytest', 'pytest-timeout']},
+    extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={
         'console_scripts': [
             f'node = {PACKAGE}.cli.main:node',
@@ -53,6 +53,7 @@ setup(
             f'sniff = {PACKAGE}.cli.main:sniff',
             f'check = {PACKAGE}.cli.main:check',
             f'plc = {PACKAGE}.cli.main:plc',
+            f'conform = {PACKAGE}.cli.main:conform',
             f'monitor = {PACKAGE}.cli.main:monitor',
             f'demo = {PACKAGE}.cli.main:demo',
         ],

@@ -42,10 +42,11 @@ COMMANDS = {
     'sniff': 'abdf1_ros.cli.sniff',
     'check': 'abdf1_ros.cli.check',
     'plc': 'abdf1_ros.cli.plc.command',
+    'conform': 'abdf1_ros.cli.conform',
 }
 """Where the ``main`` of each command is."""
 
-_TELLING = ('check', 'plc')
+_TELLING = ('check', 'plc', 'conform')
 
 
 def run(name: str) -> int:
@@ -88,6 +89,11 @@ def check() -> int:
 def plc() -> int:
     """Ask a PLC."""
     return run('plc')
+
+
+def conform() -> int:
+    """Play one end of a line against the rules."""
+    return run('conform')
 
 
 @contextmanager

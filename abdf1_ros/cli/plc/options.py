@@ -32,7 +32,7 @@ _DEFAULT_STATION = 1
 
 
 @dataclass(frozen=True, slots=True)
-class _LineDefaults:
+class LineDefaults:
     """What a command does about its line where no option says it, in words."""
 
     baud: str = str(DEFAULTS.baud)
@@ -43,7 +43,7 @@ class _LineDefaults:
 
 
 _TRIED = 'all are tried'
-_DETECT_DEFAULTS = _LineDefaults(
+_DETECT_DEFAULTS = LineDefaults(
     baud=f'{_TRIED}, but none at a URL', check=_TRIED, duplex=_TRIED,
     timeout='200',  # most of what is tried does not answer
     net='port, parity and own station')
@@ -80,13 +80,13 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
 
     def add(name: str, text: str, *examples: str,
-            defaults: _LineDefaults = _LineDefaults()) -> argparse.ArgumentParser:
+            defaults: LineDefaults = LineDefaults()) -> argparse.ArgumentParser:
         shown = '\n'.join(f'  plc {example}' for example in examples)
         command = commands.add_parser(
             name, help=text, description=f'{text[0].upper()}{text[1:]}.',
             epilog=f'example:\n{shown}\n\n{_STATUSES}',
             formatter_class=argparse.RawDescriptionHelpFormatter)
-        _add_line_options(command, defaults)
+        add_line_options(command, defaults)
         return command
 
     _add_addresses(add('read', 'read addresses once', 'read N7:0 --length 10 --net net.csv'))
@@ -131,8 +131,9 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
     watch.add_argument('--count', type=_count, metavar='N', help='end after so many reads')
 
 
-def _add_line_options(parser: argparse.ArgumentParser, defaults: _LineDefaults) -> None:
-    """Add what says how to reach the line."""
+def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
+                     duplex: bool = True) -> None:
+    """Add what says how to reach the line; without ``duplex`` the command knows that itself."""
     group = parser.add_argument_group('line')
     group.add_argument('--port', metavar='NAME',
                        help='serial port, or URL such as socket://192.168.0.9:4001')
@@ -142,16 +143,21 @@ def _add_line_options(parser: argparse.ArgumentParser, defaults: _LineDefaults) 
                                       f'(default: {defaults.baud})')
     group.add_argument('--check', type=str.upper, help=f'CRC or BCC (default: {defaults.check})')
     group.add_argument('--parity', help='None, Even or Odd (default: None)')
+    if duplex:
+        _add_duplex(group, defaults)
+    group.add_argument('--own-station', metavar='N',
+                       help=f'our own address, which no PLC has (default: {DEFAULTS.station})')
+    group.add_argument('--timeout', metavar='MS',
+                       help=f'to wait for each answer (default: {defaults.timeout})')
+
+
+def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
     either = group.add_mutually_exclusive_group()
     either.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
                         help='half: several stations on a line; full: one PLC '
                              f'(default: {defaults.duplex})')
     either.add_argument('--peer', action='store_const', const='full', dest='duplex',
                         help='the same as --duplex full')
-    group.add_argument('--own-station', metavar='N',
-                       help=f'our own address, which no PLC has (default: {DEFAULTS.station})')
-    group.add_argument('--timeout', metavar='MS',
-                       help=f'to wait for each answer (default: {defaults.timeout})')
 
 
 def _add_data_options(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,297 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The command ``conform``: plays one end of a line against the rules of the manual.
+
+What stands at the other end is a slave or a master of a half-duplex line, or a node of a
+full-duplex one that answers commands (peer) or sends them (client). Every case is a rule: what is
+sent, what must come back and within what time, with document and page.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from importlib.metadata import PackageNotFoundError, version
+import os
+from pathlib import Path
+import random
+import re
+import sys
+import time
+from typing import Any
+
+from abdf1_ros.cli.plc.line import network_of
+from abdf1_ros.cli.plc.options import add_line_options, LineDefaults
+from abdf1_ros.cli.terminal import (
+    drop_output,
+    interruptible,
+    prepare_output,
+    reason_of,
+    seconds_option,
+    whole_option,
+)
+from abdf1_ros.conform import client, data, master, peer, slave
+from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.codec import Check
+from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.report import as_issue, as_json, as_junit, line_of, summary_of
+from abdf1_ros.conform.wire import Wire
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.paths import config_file
+from abdf1_ros.ports.endpoints import Line, PtyLine, TcpLine
+from abdf1_ros.ports.port import open_port, Port
+from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.simulated_plc import load_plcs
+
+_EXIT_FAILED = 1
+_EXIT_USAGE = 2
+_INTERRUPTED = 130
+
+_MODULES = (slave, master, peer, client, data)  # importing them enters their cases
+
+_NOBODY = 'not one byte came: is anybody there? cable, port, speed, power'
+
+_EPILOG = """\
+exit status: 0 when no case failed, 1 when one did or nothing was ever heard, 2 for bad options and
+ports that cannot be opened, 130 after Ctrl-C
+
+examples:
+  conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC
+  conform peer --port /dev/ttyUSB0 --family PLC5 --words N7:100 --yes
+  conform master --pty /tmp/line --station 1        a driver opens /tmp/line and reads station 1
+  conform client --tcp 127.0.0.1:4001 --check BCC --junit result.xml
+  conform slave --list
+
+It is not to be run against a machine that is in use.
+"""
+
+
+class _PortLine:
+    """A port as a script reads it."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._never, self._keep = os.pipe()
+
+    def read(self, timeout: float) -> bytes:
+        """Return what has come after at most ``timeout`` s."""
+        return self._port.read(timeout, self._never)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._port.write(data)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._port.close()
+        os.close(self._never)
+        os.close(self._keep)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the cases; the exit statuses are those of --help."""
+    prepare_output()
+    options = _parse(args)
+    target = Target(options.target)
+    cases = _chosen(target, options.only)
+    try:
+        if options.list:
+            for case in cases:
+                print(f'{case.name:24} {case.source:16} {case.rule}')
+            return 0
+        with interruptible():
+            return _run(options, target, cases)
+    except KeyboardInterrupt:
+        print('conform: interrupted', file=sys.stderr)
+        return _INTERRUPTED
+    except BrokenPipeError:
+        drop_output()
+        return _EXIT_FAILED
+    except (ConfigurationError, ValueError) as error:
+        print(f'conform: {error}', file=sys.stderr)
+        return _EXIT_USAGE
+
+
+def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> int:
+    options.duplex = 'half' if target.is_half_duplex else 'full'
+    made = options.pty is not None or options.tcp is not None
+    if made:
+        options.port = options.port or '/dev/null'  # only its other settings are used
+    network = network_of(options)
+    try:
+        line = _open(options, network)
+    except OSError as error:
+        print(f'conform: {reason_of(options.tcp or options.pty or network.port, error)}',
+              file=sys.stderr)
+        return _EXIT_USAGE
+    try:
+        wire = Wire(line, Check(network.error_code), time.monotonic,
+                    is_half_duplex=target.is_half_duplex, answer_time=options.answer_time)
+        return _judge(options, target, cases, wire, network)
+    except OSError as error:
+        print(f'conform: the line was lost: {reason_of("", error)}', file=sys.stderr)
+        return _EXIT_FAILED
+    finally:
+        line.close()
+
+
+def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], wire: Wire,
+           network: Network) -> int:
+    results: list[CaseResult] = []
+    for result in run_cases(cases, wire, _end_maker(options, target, wire, network),
+                            _allowed(options)):
+        results.append(result)
+        if not (options.json or options.report):
+            print(line_of(result), flush=True)
+    facts = {'target': target.value, 'station': str(options.station), 'check': wire.check.value,
+             'port': options.tcp or options.pty or network.port, 'baud': str(network.baud),
+             'answer time': f'{options.answer_time:g} s', 'abdf1_ros': _version()}
+    if options.junit:
+        Path(options.junit).write_text(as_junit(facts, results) + '\n', encoding='utf-8')
+    if options.json:
+        print(as_json(facts, results))
+    elif options.report:
+        print(as_issue(facts, results))
+    else:
+        print(summary_of(results))
+    if not wire.has_heard:
+        print(f'conform: {_NOBODY}', file=sys.stderr)
+        return _EXIT_FAILED
+    return _EXIT_FAILED if any(result.verdict is Verdict.FAIL for result in results) else 0
+
+
+def _chosen(target: Target, names: Sequence[str]) -> list[Case]:
+    return [case for case in CASES
+            if target in case.targets and (not names or case.name in names)]
+
+
+def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
+    allowed = {Permission.NOTHING}
+    if options.yes:
+        allowed.add(Permission.RESET)
+        if options.words:
+            allowed.add(Permission.WRITE)
+    return frozenset(allowed)
+
+
+def _end_maker(options: argparse.Namespace, target: Target, wire: Wire,
+               network: Network) -> Callable[[], Any]:
+    """Return what makes the end that is played, anew for each case."""
+    numbering = Numbering(random.randrange(0x10000))
+    words = _words(options)
+    if target is Target.SLAVE:
+        return lambda: MasterEnd(wire, options.station, network.station, numbering, words)
+    if target is Target.PEER:
+        return lambda: PeerEnd(wire, options.station, network.station, numbering, words)
+    serve = _server(options, network)
+    if target is Target.MASTER:
+        return lambda: SlaveEnd(wire, options.station, serve)
+    return lambda: ServerEnd(wire, serve)
+
+
+def _words(options: argparse.Namespace) -> Words:
+    file, element = options.words or (7, 0)
+    return Words(file, element, options.count, options.family or '')
+
+
+def _integer_words(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r'[Nn](\d{1,3}):(\d{1,3})', text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f'"{text}" should be integer words, as N7:100')
+    return int(found[1]), int(found[2])
+
+
+def _server(options: argparse.Namespace, network: Network) -> Callable[[bytes], bytes]:
+    """Return what executes commands: the data table of a simulated PLC."""
+    plcs = load_plcs(options.data or str(config_file('simulator.csv')),
+                     Checksum[network.error_code], time.monotonic)
+    plc = next((plc for plc in plcs if plc.station == options.station), None)
+    if plc is None:
+        raise ValueError(f'--station {options.station}: {options.data or "the example data"} '
+                         f'has stations {", ".join(str(plc.station) for plc in plcs)}')
+    return lambda command: plc.serve(Packet.decode(command)).encode()
+
+
+def _open(options: argparse.Namespace, network: Network) -> _PortLine:
+    """Open the line; a line of our own waits until somebody is at its other end."""
+    line: Line
+    if options.tcp is not None:
+        host, _, port = options.tcp.rpartition(':')
+        line = TcpLine(host or '127.0.0.1', int(port))
+    elif options.pty is not None:
+        line = PtyLine(options.pty)
+    else:
+        return _PortLine(open_port(network))
+    print(f'conform: at {line.name}', file=sys.stderr, flush=True)
+    while True:
+        try:
+            return _PortLine(line.open())
+        except OSError:  # nobody yet; Ctrl-C ends it
+            time.sleep(0.05)
+
+
+def _version() -> str:
+    try:
+        return version('abdf1_ros')
+    except PackageNotFoundError:
+        return 'source tree'
+
+
+def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='conform', description=__doc__, epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('target', choices=[target.value for target in Target],
+                        help='what stands at the other end')
+    parser.add_argument('--station', type=whole_option, default=1, metavar='N',
+                        help='of the target; for master and client the one that we play '
+                             '(default: %(default)s)')
+    parser.add_argument('--answer-time', type=seconds_option, default=1.0, metavar='S',
+                        help='s that an answer may take, and that silence has to last '
+                             '(default: %(default)s)')
+    parser.add_argument('--family', type=str.upper, choices=('PLC5', 'SLC'),
+                        help='of the target, for the cases that read and write')
+    parser.add_argument('--words', metavar='ADDRESS', type=_integer_words,
+                        help='integer words that may be overwritten, with --yes (read: N7:0)')
+    parser.add_argument('--count', type=whole_option, default=1, metavar='N',
+                        help='how many words from there (default: %(default)s)')
+    parser.add_argument('--yes', action='store_true',
+                        help='run cases that write, and those that reset the line')
+    parser.add_argument('--data', metavar='FILE',
+                        help='for master and client: what we answer from (default: the example)')
+    parser.add_argument('--only', action='append', default=[], metavar='CASE',
+                        help='run this case; may be given again')
+    parser.add_argument('--list', action='store_true', help='show the cases and end')
+    parser.add_argument('--json', action='store_true', help='print the result as JSON')
+    parser.add_argument('--junit', metavar='FILE', help='write the result as JUnit XML too')
+    parser.add_argument('--report', action='store_true',
+                        help='print the result as text for an issue')
+    parser.add_argument('--pty', metavar='LINK', help='make a pseudo-terminal of this name')
+    parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
+    add_line_options(parser, LineDefaults(), duplex=False)
+    options = parser.parse_args(args)
+    unknown = set(options.only) - {case.name for case in CASES}
+    if unknown:
+        parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')
+    if not 0 <= options.station <= 254:
+        parser.error(f'--station {options.station} should be from 0 to 254')
+    if not 1 <= options.count <= 100:
+        parser.error(f'--count {options.count} should be from 1 to 100')
+    if options.tcp is not None and not re.fullmatch(r'[^:]*:\d{1,5}', options.tcp):
+        parser.error(f'--tcp "{options.tcp}" should be HOST:PORT')
+    return options

@@ -1,0 +1,133 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A case: one rule of the manual, what is done to try it, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from abdf1_ros.conform.wire import Failed, Sent, Skipped, Wire
+
+
+class Target(Enum):
+    """What stands at the other end."""
+
+    SLAVE = 'slave'
+    MASTER = 'master'
+    PEER = 'peer'
+    CLIENT = 'client'
+
+    @property
+    def is_half_duplex(self) -> bool:
+        """Tell whether it is on a half-duplex line."""
+        return self in (Target.SLAVE, Target.MASTER)
+
+
+class Permission(Enum):
+    """What has to be allowed before a case may run, with the option that allows it."""
+
+    NOTHING = ''
+    RESET = '--yes: every slave on the line drops what it holds'
+    WRITE = '--yes and --words: words that may be overwritten'
+
+
+class Verdict(Enum):
+    """What came of a case."""
+
+    PASS = 'PASS'
+    FAIL = 'FAIL'
+    SKIP = 'SKIP'
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """
+    One rule.
+
+    ``name`` is unique, ``rule`` what the manual wants of the other end, ``source`` where it
+    stands. ``run`` raises Failed or Skipped; it gets the end that the target is talked to with.
+    """
+
+    name: str
+    rule: str
+    source: str
+    targets: tuple[Target, ...]
+    run: Callable[[Any], None]
+    permission: Permission = Permission.NOTHING
+
+
+@dataclass(frozen=True, slots=True)
+class CaseResult:
+    """How a case ended; ``seconds`` it took, ``transcript`` says what passed on the line."""
+
+    case: Case
+    verdict: Verdict
+    seconds: float = 0.0
+    expected: str = ''
+    got: str = ''
+    transcript: tuple[str, ...] = field(default=())
+
+
+CASES: list[Case] = []
+
+
+Script = Callable[[Any], None]
+"""Plays a case with the end it is given; raises Failed or Skipped."""
+
+
+def case(name: str, rule: str, source: str, *targets: Target,
+         permission: Permission = Permission.NOTHING) -> Callable[[Script], Script]:
+    """Enter a function among the cases of ``targets``."""
+    def enter(run: Script) -> Script:
+        if any(other.name == name and set(other.targets) & set(targets) for other in CASES):
+            raise ValueError(f'there is a case {name} already')
+        CASES.append(Case(name, rule, source, targets, run, permission))
+        return run
+    return enter
+
+
+def run_cases(cases: Iterable[Case], wire: Wire, make_end: Callable[[], Any],
+              allowed: frozenset[Permission]) -> Iterator[CaseResult]:
+    """
+    Yield the result of each case, one after the other.
+
+    Every case gets an end of its own from ``make_end``, and a line on which all has been heard
+    out. OSError of the line is the caller's.
+    """
+    for entry in cases:
+        if entry.permission not in allowed:
+            yield CaseResult(entry, Verdict.SKIP, got=f'needs {entry.permission.value}')
+            continue
+        end = make_end()
+        end.settle()
+        wire.transcript.clear()
+        begun = wire.now
+        verdict, expected, got = Verdict.PASS, '', ''
+        try:
+            entry.run(end)
+        except Failed as failure:
+            verdict, expected, got = Verdict.FAIL, failure.expected, failure.got
+        except Skipped as reason:
+            verdict, got = Verdict.SKIP, str(reason)
+        yield CaseResult(entry, verdict, wire.now - begun, expected, got, _told(wire, begun))
+
+
+def _told(wire: Wire, begun: float) -> tuple[str, ...]:
+    return tuple(
+        f'{(entry.at - begun) * 1000:9.1f} ms {"we  " if isinstance(entry, Sent) else "they"} '
+        f'{entry.raw.hex(" ").upper()}' for entry in wire.transcript)

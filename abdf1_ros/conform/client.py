@@ -1,0 +1,142 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Cases for a full-duplex node that sends commands, such as a driver; we answer them."""
+
+from __future__ import annotations
+
+from abdf1_ros.conform import codec
+from abdf1_ros.conform.case import case, Target
+from abdf1_ros.conform.codec import Heard, SymbolKind
+from abdf1_ros.conform.ends import PATIENCE, ServerEnd
+from abdf1_ros.conform.wire import Failed, Skipped
+
+_CLIENT = Target.CLIENT
+
+_MOST_REPETITIONS = 12
+
+
+@case('command-form', 'A command has DST, SRC, CMD, STS 00 and TNS, and the check is right.',
+      'M 5-2 to 5-7, 6-3', _CLIENT)
+def command_form(end: ServerEnd) -> None:
+    command = end.next_command()
+    if len(command.data) < codec.HEADER_SIZE or command.data[2] & 0x40 or command.data[3]:
+        raise Failed('a command with STS 00', command.data.hex(' '))
+    end.finish(command)
+
+
+@case('nak-repeated', 'A message answered with DLE NAK is sent again.', 'M 4-5', _CLIENT)
+def nak_repeated(end: ServerEnd) -> None:
+    first = end.next_command()
+    end.wire.send(codec.NAK)
+    second = end.next_command('the message again')
+    if second.data != first.data:
+        raise Failed(f'the same message: {first.data.hex(" ")}', second.data.hex(' '))
+    end.finish(second)
+
+
+@case('nak-limit', 'A message that is always answered with DLE NAK is given up.',
+      'M 4-5', _CLIENT)
+def nak_limit(end: ServerEnd) -> None:
+    first = end.next_command()
+    for _ in range(_MOST_REPETITIONS):
+        end.wire.send(codec.NAK)
+        symbol = end.wire.hear(PATIENCE)
+        if symbol is None or symbol.data != first.data:
+            return
+    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+
+
+@case('silence-enquired', 'Silence is answered with DLE ENQ, not with the message; DLE ACK then '
+      'ends the message.', 'M 4-5', _CLIENT)
+def silence_enquired(end: ServerEnd) -> None:
+    command = end.next_command()
+    end.wire.expect(SymbolKind.ENQ, within=PATIENCE)
+    end.finish(command)
+
+
+@case('enquiry-nak-repeated', 'DLE NAK as answer to DLE ENQ has the message sent again.',
+      'M 4-5, 4-13', _CLIENT)
+def enquiry_nak_repeated(end: ServerEnd) -> None:
+    command = end.next_command()
+    end.wire.expect(SymbolKind.ENQ, within=PATIENCE)
+    end.wire.send(codec.NAK)
+    again = end.wire.expect(SymbolKind.MESSAGE, 'the message again')
+    if again.data != command.data:
+        raise Failed('the same message', again.data.hex(' '))
+    end.finish(again)
+
+
+@case('reply-acknowledged', 'A good reply is acknowledged with DLE ACK.', 'M 4-7 to 4-9', _CLIENT)
+def reply_acknowledged(end: ServerEnd) -> None:
+    end.finish(end.next_command())
+
+
+@case('bad-reply-refused', 'A reply with a wrong check is answered with DLE NAK.',
+      'M 4-7 to 4-9', _CLIENT)
+def bad_reply_refused(end: ServerEnd) -> None:
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    end.wire.send(codec.damaged(codec.message(end.serve(command.data), end.wire.check)))
+    end.wire.expect(SymbolKind.NAK)
+    end.reply_to(command)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
+
+
+@case('enquiry-repeats-response', 'DLE ENQ has the last response repeated.', 'M 4-13', _CLIENT)
+def enquiry_repeats_response(end: ServerEnd) -> None:
+    end.finish(end.next_command())
+    end.wire.send(codec.ENQ)
+
+    def is_response(symbol: Heard) -> bool:
+        return symbol.kind in (SymbolKind.ACK, SymbolKind.NAK)
+
+    symbol = end.wire.until(is_response, 'the last response', end.wire.answer_time)
+    if symbol.kind is not SymbolKind.ACK:
+        raise Failed('DLE ACK again', str(symbol))
+
+
+@case('duplicate-acknowledged', 'A reply that comes again is acknowledged again.',
+      'M 4-8', _CLIENT)
+def duplicate_acknowledged(end: ServerEnd) -> None:
+    command = end.next_command()
+    end.finish(command)
+    end.reply_to(command)
+
+    def is_response(symbol: Heard) -> bool:
+        return symbol.kind in (SymbolKind.ACK, SymbolKind.NAK)
+
+    symbol = end.wire.until(is_response, 'a response', end.wire.answer_time)
+    if symbol.kind is not SymbolKind.ACK:
+        raise Failed('DLE ACK for a reply that came before', str(symbol))
+
+
+@case('embedded-response', 'A response inside our reply counts, and is not part of it.',
+      'M 4-3', _CLIENT)
+def embedded_response(end: ServerEnd) -> None:
+    command = end.next_command()
+    begun, rest = codec.divided(codec.message(end.serve(command.data), end.wire.check))
+    end.wire.send(begun + codec.ACK + rest)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a reply with an embedded response')
+
+
+@case('tns-differs', 'Each new command has another TNS.', 'M 6-7', _CLIENT)
+def tns_differs(end: ServerEnd) -> None:
+    seen = []
+    for _ in range(3):
+        command = end.next_command()
+        seen.append(command.data[4:6])
+        end.finish(command)
+    if len(set(seen)) < len(seen):
+        raise Failed('three different TNS', ', '.join(tns.hex(' ') for tns in seen))

@@ -1,0 +1,215 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Cases of the commands, which a half-duplex slave and a full-duplex node answer alike.
+
+Statuses are those of M 8-2 to 8-4. The commands are written out byte by byte, as M 7-17 (SLC 500
+and MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
+"""
+
+from __future__ import annotations
+
+from abdf1_ros.conform.case import case, Permission, Target
+from abdf1_ros.conform.codec import HEADER_SIZE
+from abdf1_ros.conform.ends import Asking, Words
+from abdf1_ros.conform.wire import Failed, Skipped
+
+_ANSWERING = (Target.SLAVE, Target.PEER)
+
+_ECHO = 0x06
+_TYPED = 0x0F
+_ILLEGAL = 0x10  # STS: command code, sub-code, length or format not accepted (M 8-2)
+_EXTENDED = 0xF0  # STS: an EXT STS follows (M 8-3)
+
+# Bytes of an echo that every product takes: SLC 5/01 and 5/02 end at 95, a PLC-5 at 243.
+_ECHO_SIZES = (0, 1, 2, 64, 95)
+
+# All values of a byte that mean something to the line, and their neighbours.
+_NASTY = bytes.fromhex('10 10 03 10 02 10 05 10 06 10 15 03 02 01 00 FF 10')
+
+
+def _data(reply: bytes) -> bytes:
+    """Return what follows the header of a reply without an error; raises Failed."""
+    if reply[3]:
+        raise Failed('STS 00', f'STS {reply[3]:02X} {reply[HEADER_SIZE:].hex(" ")}'.rstrip())
+    return reply[HEADER_SIZE:]
+
+
+def _refused(reply: bytes, allowed: tuple[int, ...]) -> None:
+    if reply[3] not in allowed:
+        raise Failed(' or '.join(f'STS {sts:02X}' for sts in allowed), f'STS {reply[3]:02X}')
+
+
+def _echoed(end: Asking, data: bytes, tns: int | None = None) -> None:
+    got = _data(end.ask(_ECHO, b'\x00' + data, tns))
+    if got != data:
+        raise Failed(f'the data of the echo: {data.hex(" ")}', got.hex(' '))
+
+
+@case('stuffing', 'A data byte 10 is doubled on the line and single in the message.',
+      'M 2-7, 5-4', *_ANSWERING)
+def stuffing(end: Asking) -> None:
+    _echoed(end, _NASTY)
+
+
+@case('check-of-all-bytes', 'The check of a reply is right for every value of a byte.',
+      'M 5-2 to 5-7', *_ANSWERING)
+def check_of_all_bytes(end: Asking) -> None:
+    for start in range(0, 256, 64):
+        _echoed(end, bytes(range(start, start + 64)))
+
+
+@case('echo-sizes', 'An echo sends back what it was given, of any length up to the packet.',
+      'M 7-3', *_ANSWERING)
+def echo_sizes(end: Asking) -> None:
+    for size in _ECHO_SIZES:
+        _echoed(end, bytes(range(size)))
+
+
+@case('tns-returned', 'A reply has the TNS of its command, whatever its bytes are.',
+      'M 6-7', *_ANSWERING)
+def tns_returned(end: Asking) -> None:
+    for tns in (0x0010, 0x1010, 0xFFFF, 0x0310, 0x0000):
+        _echoed(end, b'', tns)
+
+
+@case('unknown-command', 'A command code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
+def unknown_command(end: Asking) -> None:
+    _refused(end.ask(0x0C, b''), (_ILLEGAL,))
+
+
+@case('unknown-function', 'A function code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
+def unknown_function(end: Asking) -> None:
+    _refused(end.ask(_TYPED, b'\xE7'), (_ILLEGAL, _EXTENDED))
+
+
+@case('identity', 'Diagnostic status tells what the processor is.', 'M 7-3', *_ANSWERING)
+def identity(end: Asking) -> None:
+    if not _data(end.ask(_ECHO, b'\x03')):
+        raise Failed('some bytes of diagnostic status', 'none')
+
+
+def _words_of(end: Asking) -> Words:
+    if not end.words.family:
+        raise Skipped('needs --family PLC5 or SLC')
+    return end.words
+
+
+def _number(value: int) -> bytes:
+    """Return a level of an address: a byte, from 255 on FF and two bytes (M 13-10 to 13-15)."""
+    return bytes((value,)) if value < 255 else b'\xFF' + value.to_bytes(2, 'little')
+
+
+def _read_body(words: Words, count: int) -> bytes:
+    """Return FNC and the rest of a command that reads integers."""
+    place = _number(words.file), _number(words.element)
+    if words.family == 'SLC':
+        return bytes((0xA2, 2 * count)) + place[0] + b'\x89' + place[1] + b'\x00'
+    size = count.to_bytes(2, 'little')
+    return b'\x68\x00\x00' + size + b'\x06' + place[0] + place[1] + size
+
+
+def _write_body(words: Words, data: bytes) -> bytes:
+    """Return FNC and the rest of a command that writes integers."""
+    place = _number(words.file), _number(words.element)
+    if words.family == 'SLC':
+        return bytes((0xAA, len(data))) + place[0] + b'\x89' + place[1] + b'\x00' + data
+    count = (len(data) // 2).to_bytes(2, 'little')
+    array = b'\x99\x09' + bytes((1 + len(data),)) + b'\x42'
+    return b'\x67\x00\x00' + count + b'\x06' + place[0] + place[1] + array + data
+
+
+def _masked_body(words: Words, mask: int, bits: int) -> bytes:
+    """Return FNC and the rest of a command that changes the bits of ``mask`` in a word."""
+    place = _number(words.file), _number(words.element)
+    if words.family == 'SLC':
+        return (b'\xAB\x02' + place[0] + b'\x89' + place[1] + b'\x00'
+                + mask.to_bytes(2, 'little') + bits.to_bytes(2, 'little'))
+    keep = (~mask & 0xFFFF).to_bytes(2, 'little')
+    return b'\x26\x06' + place[0] + place[1] + keep + (bits & mask).to_bytes(2, 'little')
+
+
+def _read(end: Asking, count: int) -> bytes:
+    """Return ``count`` integers as bytes, without the type that a PLC-5 puts before them."""
+    data = _data(end.ask(_TYPED, _read_body(end.words, count)))
+    if len(data) < 2 * count:
+        raise Failed(f'{2 * count} bytes of data', data.hex(' '))
+    return data[len(data) - 2 * count:]
+
+
+@case('read-words', 'A typed read returns the words that were asked for.',
+      'M 7-17, 7-28', *_ANSWERING)
+def read_words(end: Asking) -> None:
+    _words_of(end)
+    _read(end, 1)
+
+
+@case('address-forms', 'A PLC-5 takes an address with and without its data table area, in long '
+      'form, and as text.', 'M 13-10 to 13-15', *_ANSWERING)
+def address_forms(end: Asking) -> None:
+    words = _words_of(end)
+    if words.family != 'PLC5':
+        raise Skipped('only a PLC-5 has these forms')
+    place = bytes((words.file, words.element)) if max(words.file, words.element) < 255 else b''
+    long = b''.join(b'\xFF' + level.to_bytes(2, 'little')
+                    for level in (words.file, words.element))
+    text = b'\x00$' + words.address.encode() + b'\x00'
+    forms = [b'\x07\x00' + place, b'\x06' + place] if place else []
+    for address in (*forms, b'\x06' + long, text):
+        body = b'\x68\x00\x00\x01\x00' + address + b'\x01\x00'
+        try:
+            _data(end.ask(_TYPED, body))
+        except Failed as failure:
+            raise Failed(f'STS 00 for the address {address.hex(" ")}', failure.got) from None
+
+
+@case('element-too-high', 'An element that does not exist is refused, not answered with data.',
+      'M 8-2 to 8-4', *_ANSWERING)
+def element_too_high(end: Asking) -> None:
+    words = _words_of(end)
+    beyond = Words(words.file, 9999, family=words.family)
+    _refused(end.ask(_TYPED, _read_body(beyond, 1)), (_ILLEGAL, 0x50, _EXTENDED))
+
+
+@case('write-and-read', 'What was written is what is read, bit by bit.',
+      'M 7-18, 7-30', *_ANSWERING, permission=Permission.WRITE)
+def write_and_read(end: Asking) -> None:
+    words = _words_of(end)
+    before = _read(end, words.count)
+    try:
+        for pattern in (b'\x10\x10', b'\x34\x12', b'\xFF\x7F', b'\x00\x00'):
+            wanted = pattern * words.count
+            _data(end.ask(_TYPED, _write_body(words, wanted)))
+            if (got := _read(end, words.count)) != wanted:
+                raise Failed(wanted.hex(' '), got.hex(' '))
+    finally:
+        _data(end.ask(_TYPED, _write_body(words, before)))
+
+
+@case('masked-write', 'A masked write changes the bits of its mask and no others.',
+      'M 7-20', *_ANSWERING, permission=Permission.WRITE)
+def masked_write(end: Asking) -> None:
+    words = _words_of(end)
+    before = _read(end, 1)
+    try:
+        _data(end.ask(_TYPED, _write_body(words, b'\x55\xAA')))
+        reply = end.ask(_TYPED, _masked_body(words, 0x0108, 0x0108))
+        if reply[3] == _ILLEGAL:
+            raise Skipped('STS 10: this processor has no masked write')
+        _data(reply)
+        if (got := _read(end, 1)) != b'\x5D\xAB':
+            raise Failed('5d ab', got.hex(' '))
+    finally:
+        _data(end.ask(_TYPED, _write_body(words, before)))

@@ -1,0 +1,145 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Cases for a half-duplex master, such as a driver; we are a slave that it talks to."""
+
+from __future__ import annotations
+
+from abdf1_ros.conform import codec
+from abdf1_ros.conform.case import case, Target
+from abdf1_ros.conform.codec import Heard, SymbolKind
+from abdf1_ros.conform.ends import PATIENCE, SlaveEnd
+from abdf1_ros.conform.wire import Failed, Skipped
+
+_MASTER = Target.MASTER
+
+_MOST_REPETITIONS = 12
+
+
+@case('poll-form', 'A poll is DLE ENQ, the station, and a BCC, on a line with CRC too.',
+      'M 5-3', _MASTER)
+def poll_form(end: SlaveEnd) -> None:
+    symbol = end.wire.until(
+        lambda heard: heard.kind is SymbolKind.POLL, 'a poll', PATIENCE)
+    if not symbol.is_good:
+        raise Failed('a poll with the right BCC', symbol.raw.hex(' '))
+
+
+@case('command-form', 'A command has DST, SRC, CMD, STS 00 and TNS; its check covers what the '
+      'manual says.', 'M 5-2 to 5-7, 6-3', _MASTER)
+def command_form(end: SlaveEnd) -> None:
+    command = end.next_command()
+    if len(command.data) < codec.HEADER_SIZE or command.data[2] & 0x40 or command.data[3]:
+        raise Failed('a command with STS 00', command.data.hex(' '))
+    end.finish(command)
+
+
+@case('no-ack-repeated', 'A message without DLE ACK is sent again, with the same TNS.',
+      'M 3-13 to 3-15', _MASTER)
+def no_ack_repeated(end: SlaveEnd) -> None:
+    first = end.next_command()
+    second = end.next_command('the message again')
+    if second.data != first.data:
+        raise Failed(f'the same message: {first.data.hex(" ")}', second.data.hex(' '))
+    end.finish(second)
+
+
+@case('repetitions-limited', 'A message that is never acknowledged is given up.',
+      'M 3-13 to 3-15', _MASTER)
+def repetitions_limited(end: SlaveEnd) -> None:
+    first = end.next_command()
+
+    def is_other(symbol: Heard) -> bool:
+        return symbol.kind is not SymbolKind.MASTER_MESSAGE or symbol.data != first.data
+
+    for _ in range(_MOST_REPETITIONS):
+        symbol = end.wire.hear(PATIENCE)
+        if symbol is None or is_other(symbol):
+            return
+    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+
+
+@case('polled-after-ack', 'After DLE ACK the master polls for the reply.', 'M 3-13', _MASTER)
+def polled_after_ack(end: SlaveEnd) -> None:
+    command = end.next_command()
+    end.finish(command)
+
+
+@case('eot-polled-again', 'After DLE EOT the master polls again for a reply that is due.',
+      'M 3-13 to 3-15', _MASTER)
+def eot_polled_again(end: SlaveEnd) -> None:
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    end.next_poll()
+    end.wire.send(codec.EOT)
+    end.next_poll('another poll after DLE EOT')
+    end.reply_to(command)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
+
+
+@case('bad-reply-polled-again', 'A reply with a wrong check is asked for by another poll; DLE NAK '
+      'would reset the whole line.', 'M 3-14, 2-7', _MASTER)
+def bad_reply_polled_again(end: SlaveEnd) -> None:
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    end.next_poll()
+    frame = codec.message(end.serve(command.data), end.wire.check)
+    end.wire.send(codec.damaged(frame))
+    symbol = end.wire.hear(PATIENCE)
+    if symbol is None or symbol.kind is not SymbolKind.POLL or symbol.station != end.station:
+        raise Failed('another poll of this station', str(symbol or 'silence'))
+    end.reply_to(command)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
+
+
+@case('duplicate-acknowledged', 'A reply that comes again, as after a lost DLE ACK, is '
+      'acknowledged again.', 'M 3-15', _MASTER)
+def duplicate_acknowledged(end: SlaveEnd) -> None:
+    command = end.next_command()
+    end.finish(command)
+    visit = end.wire.until(lambda symbol: symbol.station == end.station, 'a poll or a command',
+                           PATIENCE)
+    if visit.kind is SymbolKind.MASTER_MESSAGE:
+        end.wire.send(codec.ACK)
+        end.next_poll()
+    end.reply_to(command)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a reply that came before')
+    if visit.kind is SymbolKind.MASTER_MESSAGE:
+        end.next_poll()
+        end.reply_to(visit)
+        end.wire.expect(SymbolKind.ACK, 'DLE ACK for the reply after it')
+
+
+@case('tns-differs', 'Each new command has another TNS.', 'M 6-7', _MASTER)
+def tns_differs(end: SlaveEnd) -> None:
+    seen = []
+    for _ in range(3):
+        command = end.next_command()
+        seen.append(command.data[4:6])
+        end.finish(command)
+    if len(set(seen)) < len(seen):
+        raise Failed('three different TNS', ', '.join(tns.hex(' ') for tns in seen))
+
+
+@case('waits-for-slow-answer', 'A master listens for as long as an answer may take: it sends '
+      'nothing while a reply comes in.', 'M 3-13 to 3-15', _MASTER)
+def waits_for_slow_answer(end: SlaveEnd) -> None:
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    end.next_poll()
+    frame = codec.message(end.serve(command.data), end.wire.check)
+    for at in range(0, len(frame), 4):
+        end.wire.send(frame[at:at + 4])
+        end.wire.rest(0.01)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a reply that came in pieces')

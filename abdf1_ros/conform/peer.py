@@ -1,0 +1,160 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Cases for a full-duplex node that answers commands, such as a PLC; we send them."""
+
+from __future__ import annotations
+
+from abdf1_ros.conform import codec
+from abdf1_ros.conform.case import case, Target
+from abdf1_ros.conform.codec import SymbolKind
+from abdf1_ros.conform.ends import check_reply, PeerEnd
+from abdf1_ros.conform.wire import Failed, Skipped
+
+_PEER = Target.PEER
+
+# A limit of repetitions or enquiries that is larger is not waited for.
+_MOST_REPETITIONS = 12
+
+# How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the
+# defaults of the products (M 7-25, 7-27).
+_ACK_TIMEOUT = 6.0
+
+
+def _answer(end: PeerEnd, frame: bytes, kind: SymbolKind) -> None:
+    end.wire.send(frame)
+    end.wire.expect(kind)
+
+
+@case('message-acknowledged', 'A good message is acknowledged with DLE ACK.',
+      'M 4-7 to 4-9', _PEER)
+def message_acknowledged(end: PeerEnd) -> None:
+    end.send(end.command())
+    end.wire.expect(SymbolKind.ACK)
+
+
+@case('bad-check-refused', 'A message with a wrong check is answered with DLE NAK.',
+      'M 4-7 to 4-9', _PEER)
+def bad_check_refused(end: PeerEnd) -> None:
+    frame = codec.message(end.command(), end.wire.check)
+    _answer(end, codec.damaged(frame), SymbolKind.NAK)
+
+
+@case('short-message-refused', 'A message of fewer than six bytes is answered with DLE NAK.',
+      'M 4-4, 4-7 to 4-9', _PEER)
+def short_message_refused(end: PeerEnd) -> None:
+    _answer(end, codec.message(end.command()[:5], end.wire.check), SymbolKind.NAK)
+
+
+@case('broken-message-refused', 'DLE ENQ inside a message ends it; the answer is DLE NAK.',
+      'M 4-7 to 4-9', _PEER)
+def broken_message_refused(end: PeerEnd) -> None:
+    begun, _ = codec.divided(codec.message(end.command(), end.wire.check))
+    _answer(end, begun + codec.ENQ, SymbolKind.NAK)
+
+
+@case('enquiry-after-ack', 'DLE ENQ has the last response repeated: DLE ACK.',
+      'M 4-5, 4-13', _PEER)
+def enquiry_after_ack(end: PeerEnd) -> None:
+    end.ask(0x06, b'\x00')
+    _answer(end, codec.ENQ, SymbolKind.ACK)
+
+
+@case('enquiry-after-nak', 'DLE ENQ has the last response repeated: DLE NAK.',
+      'M 4-5, 4-13', _PEER)
+def enquiry_after_nak(end: PeerEnd) -> None:
+    _answer(end, codec.damaged(codec.message(end.command(), end.wire.check)), SymbolKind.NAK)
+    _answer(end, codec.ENQ, SymbolKind.NAK)
+
+
+@case('duplicate-discarded', 'A message with the header of the last one is acknowledged and '
+      'discarded.', 'M 4-4, 4-8', _PEER)
+def duplicate_discarded(end: PeerEnd) -> None:
+    command = end.command(body=b'\x00twice')
+    end.deliver(command)
+    check_reply(command, end.collect())
+    _answer(end, codec.message(command, end.wire.check), SymbolKind.ACK)
+    symbol = end.wire.hear()
+    if symbol is not None:
+        raise Failed('one reply to a message sent twice',
+                     f'{symbol} (is duplicate detection off?)')
+
+
+@case('reply-repeated-after-nak', 'A message answered with DLE NAK is sent again.', 'M 4-5', _PEER)
+def reply_repeated_after_nak(end: PeerEnd) -> None:
+    end.deliver(end.command(body=b'\x00again'))
+    first = end.collect(acknowledge=False)
+    end.wire.send(codec.NAK)
+    second = end.collect()
+    if second != first:
+        raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
+
+
+@case('nak-limit', 'A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
+def nak_limit(end: PeerEnd) -> None:
+    end.deliver(end.command())
+    for _ in range(_MOST_REPETITIONS + 1):
+        symbol = end.wire.hear(_ACK_TIMEOUT)
+        if symbol is None:
+            return
+        if symbol.kind is not SymbolKind.MESSAGE:
+            raise Failed('the message again, or silence', str(symbol))
+        end.wire.send(codec.NAK)
+    end.settle()
+    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+
+
+@case('silence-is-enquired', 'A message without any response is followed by DLE ENQ; DLE ACK '
+      'ends it.', 'M 4-5', _PEER)
+def silence_is_enquired(end: PeerEnd) -> None:
+    end.deliver(end.command())
+    end.collect(acknowledge=False)
+    end.wire.expect(SymbolKind.ENQ, within=_ACK_TIMEOUT)
+    end.wire.send(codec.ACK)
+    end.wire.expect_silence('the message has been acknowledged', _ACK_TIMEOUT)
+
+
+@case('enquiry-limit', 'A message that never gets a response is given up after some DLE ENQ.',
+      'M 4-5', _PEER)
+def enquiry_limit(end: PeerEnd) -> None:
+    end.deliver(end.command())
+    end.collect(acknowledge=False)
+    for _ in range(_MOST_REPETITIONS):
+        symbol = end.wire.hear(_ACK_TIMEOUT)
+        if symbol is None:
+            return
+        if symbol.kind is not SymbolKind.ENQ:
+            raise Failed('DLE ENQ, or silence', str(symbol))
+    end.settle()
+    raise Skipped(f'more than {_MOST_REPETITIONS} enquiries: a larger limit is set')
+
+
+@case('embedded-response', 'A response inside a message counts, and is not part of the message.',
+      'M 4-3', _PEER)
+def embedded_response(end: PeerEnd) -> None:
+    first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
+    end.deliver(first)
+    check_reply(first, end.collect(acknowledge=False))
+    begun, rest = codec.divided(codec.message(second, end.wire.check))
+    end.wire.send(begun + codec.ACK + rest)
+    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a message with an embedded response')
+    check_reply(second, end.collect())
+    end.wire.expect_silence('the first reply has been acknowledged', _ACK_TIMEOUT)
+
+
+@case('noise-before-message', 'Bytes outside of a message do not spoil the next one.',
+      'M 4-7 to 4-9', _PEER)
+def noise_before_message(end: PeerEnd) -> None:
+    end.wire.send(b'\x55\x00\xFF\x03')
+    end.deliver(end.command())

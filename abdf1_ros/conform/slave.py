@@ -1,0 +1,221 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Cases for a half-duplex slave; we are the master.
+
+They send diagnostic echoes (CMD 06, FNC 00), which change nothing in the target.
+"""
+
+from __future__ import annotations
+
+from abdf1_ros.conform import codec
+from abdf1_ros.conform.case import case, Permission, Target
+from abdf1_ros.conform.codec import SymbolKind
+from abdf1_ros.conform.ends import check_reply, MasterEnd
+from abdf1_ros.conform.wire import Failed, Skipped
+
+_SLAVE = Target.SLAVE
+
+# A limit of repetitions that is larger is not waited for.
+_MOST_REPETITIONS = 12
+
+# Commands that are sent without a poll in between, to fill a slave's buffers.
+_BURST = 8
+
+
+@case('poll-idle', 'A slave that has nothing to send answers a poll with DLE EOT.',
+      'KF2 4-31', _SLAVE)
+def poll_idle(end: MasterEnd) -> None:
+    symbol = end.poll()
+    if symbol is None:
+        raise Skipped('silence: EOT suppression may be on, or nobody is there')
+    if symbol.kind is not SymbolKind.EOT:
+        raise Failed('DLE EOT', str(symbol))
+
+
+@case('message-acknowledged', 'A good message is acknowledged with DLE ACK.', 'KF2 4-31', _SLAVE)
+def message_acknowledged(end: MasterEnd) -> None:
+    end.send(end.command())
+    end.wire.expect(SymbolKind.ACK)
+
+
+@case('reply-waits-for-poll', 'A slave sends its reply as answer to a poll, not by itself.',
+      'KF2 4-31', _SLAVE)
+def reply_waits_for_poll(end: MasterEnd) -> None:
+    command = end.command()
+    end.deliver(command)
+    end.wire.expect_silence('the slave has not been polled')
+    check_reply(command, end.collect())
+
+
+@case('poll-stuffing', 'A poll of station 16 has its station doubled and its BCC not.',
+      'M 3-4, KF2 4-31', _SLAVE)
+def poll_stuffing(end: MasterEnd) -> None:
+    if end.station != codec.DLE:
+        raise Skipped('only with station 16')
+    if end.poll() is None:
+        raise Failed('an answer to 10 05 10 10 F0', 'silence')
+
+
+@case('bad-check-ignored', 'A message with a wrong check is ignored; a slave never sends DLE NAK.',
+      'KF2 4-31', _SLAVE)
+def bad_check_ignored(end: MasterEnd) -> None:
+    frame = codec.master_message(end.station, end.command(), end.wire.check)
+    end.wire.send(codec.damaged(frame))
+    end.wire.expect_silence('the check was wrong')
+
+
+@case('crc-covers-station', "The CRC of a master's message covers its station and STX.",
+      'M 5-6, 5-7', _SLAVE)
+def crc_covers_station(end: MasterEnd) -> None:
+    if end.wire.check is not codec.Check.CRC:
+        raise Skipped('only with CRC')
+    command = end.command()
+    frame = codec.master_message(end.station, command, end.wire.check)
+    end.wire.send(frame[:-2] + codec.check_bytes(command, end.wire.check))
+    end.wire.expect_silence("the CRC was that of a slave's message")
+
+
+@case('bad-poll-ignored', 'A poll with a wrong BCC is ignored.', 'KF2 4-31', _SLAVE)
+def bad_poll_ignored(end: MasterEnd) -> None:
+    end.wire.send(codec.damaged(codec.poll(end.station)))
+    end.wire.expect_silence('the BCC was wrong')
+
+
+@case('other-station-ignored', 'A message or poll of another station is ignored.',
+      'KF2 4-31', _SLAVE)
+def other_station_ignored(end: MasterEnd) -> None:
+    # Our own address: no slave has it.
+    command = bytes((end.own,)) + end.command()[1:]
+    end.wire.send(codec.master_message(end.own, command, end.wire.check))
+    end.wire.expect_silence('the message was for another station')
+    end.wire.send(codec.poll(end.own))
+    end.wire.expect_silence('the poll was of another station')
+
+
+@case('short-message-ignored', 'A message of fewer than six bytes is ignored.', 'M 3-4', _SLAVE)
+def short_message_ignored(end: MasterEnd) -> None:
+    end.send(end.command()[:5])
+    end.wire.expect_silence('the message was shorter than its header')
+
+
+@case('broken-message', 'A message that breaks off leaves the slave ready for the next one.',
+      'M 3-4', _SLAVE)
+def broken_message(end: MasterEnd) -> None:
+    frame = codec.master_message(end.station, end.command(body=b'\x00abc'), end.wire.check)
+    end.wire.send(frame[:len(frame) // 2])
+    end.wire.expect_silence('the message was not complete', 0.3)
+    end.deliver(end.command())
+
+
+@case('noise-before-message', 'Bytes outside of a symbol are ignored.', 'M 3-4', _SLAVE)
+def noise_before_message(end: MasterEnd) -> None:
+    command = end.command()
+    end.wire.send(b'\x55\x00\xFF\x03')
+    end.send(command)
+    end.wire.expect(SymbolKind.ACK)
+
+
+@case('unacknowledged-again', 'A reply that was not acknowledged is sent again at the next poll.',
+      'KF2 4-31', _SLAVE)
+def unacknowledged_again(end: MasterEnd) -> None:
+    end.deliver(end.command(body=b'\x00again'))
+    first = end.collect(acknowledge=False)
+    second = end.collect()
+    if second != first:
+        raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
+
+
+@case('acknowledged-dropped', 'A reply that was acknowledged is not sent again.',
+      'KF2 4-31', _SLAVE)
+def acknowledged_dropped(end: MasterEnd) -> None:
+    end.deliver(end.command())
+    end.collect()
+    symbol = end.poll()
+    if symbol is not None and symbol.kind is not SymbolKind.EOT:
+        raise Failed('DLE EOT', str(symbol))
+
+
+@case('repetitions-limited', 'A message that is never acknowledged is dropped after some polls.',
+      'KF2 4-31', _SLAVE)
+def repetitions_limited(end: MasterEnd) -> None:
+    end.deliver(end.command())
+    end.collect(acknowledge=False)
+    for _ in range(_MOST_REPETITIONS):
+        symbol = end.poll()
+        if symbol is None or symbol.kind is SymbolKind.EOT:
+            return
+    end.settle()
+    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+
+
+@case('duplicate-discarded', 'A message with the header of the last one is acknowledged and '
+      'discarded.', 'KF2 4-31', _SLAVE)
+def duplicate_discarded(end: MasterEnd) -> None:
+    command = end.command(body=b'\x00twice')
+    end.deliver(command)
+    end.deliver(command)
+    check_reply(command, end.collect())
+    symbol = end.poll()
+    if symbol is not None and symbol.kind is SymbolKind.MESSAGE:
+        raise Failed('one reply to a message sent twice', 'two (is duplicate detection off?)')
+
+
+@case('new-tns-executed', 'A message with another TNS is no duplicate.', 'M 3-4, 6-7', _SLAVE)
+def new_tns_executed(end: MasterEnd) -> None:
+    for _ in range(2):
+        command = end.command(body=b'\x00twice')
+        end.deliver(command)
+        check_reply(command, end.collect())
+
+
+@case('full-is-silent', 'A slave that can take no more messages does not acknowledge; what it has '
+      'acknowledged is answered.', 'KF2 4-31', _SLAVE)
+def full_is_silent(end: MasterEnd) -> None:
+    accepted = []
+    for _ in range(_BURST):
+        command = end.command()
+        end.send(command)
+        symbol = end.wire.hear()
+        if symbol is None:
+            break
+        if symbol.kind is not SymbolKind.ACK:
+            raise Failed('DLE ACK or silence', str(symbol))
+        accepted.append(command)
+    for command in accepted:
+        check_reply(command, end.collect())
+
+
+@case('broadcast-unanswered', 'A message to station 255 is neither acknowledged nor answered.',
+      'M 3-4', _SLAVE)
+def broadcast_unanswered(end: MasterEnd) -> None:
+    command = bytes((0xFF,)) + end.command()[1:]
+    end.wire.send(codec.master_message(0xFF, command, end.wire.check))
+    end.wire.expect_silence('the message was a broadcast')
+    symbol = end.poll()
+    if symbol is not None and symbol.kind is SymbolKind.MESSAGE:
+        raise Failed('no reply to a broadcast', symbol.data.hex(' '))
+
+
+@case('nak-resets', 'DLE NAK makes every slave drop what it holds.', 'M 2-7, 3-11', _SLAVE,
+      permission=Permission.RESET)
+def nak_resets(end: MasterEnd) -> None:
+    end.deliver(end.command())
+    end.collect(acknowledge=False)
+    end.wire.send(codec.NAK)
+    end.wire.expect_silence('DLE NAK has no answer')
+    symbol = end.poll()
+    if symbol is not None and symbol.kind is not SymbolKind.EOT:
+        raise Failed('DLE EOT', str(symbol))

@@ -1,0 +1,156 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The line as a script uses it: send these bytes, expect that symbol, within so long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+import math
+from typing import Protocol
+
+from abdf1_ros.conform import codec
+from abdf1_ros.conform.codec import Check, Heard, SymbolKind
+
+# A symbol that has begun may take as long as a slow line needs for the longest frame, and is not
+# waited for without end.
+_FRAME_TIME = 3.0
+
+_MOST_UNREAD = 65536
+
+
+class RawLine(Protocol):
+    """What bytes come from and go to."""
+
+    def read(self, timeout: float) -> bytes:
+        """Return what has come after at most ``timeout`` s; nothing if nothing has."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What we have sent, and when (s)."""
+
+    at: float
+    raw: bytes
+
+
+class Failed(Exception):
+    """The other end did not do what the rule says."""
+
+    def __init__(self, expected: str, got: str) -> None:
+        super().__init__(f'expected {expected}, got {got}')
+        self.expected = expected
+        self.got = got
+
+
+class Skipped(Exception):
+    """The case cannot be judged here; the text says why."""
+
+
+class Wire:
+    """
+    One end of a line.
+
+    ``answer_time`` is how long (s) an answer may take, and how long silence has to last to be
+    silence. ``transcript`` keeps all that passed, in order; ``has_heard`` tells whether any byte
+    came.
+    """
+
+    def __init__(self, line: RawLine, check: Check, clock: Callable[[], float], *,
+                 is_half_duplex: bool, answer_time: float = 1.0) -> None:
+        self.check = check
+        self.is_half_duplex = is_half_duplex
+        self.answer_time = answer_time
+        self.transcript: list[Sent | Heard] = []
+        self.has_heard = False
+        self._line = line
+        self._clock = clock
+        self._buffer = b''
+
+    @property
+    def now(self) -> float:
+        """Return the time (s) on the clock of the transcript."""
+        return self._clock()
+
+    def send(self, raw: bytes) -> None:
+        """Send bytes as they are."""
+        self.transcript.append(Sent(self._clock(), raw))
+        self._line.write(raw)
+
+    def hear(self, within: float | None = None) -> Heard | None:
+        """Return the next symbol; None where none has begun after ``within`` s."""
+        begun = self._clock()
+        end = begun + (self.answer_time if within is None else within)
+        while True:
+            symbol = codec.next_symbol(self._buffer, self.check, self.is_half_duplex)
+            if symbol is not None:
+                return self._take(symbol)
+            # What has begun may end; it must not go on for ever.
+            limit = max(end, begun + _FRAME_TIME) if self._buffer else end
+            left = limit - self._clock()
+            if left <= 0:
+                return self._take(Heard(SymbolKind.NOISE, self._buffer)) if self._buffer else None
+            self._read(left)
+
+    def _read(self, timeout: float) -> None:
+        data = self._line.read(timeout)
+        self.has_heard = self.has_heard or bool(data)
+        self._buffer = (self._buffer + data)[-_MOST_UNREAD:]
+
+    def _take(self, symbol: Heard) -> Heard:
+        symbol = replace(symbol, at=self._clock())
+        self._buffer = self._buffer[len(symbol.raw):]
+        self.transcript.append(symbol)
+        return symbol
+
+    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Heard:
+        """Return the next symbol if it is of ``kind`` and good; raises Failed."""
+        expected = what or kind.value
+        symbol = self.hear(within)
+        if symbol is None:
+            raise Failed(expected, 'silence')
+        if symbol.kind is not kind or not symbol.is_good:
+            raise Failed(expected, str(symbol))
+        return symbol
+
+    def expect_silence(self, what: str, within: float | None = None) -> None:
+        """Take silence for the answer; raises Failed for anything else."""
+        symbol = self.hear(within)
+        if symbol is not None:
+            raise Failed(f'silence: {what}', str(symbol))
+
+    def until(self, is_wanted: Callable[[Heard], bool], what: str, within: float) -> Heard:
+        """Return the first symbol that ``is_wanted``, whatever comes before it."""
+        end = self._clock() + within
+        while (left := end - self._clock()) > 0:
+            symbol = self.hear(left)
+            if symbol is not None and is_wanted(symbol):
+                return symbol
+        raise Failed(what, f'nothing of the kind in {within:g} s')
+
+    def rest(self, seconds: float) -> None:
+        """Wait, and leave unread what comes."""
+        end = self._clock() + seconds
+        while (left := end - self._clock()) > 0:
+            self._read(left)
+
+    def drain(self, quiet: float = 0.2, limit: float = math.inf) -> None:
+        """Hear and drop all until nothing has come for ``quiet`` s, at most ``limit`` s."""
+        end = self._clock() + limit
+        while self._clock() < end and self.hear(quiet) is not None:
+            pass

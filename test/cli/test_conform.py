@@ -1,0 +1,113 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command ``conform``, against a simulated PLC on a pseudo-terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+from pathlib import Path
+import time
+from xml.etree import ElementTree
+
+from abdf1_ros.cli.conform import main
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.port import LinkThread
+import pytest
+from support.driver_bench import simulated_plc
+from support.ptys import Pty
+
+QUICK = ('--only', 'poll-idle', '--only', 'message-acknowledged', '--only', 'nak-resets')
+
+
+@pytest.fixture
+def port(tmp_path: Path) -> Iterator[str]:
+    """Return a pseudo-terminal with a simulated SLC 1 at its other end."""
+    plc = simulated_plc(1, 'SLC', time.monotonic, ('N7:0', 4))
+    line = PtyLine(str(tmp_path / 'plc'))
+    link = LinkThread(Machine(multidrop([plc]), checksum=Checksum.CRC), line.open)
+    link.start()
+    yield line.name
+    link.stop()
+    line.close()
+
+
+def test_result_is_told_in_lines_and_as_junit(
+        port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    junit = tmp_path / 'result.xml'
+    assert main(['slave', '--port', port, '--junit', str(junit), *QUICK]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[:2] for line in lines if line[:4] in ('PASS', 'SKIP')] == [
+        ['PASS', 'poll-idle'], ['PASS', 'message-acknowledged'], ['SKIP', 'nak-resets']]
+    assert lines[-1] == '2 passed, 0 failed, 1 skipped'
+    suite = ElementTree.parse(junit).getroot()
+    assert (suite.get('tests'), suite.get('failures'), suite.get('skipped')) == ('3', '0', '1')
+
+
+def test_failure_is_the_exit_status_and_shows_the_bytes(
+        port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ('--port', port, '--station', '2', '--answer-time', '0.05', '--only',
+               'message-acknowledged')
+    assert main(['slave', *options, '--json']) == 1
+    run = json.loads(capsys.readouterr().out)
+    case, = run['cases']
+    assert (run['target'], case['verdict'], case['got']) == ('slave', 'FAIL', 'silence')
+    assert case['transcript'][0].split(' ms ')[1].startswith('we   10 01 02 10 02 02 05 06 00')
+
+
+def test_report_is_markdown(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['slave', '--port', port, '--report', *QUICK]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith('### Conformance run\n')
+    assert '| PASS | poll-idle | KF2 4-31 |  |' in text
+
+
+def test_nobody_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    dead = Pty(tmp_path / 'dead')
+    assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
+                 'poll-idle']) == 1
+    assert 'not one byte came' in capsys.readouterr().err
+    dead.close()
+
+
+@pytest.mark.parametrize(('args', 'text'), [
+    (['slave', '--port', '/nowhere/at/all'], 'No such file'),
+    (['slave'], '--port'),
+    (['master', '--pty', '', '--station', '9'], ''),
+])
+def test_bad_options_end_with_two(args: list[str], text: str, tmp_path: Path,
+                                  capsys: pytest.CaptureFixture[str]) -> None:
+    if '' in args:
+        args[args.index('')] = str(tmp_path / 'occupied')
+        (tmp_path / 'occupied').write_text('')
+    assert main(args) == 2
+    assert text in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('args', [
+    ['slave', '--only', 'nothing'], ['slave', '--station', '255'], ['slave', '--count', '0'],
+    ['slave', '--tcp', 'nowhere'], ['peer', '--words', 'F8:0'], []])
+def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(args)
+    assert end.value.code == 2
+
+
+def test_cases_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['client', '--list']) == 0
+    assert 'silence-enquired' in capsys.readouterr().out

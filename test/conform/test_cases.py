@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every case passes against our own link, and fails against one that breaks its rule."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from abdf1_ros.conform import client, codec, data, master, peer, slave
+from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.codec import Check
+from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.wire import Wire
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.settings.network import Network
+import pytest
+from support.driver_bench import Recorder, simulated_plc
+from support.mappings import make_mapping
+from support.scripted_line import ScriptedLine
+
+ALL = frozenset(Permission)
+CHECKS = ['BCC', 'CRC']
+MODULES = (client, data, master, peer, slave)
+
+
+class SpoiledLine(ScriptedLine):
+    """A line on which what the machine sends is changed on its way to the script."""
+
+    spoil: Callable[[bytes], bytes] = bytes
+
+    def read(self, timeout: float) -> bytes:
+        """Return what is left of what has come."""
+        return self.spoil(super().read(timeout))
+
+
+def answering(family: str, check: str, is_half_duplex: bool) -> SpoiledLine:
+    """Return a line with a simulated PLC 1 at its end."""
+    plc = simulated_plc(1, family, lambda: 0.0, ('N7:0', 20), checksum=check)
+    if is_half_duplex:
+        return SpoiledLine(Machine(multidrop([plc]), checksum=Checksum[check]))
+
+    def run(machine: Machine) -> Procedure:
+        return FullDuplexPeer(machine, PeerSettings(Checksum[check]), ActiveStationList(),
+                              plc.serve).run(plc)
+
+    plc.be_full_duplex()
+    return SpoiledLine(Machine(run, checksum=Checksum[check], duplex=Duplex.FULL))
+
+
+def asking(check: str, mode: str) -> SpoiledLine:
+    """Return a line with a driver at its end that reads station 1 all the time."""
+    network = Network(mode=mode, error_code=check, baud=115200, timeout=300, cmd_timeout=2000,
+                      station=5)
+    listener = Recorder(lambda: 0.0)
+    driver = Driver(network, [make_mapping('N7:0', length=2, period=0)],
+                    DriverSettings(processor_period=0), listener)
+    return SpoiledLine(driver.machine)
+
+
+def results_of(line: ScriptedLine, target: Target, check: str, family: str = 'SLC',
+               only: str = '') -> list[CaseResult]:
+    """Return how the cases of ``target`` end."""
+    wire = Wire(line, Check(check), line.clock, is_half_duplex=target.is_half_duplex,
+                answer_time=1.0)
+    words = Words(7, 2, 3, family)
+    plc = simulated_plc(1, 'PLC5', line.clock, ('N7:0', 20), checksum=check)
+
+    def serve(command: bytes) -> bytes:
+        return plc.serve(Packet.decode(command)).encode()
+
+    ends: dict[Target, Callable[[], Any]] = {
+        Target.SLAVE: lambda: MasterEnd(wire, 1, 5, numbering, words),
+        Target.PEER: lambda: PeerEnd(wire, 1, 5, numbering, words),
+        Target.MASTER: lambda: SlaveEnd(wire, 1, serve),
+        Target.CLIENT: lambda: ServerEnd(wire, serve)}
+    numbering = Numbering(0x0FF0)
+    cases = [case for case in CASES if target in case.targets and only in ('', case.name)]
+    return list(run_cases(cases, wire, ends[target], ALL))
+
+
+def failures(results: list[CaseResult]) -> list[str]:
+    """Return the cases that failed, with the reason."""
+    return [f'{result.case.name}: expected {result.expected}, got {result.got}'
+            for result in results if result.verdict is Verdict.FAIL]
+
+
+@pytest.mark.parametrize('check', CHECKS)
+@pytest.mark.parametrize('family', ['SLC', 'PLC5'])
+@pytest.mark.parametrize('target', [Target.SLAVE, Target.PEER])
+def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None:
+    results = results_of(answering(family, check, target.is_half_duplex), target, check, family)
+    assert failures(results) == []
+    skipped = {result.case.name for result in results if result.verdict is Verdict.SKIP}
+    assert skipped <= {'poll-stuffing', 'crc-covers-station', 'address-forms'}
+
+
+@pytest.mark.parametrize('check', CHECKS)
+@pytest.mark.parametrize(('target', 'mode'), [(Target.MASTER, 'Master'), (Target.CLIENT, 'Peer')])
+def test_driver_conforms(target: Target, mode: str, check: str) -> None:
+    results = results_of(asking(check, mode), target, check)
+    assert failures(results) == []
+    assert {result.verdict for result in results} == {Verdict.PASS}
+
+
+def _nothing(raw: bytes) -> bytes:
+    return b''
+
+
+def _replaced(old: bytes, new: bytes) -> Callable[[bytes], bytes]:
+    return lambda raw: raw.replace(old, new)
+
+
+def _flipped(raw: bytes) -> bytes:
+    """Return messages with a wrong check, and all else as it is."""
+    return codec.damaged(raw) if b'\x10\x02' in raw else raw
+
+
+@pytest.mark.parametrize(('target', 'name', 'spoil', 'expected'), [
+    (Target.SLAVE, 'message-acknowledged', _nothing, 'DLE ACK'),
+    (Target.SLAVE, 'message-acknowledged', _replaced(codec.ACK, codec.NAK), 'DLE ACK'),
+    (Target.SLAVE, 'poll-idle', _replaced(codec.EOT, codec.ACK), 'DLE EOT'),
+    (Target.SLAVE, 'reply-waits-for-poll', _flipped, 'a message or DLE EOT'),
+    (Target.PEER, 'bad-check-refused', _nothing, 'DLE NAK'),
+    (Target.PEER, 'bad-check-refused', _replaced(codec.NAK, codec.ACK), 'DLE NAK'),
+    (Target.PEER, 'enquiry-after-ack', _replaced(codec.ACK, codec.NAK), 'DLE ACK'),
+    (Target.PEER, 'stuffing', _flipped, 'the reply'),
+])
+def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[bytes], bytes],
+                                    expected: str) -> None:
+    line = answering('SLC', 'CRC', target.is_half_duplex)
+    line.spoil = spoil
+    result, = results_of(line, target, 'CRC', only=name)
+    assert result.verdict is Verdict.FAIL
+    assert expected in result.expected
+    assert result.transcript
+
+
+@pytest.mark.parametrize('name', ['read-words', 'write-and-read'])
+def test_other_family_refuses(name: str) -> None:
+    """A PLC-5 does not know the commands of an SLC, and says so."""
+    line = answering('PLC5', 'CRC', is_half_duplex=True)
+    result, = results_of(line, Target.SLAVE, 'CRC', 'SLC', only=name)
+    assert (result.verdict, result.expected, result.got) == (Verdict.FAIL, 'STS 00', 'STS 10')
+
+
+def test_case_that_needs_leave_is_skipped() -> None:
+    line = answering('SLC', 'CRC', is_half_duplex=True)
+    wire = Wire(line, Check.CRC, line.clock, is_half_duplex=True)
+    case = next(case for case in CASES if case.name == 'nak-resets')
+    result, = run_cases([case], wire, lambda: MasterEnd(wire, 1, 5, Numbering(1)),
+                        frozenset((Permission.NOTHING,)))
+    assert (result.verdict, result.got[:11]) == (Verdict.SKIP, 'needs --yes')
+
+
+def test_every_case_cites_its_source() -> None:
+    assert len(CASES) > 50 and MODULES
+    assert all(case.source.startswith(('M ', 'KF2 ')) for case in CASES)
