@@ -58,10 +58,10 @@ def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     assert 'error' not in out.replace('no errors', '')
     assert 'Mode Master, 9600 baud' in out
     cells = next(line.split() for line in out.splitlines() if line.endswith('speed'))
-    # 53 characters of 10 bits at 9600 baud, and two answers of 10 ms.
-    assert cells == ['1', 'PLC5', 'N7:0', 'N7:1', '2', '4', '1', '55.2', '75.2', '1000.0', 'speed']
-    assert 'expected scan time: 75.2 ms' in out
-    assert 'load of the line: 8%' in out
+    # 52 characters of 10 bits at 9600 baud, and two answers of 10 ms.
+    assert cells == ['1', 'PLC5', 'N7:0', 'N7:1', '2', '4', '1', '54.2', '74.2', '1000.0', 'speed']
+    assert 'expected scan time: 74.2 ms' in out
+    assert 'load of the line: 7%' in out
     assert out.endswith('no errors, no warnings\n')
 
 
@@ -126,13 +126,13 @@ def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
     assert content['blocks'][1]['last'] == 'F8:0'
     assert content['blocks'][0] == {
         'station': 1, 'plc_type': 'PLC5', 'first': 'N7:0', 'last': 'N7:1', 'words': 2,
-        'bytes': 4, 'packets': 1, 'line_ms': 55.208, 'total_ms': 95.208, 'period_ms': 1000.0,
+        'bytes': 4, 'packets': 1, 'line_ms': 54.167, 'total_ms': 94.167, 'period_ms': 1000.0,
         'tags': ['speed']}
     assert content['network']['baud'] == 9600
     assert {warning['kind'] for warning in content['warnings']} == {'station', 'load', 'period'}
     # One float of an SLC is 4 bytes as two words are: 45 characters, and 40 ms.
-    assert content['scan_time_ms'] == pytest.approx(95.208 + 86.875, abs=0.01)
-    assert content['load'] == pytest.approx(0.0952 + 1.7375, abs=0.001)
+    assert content['scan_time_ms'] == pytest.approx(94.167 + 86.875, abs=0.01)
+    assert content['load'] == pytest.approx(0.0942 + 1.7375, abs=0.001)
     assert content['needed_baud'] == 115200
 
 
