@@ -45,7 +45,7 @@ setup(
     zip_safe=False,
     install_requires=['setuptools', 'pyserial'],
     # Not tests_require: newer setuptools ignores it, and colcon test would then run no pytest.
-    extras_require={'test': ['hypothesis', 'pytest']},
+    extras_require={'test': ['hypothesis', 'pytest', 'pytest-timeout']},
     entry_points={
         'console_scripts': [
             f'node = {PACKAGE}.cli.main:node',

@@ -19,7 +19,6 @@ from __future__ import annotations
 from abdf1_ros.text import printable
 from hypothesis import given, strategies
 import pytest
-from support.properties import PROPERTY
 
 
 @pytest.mark.parametrize('text', ['', 'N7:0', 'Größe 5 °C', 'скорость', '速度', 'a "b" \\n'])
@@ -42,7 +41,6 @@ def test_what_cannot_be_seen_is_escaped(text: str, shown: str) -> None:
     assert printable(text) == shown
 
 
-@PROPERTY
 @given(strategies.text())
 def test_any_text_is_one_visible_line(text: str) -> None:
     shown = printable(text)

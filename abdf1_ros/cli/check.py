@@ -38,7 +38,7 @@ from abdf1_ros.plan.planner import Block
 from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.settings.network import FIELDS, load_network, Network
 from abdf1_ros.text import printable
 
 EXIT_FAULTY = 2
@@ -202,7 +202,8 @@ def _json(found: Findings, report: Report | None) -> str:
         'scan_time_ms': None, 'load': None, 'needed_baud': None, 'response_time_ms': None}
     if report is not None:
         content |= {
-            'network': asdict(report.network), 'warnings': [*map(_remark, report.remarks())],
+            'network': {name: getattr(report.network, name) for name in FIELDS},
+            'warnings': [*map(_remark, report.remarks())],
             'blocks': [_entry(report, block) for block in report.blocks],
             'scan_time_ms': _ms(report.scan_time), 'load': round(report.load, 4),
             'needed_baud': report.needed_baud(),

@@ -301,8 +301,8 @@ class FrameDecoder:
 
     def _link_data(self) -> Result:
         end = self._buffer.find(DLE)
-        if end and not self._take_data(len(self._buffer) if end < 0 else end):
-            return self._frame(Fault.TOO_LONG)
+        if end:
+            self._take_data(len(self._buffer) if end < 0 else end)
         if len(self._buffer) < 2:
             return MORE
         pair = bytes(self._buffer[:2])
@@ -312,18 +312,17 @@ class FrameDecoder:
             return self._check()
         if pair == _DATA_DLE:
             del self._buffer[:1]
-            return None if self._take_data(1) else self._frame(Fault.TOO_LONG)
+            self._take_data(1)
+            return None
         if pair in (ACK, NAK) and not self._is_half_duplex:
             del self._buffer[:2]
             return _CONTROLS[pair]  # an embedded response (M 4-3)
         return self._frame(Fault.NO_ETX)  # the pair that broke in is read again as a symbol
 
-    def _take_data(self, count: int) -> bool:
-        """Take bytes of a message; return whether it is none too long."""
-        count = min(count, MAX_LINK_DATA + 1 - len(self._data))
-        self._data += self._buffer[:count]
+    def _take_data(self, count: int) -> None:
+        """Take bytes of a message; those that are too many are dropped, up to its end (M 4-8)."""
+        self._data += self._buffer[:min(count, MAX_LINK_DATA + 1 - len(self._data))]
         del self._buffer[:count]
-        return len(self._data) <= MAX_LINK_DATA
 
     def _check(self) -> Result:
         size = self._checksum.size
@@ -331,6 +330,8 @@ class FrameDecoder:
             return MORE
         received = int.from_bytes(self._buffer[:size], 'little')
         del self._buffer[:size]
+        if len(self._data) > MAX_LINK_DATA:
+            return self._frame(Fault.TOO_LONG)
         expected = self._checksum.of_message(self._data, self._station)
         if received != expected:
             return self._frame(Fault.BAD_CHECK, received, expected)

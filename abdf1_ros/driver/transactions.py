@@ -23,9 +23,11 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.fields import word
-from abdf1_ros.pccc.identity import decode_identity, Identity
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.plc5 import identity as plc5
 from abdf1_ros.pccc.status import check_status, is_local, STS_ILLEGAL_COMMAND
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -132,8 +134,20 @@ def read_values(mapping: Mapping, block: Block) -> Generator[Request, Packet, Va
 
 
 def identify() -> Generator[Request, Packet, Identity]:
-    """Ask who is there; raises RemoteError, or FormatError for a reply too short to tell."""
-    return decode_identity(check_status((yield diagnostics.CMD, diagnostics.STATUS_REQUEST)))
+    """
+    Ask who is there, and a PLC-5 with a fault which one.
+
+    Raises LinkError, RemoteError, or FormatError for a reply too short to tell.
+    """
+    reply = yield diagnostics.CMD, diagnostics.STATUS_REQUEST
+    identity = decode_identity(check_status(reply))
+    request = plc5.fault_request(identity)
+    if request is None:
+        return identity
+    try:
+        return plc5.with_fault(identity, check_status((yield request)))
+    except (RemoteError, FormatError):
+        return identity  # one without typed commands: who it is counts more
 
 
 def echo(data: bytes) -> Generator[Request, Packet, None]:

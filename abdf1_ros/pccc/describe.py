@@ -25,8 +25,8 @@ from typing import Any
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import diagnostics, notation
+from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.identity import decode_identity
 from abdf1_ros.pccc.notation import count_of, hexadecimal, part_of, words_text
 from abdf1_ros.pccc.plc2 import commands as plc2
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress

@@ -27,7 +27,8 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.diagnostics import ReadCounters
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import HALF_DUPLEX_PORT, Identity
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.slc.identity import HALF_DUPLEX_PORT, is_micrologix_1000
 
 _MODEM_LINES = 'modem lines'
 _LINES = ('CTS', 'RTS', 'DSR', 'DCD', 'DTR')
@@ -68,10 +69,6 @@ class Layout(Enum):
         return 2 * len(self.value)
 
 
-# What to ask a module for, whose counters are single bytes in an order of its own (M 9-10).
-_MODULE_SIZE = 55
-
-
 def layout_of(identity: Identity | None) -> Layout | None:
     """Return the layout of a processor that has identified itself, None for an unknown one."""
     if identity is None:
@@ -80,7 +77,7 @@ def layout_of(identity: Identity | None) -> Layout | None:
         return Layout.PLC5
     if identity.family != 'SLC':
         return None
-    if identity.is_micrologix_1000:
+    if is_micrologix_1000(identity):
         return Layout.MICROLOGIX_1000
     is_half_duplex = identity.interface == HALF_DUPLEX_PORT
     return Layout.SLC_SLAVE if is_half_duplex else Layout.SLC_FULL_DUPLEX
@@ -91,7 +88,8 @@ def counter_request(identity: Identity | None) -> ReadCounters:
     layout = layout_of(identity)
     if layout is not None:
         return ReadCounters(0, layout.size)
-    return ReadCounters(identity.counter_address if identity else 0, _MODULE_SIZE)
+    known = identity or Identity('', '')
+    return ReadCounters(known.counter_address, known.counter_size)
 
 
 def decode_counters(data: bytes, layout: Layout | None) -> dict[str, str]:

@@ -34,6 +34,7 @@ from abdf1_ros.plan.line_model import Request
 from abdf1_ros.plan.planner import Block, Place, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.remarks import network_remarks
 
 _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the scan time
@@ -44,6 +45,7 @@ class Kind(Enum):
     """What a remark is about; the value is what programs see."""
 
     MAP = 'map'
+    SETTING = 'setting'
     STATION = 'station'
     PERIOD = 'period'
     LOAD = 'load'
@@ -95,9 +97,11 @@ class Report:
 
     def remarks(self) -> list[Remark]:
         """Return all that is odd."""
+        found = [*setting_remarks(self.network, self.mappings)]
         if not self.mappings:
-            return [Remark(Kind.MAP, 'the map has no usable row: nothing is read or written')]
-        return [*_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
+            text = 'the map has no usable row: nothing is read or written'
+            return [*found, Remark(Kind.MAP, text)]
+        return [*found, *_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
                 *_gap_remarks(self)]
 
 
@@ -108,6 +112,15 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
     planner = Planner(forecast.line_model(network), default_period)
     blocks = sorted(planner.plan(mappings), key=_row_order)
     return Report(network, mappings, tuple(blocks), default_period, response_time)
+
+
+def setting_remarks(network: Network, mappings: Iterable[Mapping]) -> Iterator[Remark]:
+    """Find what is valid and still odd in both files."""
+    for text in network_remarks(network):
+        yield Remark(Kind.SETTING, text)
+    for mapping in mappings:
+        for text in mapping.remarks:
+            yield Remark(Kind.SETTING, text, mapping.station)
 
 
 def _row_order(block: Block) -> tuple[int, int]:

@@ -42,6 +42,7 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch
@@ -112,6 +113,7 @@ _QUIET = 0.05
 _LAST_WRITES = 0.5
 
 _MOST_NAMES = 5  # in a line of the log
+_MOST_REMARKS = 20  # about both files, in the log
 
 # What rclpy's errors about the directory of the logs begin with.
 _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
@@ -142,6 +144,7 @@ class BridgeNode(Node):
         self.get_logger().info(str(configuration))
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
+        self._tell_remarks(configuration)
         if not configuration.mappings:
             self.get_logger().warning('the map has no usable row: nothing is read or written')
         if configuration.ignored:
@@ -191,6 +194,14 @@ class BridgeNode(Node):
         self._link_counters = LinkCounterService(self.driver, self.link)
         self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
                             callback_group=MutuallyExclusiveCallbackGroup())
+
+    def _tell_remarks(self, configuration: Configuration) -> None:
+        remarks = [*setting_remarks(configuration.network, configuration.mappings)]
+        for remark in remarks[:_MOST_REMARKS]:
+            self.get_logger().warning(printable(remark.text))
+        if len(remarks) > _MOST_REMARKS:
+            self.get_logger().warning(
+                f'and {len(remarks) - _MOST_REMARKS} more remarks; "check" has them all')
 
     def start(self) -> None:
         """Open the port and begin to read."""

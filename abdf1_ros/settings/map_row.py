@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 import math
 from typing import TypeVar
@@ -34,6 +34,7 @@ from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row, shown
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
+from abdf1_ros.settings.remarks import row_remarks
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.structures import type_fault, write_fault
 from abdf1_ros.settings.values import types_of, ValueType, WordOrder
@@ -118,7 +119,10 @@ class RowReader:
             station, plc_type, length, value_type or _natural_type(address), topic,
             period, publish, minimum, maximum, word_order, scaling, access, processor)
         self._check(mapping)
-        return None if self.faults else mapping
+        if self.faults:
+            return None
+        remarks = tuple(row_remarks(self._row, mapping))
+        return replace(mapping, remarks=remarks) if remarks else mapping
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:

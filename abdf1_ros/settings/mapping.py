@@ -55,6 +55,7 @@ class Mapping:
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values.
+    ``remarks`` say what is odd about the row.
     """
 
     item: int
@@ -76,6 +77,7 @@ class Mapping:
     scaling: Scaling | None = None
     access: Access | None = None
     processor: Processor | None = None
+    remarks: tuple[str, ...] = field(default=(), compare=False)
     # What turns words into raw values and back, and what is said to the PLC: made once, they
     # are needed at every read.
     codec: Codec = field(init=False, repr=False, compare=False)
@@ -94,6 +96,11 @@ class Mapping:
     def message_type(self) -> ValueType:
         """Return the type of the values on the topic."""
         return self.type if self.scaling is None else ValueType.FLOAT32
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Return the least and the greatest value that its type can hold, in the topic's unit."""
+        return self.type.range if self.scaling is None else self.scaling.limits(self.type)
 
     @property
     def serves(self) -> bool:

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 import re
 from types import MappingProxyType
 from typing import Any
@@ -30,6 +30,7 @@ from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.settings.csv_table import read_rows, shown
+from abdf1_ros.settings.station_lists import octal_remarks
 
 MODES = ('Master', 'Slave', 'Peer')
 SUPPORTED_MODES = MODES
@@ -152,6 +153,8 @@ class Network:
         'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
     polling: str = _net(
         'Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
+    # What is odd about how the file says it.
+    remarks: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def checksum(self) -> Checksum:
@@ -178,7 +181,8 @@ class Network:
 
 
 FIELDS: dict[str, NetField] = {
-    entry.name: entry.metadata['net'] for entry in fields(Network)}
+    entry.name: entry.metadata['net'] for entry in fields(Network)
+    if 'net' in entry.metadata}
 
 
 def load_network(path: str) -> Network:
@@ -195,7 +199,7 @@ def load_network(path: str) -> Network:
     row = rows[0]
     cells = {name: (row.get(entry.column), row.where(entry.column))
              for name, entry in FIELDS.items() if row.get(entry.column)}
-    return make_network(cells)
+    return replace(make_network(cells), remarks=tuple(octal_remarks(row)))
 
 
 def make_network(values: MappingType[str, tuple[str, Place | str]],

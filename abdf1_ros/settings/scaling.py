@@ -65,7 +65,7 @@ class Scaling:
         """
         if kind in (ValueType.BOOL, ValueType.STRING):
             return f'Scale and Offset are for numbers, not for {kind.value}'
-        widest = max(map(abs, self._ends(kind)))
+        widest = max(map(abs, self.limits(kind)))
         if kind is not ValueType.FLOAT32 and widest > FLOAT_MAX:
             return f'a float32 cannot hold {self._range(kind)}'
         # So the float32 is at most a quarter of a raw step off, the next raw value half of one.
@@ -74,11 +74,13 @@ class Scaling:
                     f'{self._range(kind)}')
         return None
 
-    def _ends(self, kind: ValueType) -> list[float]:
-        return sorted(end * self.scale + self.offset for end in kind.range)
+    def limits(self, kind: ValueType) -> tuple[float, float]:
+        """Return the least and the greatest engineering value that raw values can stand for."""
+        low, high = sorted(end * self.scale + self.offset for end in kind.range)
+        return low, high
 
     def _range(self, kind: ValueType) -> str:
-        low, high = self._ends(kind)
+        low, high = self.limits(kind)
         return (f'{low:.10g} to {high:.10g}, the range of {kind.value} with '
                 f'Scale {self.scale:.10g}, Offset {self.offset:.10g}')
 

@@ -16,8 +16,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+import re
+
 from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.settings.csv_table import Row
+
+_LEADING_ZERO = re.compile(r'0[0-7]+')
 
 
 def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
@@ -33,3 +40,12 @@ def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
         else:
             stations += range(low, high + 1)
     return tuple(dict.fromkeys(stations)), faults
+
+
+def octal_remarks(row: Row) -> Iterator[str]:
+    """Yield that a Station with a leading zero is decimal here; panels of a PLC-5 show octal."""
+    text = row.get('Station')
+    if _LEADING_ZERO.fullmatch(text) and int(text, 8) != int(text):
+        yield str(Problem(row.where('Station'), (
+            f'Station = "{text}" is {int(text)}, decimal; an octal {text} would be '
+            f'{int(text, 8)}')))

@@ -28,9 +28,9 @@ from abdf1_ros.paths import config_file
 import pytest
 from support.ros import write_csv
 
-NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout'
+NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout,Timeout'
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
-GOOD_NET = '5,Master,9600,500'
+GOOD_NET = '5,Master,9600,500,300'
 GOOD_ROW = 'speed,Read,N7:0,1,PLC5,2,1000'
 BAD_ROWS = ('a,Read,N7,1,PLC5,,', 'b,Rad,N7:1,256,PLC5,,', 'c,Serve,N7:0,6,PLC5,,',
             'a,Read,N7:9999,1,PLC5,,')
@@ -151,6 +151,20 @@ def test_default_period(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
     assert parsed(capsys)['blocks'][0]['period_ms'] == 100
     check(files, GOOD_NET, (row,), '--json', '--default-period', '2000')
     assert parsed(capsys)['blocks'][0]['period_ms'] == 2000
+
+
+def test_odd_settings_are_warnings_with_their_places(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    row = 'N7:0,Write,I:1.0,017,SLC,1,'
+    assert check(files, '5,Master,9600,500,600', (row,)) == 0
+    warnings = [line for line in capsys.readouterr().out.splitlines() if 'warning: ' in line]
+    assert [warning.removeprefix('warning: ') for warning in warnings] == [
+        'Timeout 600 ms is not shorter than Cmd_Timeout 500 ms: after one lost frame there is no '
+        'time to repeat it',
+        f'{files[1]}:2:4 (Station): Station = "017" is 17, decimal; an octal 017 would be 15',
+        f'{files[1]}:2:1 (Tag): Tag "N7:0" becomes the topic N7_0',
+        f'{files[1]}:2:2 (Command): I:1.0 is an input: the PLC overwrites what is written there '
+        'with its next scan']
 
 
 def test_missing_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

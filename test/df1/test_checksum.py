@@ -20,7 +20,6 @@ from abdf1_ros.df1.checksum import bcc, Checksum, crc16
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import MESSAGES, Vector
 
 
@@ -81,19 +80,16 @@ def test_crc_goes_on_the_line_low_byte_first() -> None:
     assert (Checksum.CRC.size, Checksum.BCC.size) == (2, 1)
 
 
-@PROPERTY
 @given(st.binary(max_size=64), st.binary(max_size=64))
 def test_crc_can_be_continued(first: bytes, second: bytes) -> None:
     assert crc16(second, crc16(first)) == crc16(first + second)
 
 
-@PROPERTY
 @given(st.binary(max_size=300), st.integers(0, 255))
 def test_sum_of_covered_bytes_and_bcc_is_zero(data: bytes, station: int) -> None:
     assert (station + sum(data) + bcc(data, station)) % 256 == 0
 
 
-@PROPERTY
 @given(st.binary(min_size=1, max_size=261), st.integers(0), st.integers(1, 0xFFFF))
 def test_crc_sees_every_error_burst_of_up_to_16_bits(data: bytes, place: int, burst: int) -> None:
     at = place % (8 * len(data))

@@ -41,7 +41,6 @@ from abdf1_ros.df1.frames import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import CAPTURED, Captured, MESSAGES, Vector, vector, VECTORS
 
 HALF, FULL, CRC, BCC = Duplex.HALF, Duplex.FULL, Checksum.CRC, Checksum.BCC
@@ -256,11 +255,15 @@ def test_longest_message(fill: int) -> None:
 
 
 @pytest.mark.parametrize('fill', [0x10, 0x55])
+@pytest.mark.parametrize('size', [262, 263, 1000])
+@pytest.mark.parametrize('checksum', Checksum)
 @pytest.mark.parametrize('chunk', [None, 1])
-def test_message_longer_than_the_longest(fill: int, chunk: int | None) -> None:
-    first, *rest = decode(message_frame(bytes((fill,)) * 262, CRC), chunk=chunk)
-    assert first == Frame(bytes((fill,)) * 262, None, Fault.TOO_LONG)
-    assert not any(isinstance(symbol, Frame) for symbol in rest)
+def test_message_longer_than_the_longest_is_one_up_to_its_end(
+        fill: int, size: int, checksum: Checksum, chunk: int | None) -> None:
+    good = message_frame(DATA, checksum)
+    line = message_frame(bytes((fill,)) * size, checksum) + good
+    assert decode(line, checksum, chunk=chunk) == [
+        Frame(bytes((fill,)) * 262, None, Fault.TOO_LONG), *decode(good, checksum)]
 
 
 def test_largest_reply_of_any_command_fits() -> None:
@@ -268,9 +271,10 @@ def test_largest_reply_of_any_command_fits() -> None:
 
 
 @pytest.mark.parametrize('chunk', [None, 1, 100])
-def test_message_without_end_is_cut_at_the_same_byte_in_any_chunks(chunk: int | None) -> None:
-    assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == [
-        Frame(bytes(262), None, Fault.TOO_LONG)]
+def test_message_without_end_is_told_with_what_breaks_it_off(chunk: int | None) -> None:
+    assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == []
+    assert decode(b'\x10\x02' + bytes(1000) + EOT, chunk=chunk) == [
+        Frame(bytes(262), None, Fault.NO_ETX), Control(Code.EOT)]
 
 
 @pytest.mark.parametrize('duplex', Duplex)
@@ -311,7 +315,6 @@ def test_in_message_from_stx_to_the_last_check_byte() -> None:
     assert len(symbols) == 1
 
 
-@PROPERTY
 @given(st.binary(max_size=MAX_LINK_DATA), st.sampled_from(Checksum), st.sampled_from(Duplex))
 def test_stuffing_round_trip(data: bytes, checksum: Checksum, duplex: Duplex) -> None:
     check = checksum.of_message(data)
@@ -320,7 +323,6 @@ def test_stuffing_round_trip(data: bytes, checksum: Checksum, duplex: Duplex) ->
     assert stuff(data).count(b'\x10') == 2 * data.count(b'\x10')
 
 
-@PROPERTY
 @given(st.binary(min_size=6, max_size=100), st.integers(0, 255), st.sampled_from(Checksum))
 def test_master_frame_round_trip(data: bytes, station: int, checksum: Checksum) -> None:
     check = checksum.of_message(data, station)
@@ -328,7 +330,6 @@ def test_master_frame_round_trip(data: bytes, station: int, checksum: Checksum) 
         Frame(data, station, None, check, check)]
 
 
-@PROPERTY
 @given(line_bytes, st.sampled_from(Checksum), st.sampled_from(Duplex), st.data())
 def test_any_chunking_gives_the_same_symbols(data: bytes, checksum: Checksum, duplex: Duplex,
                                              draw: st.DataObject) -> None:
@@ -344,7 +345,6 @@ def test_any_chunking_gives_the_same_symbols(data: bytes, checksum: Checksum, du
     assert symbols == decode(data or b'\x00', checksum, duplex, 1)
 
 
-@PROPERTY
 @given(decoders, st.lists(st.one_of(line_bytes, st.binary(max_size=400)), max_size=10))
 def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: list[bytes]) -> None:
     for part in parts:
@@ -366,7 +366,6 @@ def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
     assert drain(decoder) == [Control(Code.EOT)]
 
 
-@PROPERTY
 @given(decoders, line_bytes)
 def test_frame_is_read_behind_any_garbage_after_a_reset(decoder: FrameDecoder,
                                                         garbage: bytes) -> None:

@@ -24,7 +24,6 @@ from abdf1_ros.errors import FormatError
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import MESSAGES, Vector
 
 COMMAND = Packet(dst=17, src=5, cmd=0x0F, sts=0, tns=0x0102, data=b'\xA2')
@@ -47,7 +46,6 @@ def test_tns_stands_low_byte_first() -> None:
     assert COMMAND.encode() == bytes.fromhex('11 05 0F 00 02 01 A2')
 
 
-@PROPERTY
 @given(st.binary(min_size=HEADER_SIZE, max_size=300))
 def test_decode_and_encode_are_inverse(link_data: bytes) -> None:
     assert Packet.decode(link_data).encode() == link_data

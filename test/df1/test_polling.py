@@ -28,7 +28,6 @@ from hypothesis import given, strategies
 import pytest
 from support.multidrop import MasterBench
 from support.peers import Errand
-from support.properties import PROPERTY
 
 SETTINGS = MasterSettings(
     station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
@@ -533,7 +532,6 @@ def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> No
     assert [reply.sts for reply in rig[1].heard] == [2]
 
 
-@PROPERTY
 @given(strategies.lists(strategies.integers(11, 22), max_size=20),
        strategies.frozensets(strategies.integers(11, 22), max_size=6),
        strategies.integers(0, 5), strategies.booleans(), strategies.booleans())

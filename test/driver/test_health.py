@@ -132,7 +132,8 @@ def test_program_mode_and_fault_are_seen(network: Network) -> None:
     bench.run(PERIOD)
     identity = bench.driver.health.known(1).identity
     assert identity is not None
-    assert identity.faults == ('major error 0x0020, processor halted',)
+    assert identity.faults == (
+        'major error 0x0020 (minor error at the end of a scan), processor halted',)
     assert bench.listener.changes == []
 
 

@@ -29,7 +29,6 @@ from hypothesis import strategies as st
 import pytest
 from support.driver_bench import simulated_plc, stored
 from support.mappings import make_mapping
-from support.properties import PROPERTY
 
 
 def point(publish: str = 'Always', **cells: str) -> ReadPoint:
@@ -249,7 +248,6 @@ def test_string_is_written_whole() -> None:
     assert not any(stored(machine, 'ST9:0', 42))
 
 
-@PROPERTY
 @given(st.sampled_from((PlcType.PLC5, PlcType.SLC)), st.integers(0, 15), st.integers(1, 40),
        st.data())
 def test_bit_writes_touch_only_their_bits(
@@ -329,7 +327,6 @@ def test_nearest_raw_values_are_written(
     assert [data.hex(' ') for _, data in write.commands] == [command]
 
 
-@PROPERTY
 @given(st.sampled_from(['int16', 'uint16']), st.integers(0, 65535),
        st.floats(0.001, 1000.0) | st.floats(-1000.0, -0.001), st.floats(-1000.0, 1000.0))
 def test_word_comes_back_from_the_value_that_was_published(

@@ -35,7 +35,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 from support.mappings import make_mapping
-from support.properties import PROPERTY
 
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.0001))
 
@@ -186,7 +185,7 @@ def test_reads_without_a_period_have_their_turn_on_a_full_line() -> None:
     assert fmean(means[1000]) < 1000 * 1.6
 
 
-@settings(PROPERTY, max_examples=20)
+@settings(max_examples=20)
 @given(st.dictionaries(st.sampled_from([0, 50, 100, 200, 500, 1000, 2000, 5000]),
                        st.integers(1, 25), min_size=1, max_size=3))
 def test_forecast_is_what_comes(periods: dict[int, int]) -> None:

@@ -33,7 +33,6 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
 from support.mappings import make_mapping
-from support.properties import PROPERTY
 
 PROBE_TIME = 0.5
 
@@ -645,4 +644,4 @@ class AnyOrder(RuleBasedStateMachine):
 
 
 TestAnyOrder = AnyOrder.TestCase
-TestAnyOrder.settings = settings(PROPERTY, max_examples=60, stateful_step_count=40)
+TestAnyOrder.settings = settings(max_examples=60, stateful_step_count=40)

@@ -32,7 +32,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.mappings import load_rows, make_mapping
-from support.properties import PROPERTY
 from support.vectors import commands
 
 STATION = 5
@@ -409,7 +408,6 @@ def test_any_command_is_answered(plc: str) -> None:
 
 @given(cmd=st.sampled_from((0x0F, 0x06, 0x2F, 0x01)), data=st.binary(max_size=60),
        plc=st.sampled_from(FAMILIES))
-@PROPERTY
 def test_any_bytes_are_answered(cmd: int, data: bytes, plc: str) -> None:
     bench = Bench(plc, row('N7:0', plc, 20))
     sts, _ = bench.ask(cmd, data)

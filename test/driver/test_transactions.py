@@ -31,6 +31,7 @@ from abdf1_ros.driver.transactions import (
 )
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.network import Network
@@ -203,6 +204,22 @@ def test_identify() -> None:
     requests, identity = converse(identify(), [reply(STATUS)])
     assert requests == [(0x06, b'\x03')]
     assert str(identity).startswith('SLC 5/03')
+
+
+FAULTED_PLC5 = bytes((0x0A, 0xEB, 0x15)).ljust(36, b'\0')
+FAULT_WORDS = (0x0F, bytes.fromhex('68 00 00 02 00 06 02 0B 02 00'))
+
+
+@pytest.mark.parametrize(('answer', 'fault'), [
+    (reply(bytes.fromhex('95 09 42 00 01 58 00')),
+     'major processor fault: watchdog; fault code 88 (S:12)'),
+    (reply(b'\x06', 0xF0), 'major processor fault (word S:11 says which)'),
+    (reply(b'\0'), 'major processor fault (word S:11 says which)')])
+def test_plc5_with_a_fault_is_asked_which(answer: Packet, fault: str) -> None:
+    requests, identity = converse(identify(), [reply(FAULTED_PLC5), answer])
+    assert requests == [(0x06, b'\x03'), FAULT_WORDS]
+    assert isinstance(identity, Identity)
+    assert identity.faults == (fault,)
 
 
 def test_echo() -> None:

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
-import signal
 import struct
 
 from abdf1_ros.df1 import frames
@@ -143,7 +142,7 @@ def test_plc_loses_power_in_the_middle_of_a_write(
 
         def cut(data: bytes) -> bytes:
             if sent:  # the poll for the reply, so the command was acknowledged
-                rig.simulator.send(signal.SIGKILL)
+                rig.kill_simulator()
             elif command in data:
                 sent.append(data)
             return b''
@@ -162,7 +161,7 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
         data = rig.files.simulator.read_text()
         write_csv(rig.files.simulator, SIMULATOR_HEADER, [
             '1,SLC,N7:0,64,5,,', '1,SLC,F8:0,8,5,,', '2,PLC5,N7:0,64,5,,', '2,PLC5,F8:0,8,5,,'])
-        rig.simulator.send(signal.SIGKILL)
+        rig.kill_simulator()
         rig.simulator.result()
         rig.diagnostics.clear()
         rig.simulator = Process('simulator', '--pty', str(rig.files.port), '--data',
@@ -176,7 +175,7 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
         rig.status('link', OK)  # both answer
         rig.status('mappings', ERROR, '25 failed')
         rig.files.simulator.write_text(data)
-        rig.simulator.send(signal.SIGKILL)
+        rig.kill_simulator()
         rig.restart_simulator()
         rig.recovers(10.0)
         assert rig.has_read_only(SETPOINT)

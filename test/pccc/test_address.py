@@ -24,7 +24,6 @@ from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcTyp
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 BOTH = (PLC5, SLC)
@@ -170,7 +169,6 @@ texts = st.builds(
     st.sampled_from(['', '', '/0', '/07', '/15', '/17', '/DN', '/EN', '/FD', '/ACC', '/INI']))
 
 
-@PROPERTY
 @given(texts, FAMILIES)
 def test_parse_and_str_are_inverse(text: str, family: PlcType) -> None:
     try:
@@ -198,7 +196,6 @@ def addresses(draw: st.DrawFn) -> Address:
     return Address(family, kind, file, draw(st.integers(0, 30 if slot else 127)), word, bit)
 
 
-@PROPERTY
 @given(addresses())
 def test_every_address_is_read_back(address: Address) -> None:
     assert Address.parse(str(address), address.plc_type) == address
@@ -285,7 +282,6 @@ def test_flat_io_has_no_words_of_slots() -> None:
         Address.parse('I:7936', SLC, Access.FLAT)
 
 
-@PROPERTY
 @given(st.one_of(
     st.text(max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), FAMILIES)
 def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) -> None:
@@ -297,7 +293,6 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
         assert address.offset < address.area_size
 
 
-@PROPERTY
 @given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS', 'PD9:3', 'MG9:1']),
        FAMILIES, st.integers(0, 255))
 def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: int) -> None:

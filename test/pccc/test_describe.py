@@ -126,7 +126,8 @@ def test_replies(asked: str, data: str, text: str) -> None:
      '5/09 series B revision 3, REM PROG; major error 0x0116, processor halted; testing edits'),
     ('00 EE 34 49 22 4C 49 4E 45 20 34 20 20 20 20 20 00 00 06 00 00 00 10 00',
      'SLC 5/03 series B revision 3, REM RUN; name LINE 4'),
-    ('08 BB', 'PLC-5/15, PROG; major processor fault (word S:11 says which)'),
+    ('08 BB 00 80 01 00 42 07 FD 00 0C 00 05 00 00 00 00',
+     'PLC-5/15 series C revision C, PROG; major processor fault (word S:11 says which)'),
     ('00 99 01 02 03 04 05 06 07 08', '00 99 01 02 03 04 05 06 07 08'), ('00', '00')])
 def test_diagnostic_status(data: str, text: str) -> None:
     request = command('03', 0x06)

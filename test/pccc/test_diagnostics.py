@@ -24,7 +24,6 @@ from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import pair
 
 
@@ -56,7 +55,6 @@ def test_read_counters() -> None:
 
 
 @given(address=st.integers(0, 0xFFFF), size=st.integers(0, 255))
-@PROPERTY
 def test_read_counters_is_read_as_it_was_made(address: int, size: int) -> None:
     request = ReadCounters(address, size)
     assert ReadCounters.read(parameters(request.encode(), diagnostics.READ_COUNTERS)) == request

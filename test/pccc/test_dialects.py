@@ -27,7 +27,6 @@ from abdf1_ros.pccc.processor import Processor
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.tables import replied
 
 # Every family and access that the emulated PLC serves, with places of each kind of file. The
@@ -72,7 +71,6 @@ def test_access_of_another_family(family: PlcType, access: Access, right: str) -
         dialect_of(family, access)
 
 
-@PROPERTY
 @given(st.sampled_from(WORDS), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF),
        st.integers(0, 0xFFFF))
 def test_write_read_and_write_bits_come_back(place: tuple[PlcType, Access, str], value: int,
@@ -165,7 +163,6 @@ def test_floats_arrive_with_their_words_in_order(place: tuple[PlcType, Access]) 
     assert dialect.read_data(address, 4, replied(table, *dialect.read(address, 4))) == data
 
 
-@PROPERTY
 @given(st.sampled_from([place for place in WORDS if '.' not in place[2]]),
        st.integers(1, 40), st.integers(1, 15))
 def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], words: int,

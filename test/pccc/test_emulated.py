@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import decode_identity
 import pytest
 from support.vectors import pair
 
@@ -64,7 +64,7 @@ def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -
 
 
 @pytest.mark.parametrize(('plc_type', 'fault'), [
-    (PlcType.SLC, 'major error 0x0020, processor halted'),
+    (PlcType.SLC, 'major error 0x0020 (minor error at the end of a scan), processor halted'),
     (PlcType.PLC5, 'major processor fault (word S:11 says which)'),
     (PlcType.PLC3, 'major processor fault'),
     (PlcType.PLC2, 'no communication between module and processor')])

@@ -23,7 +23,6 @@ from abdf1_ros.pccc.fields import number, Reader, word
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 
 @pytest.mark.parametrize(('value', 'encoded'), [
@@ -38,7 +37,6 @@ def test_long_form_of_a_small_number_is_read_too() -> None:
     assert Reader(b'\xFF\x07\x00').number() == 7
 
 
-@PROPERTY
 @given(st.lists(st.integers(0, 0xFFFF), max_size=8))
 def test_numbers_are_read_back(values: list[int]) -> None:
     reader = Reader(b''.join(map(number, values)))

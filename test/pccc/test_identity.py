@@ -17,11 +17,16 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.identity import decode_identity, Identity, Mode
+from abdf1_ros.pccc.diagnostic_status import decode_identity
+from abdf1_ros.pccc.diagnostics import ReadCounters
+from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.pccc.link_counters import counter_request
+from abdf1_ros.pccc.plc5 import identity as plc5
+from abdf1_ros.pccc.slc.faults import major_error
+from abdf1_ros.pccc.slc.identity import is_micrologix_1000
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import pair
 
 SLC = bytes.fromhex('00 EE 34 49 22') + b'5/03'.ljust(11) + bytes.fromhex('0000 06 00 3412 20 FC')
@@ -79,8 +84,9 @@ def test_modes_in_a_sentence(mode: Mode, words: str) -> None:
 
 
 def test_slc_that_has_halted() -> None:
-    identity = changed(SLC, byte17=0x16, byte18=0x01, byte19=0x01, byte20=0x20)
-    assert identity.faults == ('major error 0x0116, processor halted',)
+    identity = changed(SLC, byte17=0x34, byte19=0x01, byte20=0x20)
+    assert identity.faults == (
+        'major error 0x0034 (negative timer preset or accumulator), processor halted',)
     assert identity.remarks == ()
 
 
@@ -88,7 +94,8 @@ def test_slc_remarks_are_no_faults() -> None:
     identity = changed(SLC, byte1=0xC0, byte17=0x20, byte19=0x66, byte24=0xFD)
     assert identity.faults == ()
     assert identity.remarks == (
-        'last major error 0x0020', 'forces active', 'forces installed', 'testing edits',
+        'last major error 0x0020 (minor error at the end of a scan)',
+        'forces active', 'forces installed', 'testing edits',
         'edits in the processor', 'program directory corrupted')
 
 
@@ -106,17 +113,31 @@ def test_plc5_faults_and_remarks() -> None:
     (0x88, 'MicroLogix 1200'), (0x89, 'MicroLogix 1500 LSP'), (0x8C, 'MicroLogix 1500 LRP'),
     (0x9C, 'MicroLogix 1100')])
 def test_slc_models(code: int, model: str) -> None:
-    identity = changed(SLC, byte4=code)
+    identity = changed(SLC, byte4=code, byte6=0)  # without a name
     assert str(identity) == f'{model} series B revision 3, REM RUN'
-    assert identity.is_micrologix_1000 == (code == 0x58)
+    assert is_micrologix_1000(identity) == (code == 0x58)
 
 
-def test_micrologix_of_an_unknown_code_is_known_by_its_name() -> None:
-    data = bytearray(SLC)
-    data[3], data[5:16] = 0xB9, b'1766-LEC   '
-    identity = decode_identity(bytes(data))
-    assert str(identity) == '1766-LEC series B revision 3, REM RUN'
-    assert identity.family == 'SLC'
+@pytest.mark.parametrize(('code', 'name', 'model', 'remarks'), [
+    (0xB9, b'1766-LEC   ', 'MicroLogix 1400', ()), (0x77, b'1747-L542B ', '1747-L542B', ()),
+    (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', ()), (0x1A, b'500-20     ',
+                                                          'SLC 500 fixed', ()),
+    (0x78, b'5/04       ', 'SLC 5/04', ('its processor code 0x78 is that of a SLC 5/05',)),
+    (0x9C, b'1762-L24   ', 'MicroLogix 1200',
+     ('its processor code 0x9C is that of a MicroLogix 1100',)),
+    (0x18, b'5/06       ', '5/06', ('its processor code 0x18 is that of a SLC 5/01',))])
+def test_name_of_an_slc_counts_more_than_its_code(
+        code: int, name: bytes, model: str, remarks: tuple[str, ...]) -> None:
+    identity = decode_identity(SLC[:3] + bytes((code,)) + SLC[4:5] + name + SLC[16:])
+    assert (identity.family, identity.model, identity.remarks) == ('SLC', model, remarks)
+
+
+@pytest.mark.parametrize(('code', 'text'), [
+    (0x0022, 'major error 0x0022 (watchdog: scan time exceeded)'),
+    (0x0352, 'major error 0x0352 (slot 3: module is missing or was removed)'),
+    (0x0122, 'major error 0x0122'), (0x0099, 'major error 0x0099')])
+def test_major_errors(code: int, text: str) -> None:
+    assert major_error(code) == text
 
 
 def test_unknown_processor_is_named_and_not_interpreted() -> None:
@@ -136,10 +157,36 @@ def test_plc5_models(byte3: int, model: str) -> None:
     assert changed(PLC5, byte3=byte3).model == model
 
 
-def test_plc5_15_has_no_expansion_byte() -> None:
-    identity = decode_identity(bytes((0x0A, 0xBB)) + bytes(30))
-    assert str(identity) == 'PLC-5/15, RUN'
-    assert identity.faults == ('major processor fault (word S:11 says which)',)
+# M 10-20 and 10-21: the same fields, with and without the expansion byte in front of them.
+_OLD_FIELDS = '00 80 01 00 42 07 FD 00 0C 00 05 00 11 01 01'
+
+
+@pytest.mark.parametrize(('start', 'model'), [
+    ('0A EB 13', 'PLC-5/12'), ('0A EB 14', 'PLC-5/25'), ('0A BB', 'PLC-5/15'),
+    ('0A CB', 'PLC-5 VME (6008-LTV)')])
+def test_old_plc5_ends_with_the_byte_about_its_ram(start: str, model: str) -> None:
+    data = bytes.fromhex(start + _OLD_FIELDS)
+    identity = decode_identity(data)
+    assert str(identity) == f'{model} series C revision C, RUN'
+    assert identity.faults == ('major processor fault (word S:11 says which)', 'bad RAM')
+    assert identity.remarks == ('forces active', 'forces installed', 'memory protected')
+    assert identity.memory == '98304'
+    with pytest.raises(FormatError, match=f'{len(data) - 1} bytes; .* {len(data)} or more'):
+        decode_identity(data[:-1])
+
+
+def test_fault_of_a_plc5_is_asked_for_and_named() -> None:
+    assert plc5.fault_request(changed(PLC5, byte1=0x06)) is None
+    identity = changed(PLC5, byte1=0x0A, byte18=1)
+    assert plc5.fault_request(identity) == (
+        0x0F, bytes.fromhex('68 00 00 02 00 06 02 0B 02 00'))
+    known = plc5.with_fault(identity, bytes.fromhex('95 09 42 84 01 58 00'))
+    assert known.faults == (
+        'major processor fault: programming error, the program jumped to the fault routine, '
+        'watchdog; fault code 88 (S:12)', 'bad RAM')
+    assert plc5.fault_request(known) is None
+    assert plc5.with_fault(identity, bytes.fromhex('95 09 42 00 00 00 00')).faults[0] == \
+        'major processor fault: S:11 is 0; fault code 0 (S:12)'
 
 
 def test_plc3() -> None:
@@ -168,9 +215,41 @@ def test_gateway_has_no_mode() -> None:
     assert (identity.is_running, identity.counter_address) == (None, 0x2010)
 
 
-def test_gateway_with_a_name() -> None:
-    identity = decode_identity(bytes((0, 0xFE, 0x2C, 0, 0)) + b'1770-KF3\0xx' + bytes(8))
-    assert (str(identity), identity.is_running) == ('1770-KF3 series A revision 1', None)
+@pytest.mark.parametrize(('data', 'text', 'counters'), [
+    ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),  # M 10-16
+    ('00 EE 30 2F 34 12 00 20 21 00 30', '1785-KA5 series B revision B', 0x2000),  # M 10-17
+    ('00 FE 19 00 00 30 00 20 21 00', '1785-KE series B revision B', 0x2000),  # M 10-19
+    ('00 FE 1B 00 00 00 44 41 03 00' + '20' * 8, '1784-KT or 1784-KT2 series A revision D',
+     0x4144)])  # M 10-15
+def test_gateway_without_a_name(data: str, text: str, counters: int) -> None:
+    identity = decode_identity(bytes.fromhex(data))
+    assert (identity.family, str(identity)) == ('', text)
+    assert counter_request(identity) == ReadCounters(counters, 55)
+
+
+@pytest.mark.parametrize(('data', 'model', 'counters'), [
+    ('02 1D 00 00 00 00 00 20 21 00', 'PLC-2 at 1785-KA3', 0x2000),  # M 10-17, 10-18
+    ('02 6D 00 00 00 00 00 20 21 00', 'PLC-2/15 at 1785-KA3', 0x2000),
+    ('02 ED 1F 00 00 00 00 00 20 21 00', 'PLC-2/16 at 1785-KA3', 0x2000),
+    ('02 ED 77 00 00 00 00 00 20 21 00', 'PLC-2 of type 0x77 at 1785-KA3', 0x2000)])
+def test_1785_ka3_may_have_an_expansion_byte(data: str, model: str, counters: int) -> None:
+    identity = decode_identity(bytes.fromhex(data))
+    assert str(identity) == f'{model} series B revision B, RUN'
+    assert (identity.family, identity.counter_address) == ('PLC-2', counters)
+
+
+@pytest.mark.parametrize(('kind', 'name', 'counters'), [
+    (0x2C, '1770-KF3', ReadCounters(0, 20)), (0x24, '1784-KR', ReadCounters(0, 55))])
+def test_gateway_with_a_name(kind: int, name: str, counters: ReadCounters) -> None:
+    data = bytes((0, 0xFE, kind, 0, 0)) + name.encode().ljust(9, b'\0') + b'xx' + bytes(8)
+    identity = decode_identity(data)
+    assert (str(identity), identity.is_running) == (f'{name} series A revision 1', None)
+    assert counter_request(identity) == counters
+
+
+def test_1785_ka5_that_is_asked_over_dh485_has_its_name() -> None:
+    data = bytes((0, 0xEE, 0x30, 0x2F, 0x21)) + b'1785-KA5'.ljust(11, b'\0') + bytes(8)
+    assert str(decode_identity(data)) == '1785-KA5 series B revision 2'
 
 
 def test_unknown_layout_is_shown_in_hexadecimal() -> None:
@@ -178,7 +257,7 @@ def test_unknown_layout_is_shown_in_hexadecimal() -> None:
         'unknown processor (00 99 12 34)'
 
 
-@pytest.mark.parametrize('data', [b'', b'\0', PLC5[:35]])
+@pytest.mark.parametrize('data', [b'', b'\0', PLC5[:17], PLC5[:2]])
 def test_too_short(data: bytes) -> None:
     with pytest.raises(FormatError, match='a diagnostic status of'):
         decode_identity(data)
@@ -198,7 +277,6 @@ _DATA = st.one_of(
 
 
 @given(data=_DATA)
-@PROPERTY
 def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
     try:
         identity = decode_identity(data)

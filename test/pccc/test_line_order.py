@@ -22,7 +22,6 @@ from abdf1_ros.pccc.line_order import in_line_order, word_on_line
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 
 def at(text: str) -> Address:
@@ -49,7 +48,6 @@ def test_only_the_floats_of_a_pid_block_are_exchanged() -> None:
     assert list(line[::2]) == order
 
 
-@PROPERTY
 @given(st.sampled_from(['F8:0', 'PD10:2']), st.binary(min_size=328, max_size=328))
 def test_the_line_order_of_the_line_order_is_ours(text: str, data: bytes) -> None:
     assert in_line_order(at(text), in_line_order(at(text), data)) == data

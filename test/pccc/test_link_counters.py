@@ -32,7 +32,6 @@ from abdf1_ros.pccc.link_counters import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 
 def words(count: int) -> bytes:
@@ -97,7 +96,6 @@ def test_half_a_word_is_no_counter(data: bytes) -> None:
 
 
 @given(data=st.binary(max_size=60), layout=st.sampled_from([None, *Layout]))
-@PROPERTY
 def test_any_bytes_are_counters_or_a_format_error(data: bytes, layout: Layout | None) -> None:
     try:
         counters = decode_counters(data, layout)

@@ -19,16 +19,16 @@ from __future__ import annotations
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.diagnostics import max_echo, ReadCounters, RESET_REQUEST, STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import decode_identity, Mode
+from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.pccc.link_counters import Layout, ServedCounters
 from abdf1_ros.pccc.server import Server
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import pair
 
 REFUSED = 0x10
@@ -66,7 +66,6 @@ def test_echo_of_the_vectors(plc_type: PlcType) -> None:
 
 
 @given(data=st.binary(max_size=236))
-@PROPERTY
 def test_echo_of_anything(data: bytes) -> None:
     assert answer(PlcType.SLC, b'\0' + data).data == data
 

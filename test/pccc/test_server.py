@@ -27,7 +27,6 @@ from abdf1_ros.pccc.server import Refusal, Server
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.tables import ask, counting, table, words_at
 from support.vectors import pair
 
@@ -175,7 +174,6 @@ FILES = {
           'I_0': '00 00', 'O_1': '00 00'}}
 
 
-@PROPERTY
 @given(requests, st.sampled_from(PlcType), st.one_of(st.sampled_from((0x0F, 1, 2, 5, 8)),
                                                      st.integers(0, 255)),
        st.integers(0, 0xFFFF))

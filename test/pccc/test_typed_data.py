@@ -21,7 +21,6 @@ from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import pair, vector, VECTORS
 
 TYPED_READS = sorted({entry.pair for entry in VECTORS
@@ -103,7 +102,6 @@ def test_data_of_the_typed_write_vector() -> None:
     assert TypedData(4, 2, b'\x01\x00').encode() == data
 
 
-@PROPERTY
 @given(st.integers(1, 0x20).filter(lambda value: value != 9), st.integers(1, 300),
        st.integers(0, 5))
 def test_any_elements_are_read_back(type_id: int, size: int, count: int) -> None:
@@ -112,7 +110,6 @@ def test_any_elements_are_read_back(type_id: int, size: int, count: int) -> None
     assert values.count == count
 
 
-@PROPERTY
 @given(st.one_of(st.binary(max_size=40), st.builds(
     bytes.__add__, st.sampled_from([b'\x99\x09', b'\x9A\x09', b'\x93\x09', b'\x42']),
     st.binary(max_size=20))))

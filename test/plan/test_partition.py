@@ -25,7 +25,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.groupings import groupings
-from support.properties import PROPERTY
 
 COMMAND, WORD, LIMIT = 50.0, 2.0, 110
 COSTS = [COMMAND + WORD * words for words in range(LIMIT + 1)]
@@ -50,7 +49,6 @@ def least_load(wanted: Sequence[Draft], terms: Terms = TERMS) -> float:
     return min(load(map(joined, groups), terms) for groups in groupings(wanted))
 
 
-@PROPERTY
 @given(st.lists(SPANS, min_size=1, max_size=6, unique=True), st.sampled_from([1, 3]))
 def test_nothing_is_cheaper_where_all_have_one_period(spans: list[Span], element: int) -> None:
     terms = Terms(COSTS[:LIMIT // element * element + 1], element)
@@ -62,7 +60,6 @@ def test_nothing_is_cheaper_where_all_have_one_period(spans: list[Span], element
         assert any(block.holds(entry.span) for block in blocks)
 
 
-@PROPERTY
 @given(st.lists(st.tuples(SPANS, st.sampled_from([0.1, 0.5, 1.0])), min_size=1, max_size=6,
                 unique=True))
 def test_plan_of_several_periods_serves_all_and_is_never_worse_than_apart(
@@ -95,7 +92,6 @@ def test_on_a_full_line_periods_make_no_difference() -> None:
     assert draft(needed, TERMS, 10.0) == [Draft(Span(0, 21), 0.1)]
 
 
-@PROPERTY
 @given(st.lists(SPANS, min_size=1, max_size=30), st.lists(SPANS, max_size=5))
 def test_blocks_keep_to_the_limit_and_around_what_was_refused(
         spans: list[Span], refused: list[Span]) -> None:
@@ -114,7 +110,6 @@ def test_block_that_cannot_be_has_no_price() -> None:
     assert terms.cost(Span(10, 11 + LIMIT)) == math.inf
 
 
-@PROPERTY
 @given(st.lists(SPANS))
 def test_without_contained_keeps_what_no_other_holds(spans: list[Span]) -> None:
     kept = without_contained(spans)

@@ -35,7 +35,6 @@ from hypothesis import strategies as st
 import pytest
 from support.groupings import groupings
 from support.mappings import make_mapping
-from support.properties import PROPERTY
 
 CHARACTER = 0.001
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(CHARACTER))
@@ -123,13 +122,11 @@ def check_plan(mappings: Sequence[Mapping], blocks: Sequence[Block]) -> None:
             assert len({mapping.codec.words for mapping in block.mappings}) == 1
 
 
-@PROPERTY
 @given(word_mappings())
 def test_every_word_is_covered_within_the_limits(mappings: list[Mapping]) -> None:
     check_plan(mappings, plan(*mappings))
 
 
-@PROPERTY
 @given(mixed_mappings())
 def test_nothing_is_bridged_across_files_stations_and_families(mappings: list[Mapping]) -> None:
     blocks = plan(*mappings)
@@ -139,7 +136,6 @@ def test_nothing_is_bridged_across_files_stations_and_families(mappings: list[Ma
             (block.station, block.start.area)}
 
 
-@PROPERTY
 @given(word_mappings(most=5))
 def test_no_other_plan_is_cheaper(mappings: list[Mapping]) -> None:
     planned = plan(*mappings)
@@ -343,7 +339,6 @@ def test_words_of_a_mapping_in_the_data_of_its_block() -> None:
     assert data[block.slice_of(last)] == data[16:20]
 
 
-@PROPERTY
 @given(word_mappings())
 def test_split_halves_a_block_until_all_its_mappings_are_the_same_words(
         mappings: list[Mapping]) -> None:
@@ -392,7 +387,6 @@ def test_on_a_full_line_periods_that_cannot_be_kept_make_no_difference() -> None
     assert len(blocks) == 11
 
 
-@PROPERTY
 @given(st.lists(st.tuples(st.integers(0, 200), st.sampled_from([100, 300, 1000])),
                 min_size=1, max_size=40))
 def test_mapping_is_read_as_often_as_it_wants(places: list[tuple[int, int]]) -> None:
@@ -404,7 +398,6 @@ def test_mapping_is_read_as_often_as_it_wants(places: list[tuple[int, int]]) -> 
 # refusals
 
 
-@PROPERTY
 @given(word_mappings(last=60), st.lists(st.tuples(st.integers(0, 80), st.integers(1, 4)),
                                         min_size=1, max_size=4))
 def test_no_plan_holds_what_was_refused(mappings: list[Mapping],

@@ -29,7 +29,6 @@ from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 from support.mappings import make_mapping
-from support.properties import PROPERTY
 
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
 
@@ -151,7 +150,6 @@ def test_single_mapping_that_is_refused_is_asked_for_again() -> None:
     assert not plc.failed
 
 
-@PROPERTY
 @given(st.lists(st.tuples(st.integers(0, 80), st.sampled_from([1, 1, 1, 2, 5])), min_size=1,
                 max_size=25), st.sets(st.integers(0, 90), max_size=6))
 def test_only_mappings_that_are_not_there_fail_and_the_rest_is_read_as_planned(

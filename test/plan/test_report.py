@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.plan.report import Kind, make_report, Report
+from dataclasses import replace
+
+from abdf1_ros.plan.report import Kind, make_report, Remark, Report
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -33,7 +35,17 @@ ANSWERS = 0.02  # two, of 10 ms
 
 def report_of(*mappings: Mapping, period: float = 1.0, response: float = 0.01,
               **settings: object) -> Report:
-    return make_report(Network(**settings), mappings, period, response)  # type: ignore[arg-type]
+    network = Network(**{'timeout': 300} | settings)  # type: ignore[arg-type]
+    return make_report(network, mappings, period, response)
+
+
+def test_settings_that_are_odd_come_first_with_their_stations() -> None:
+    mapping = make_mapping('N7:0', station=3)
+    odd = replace(mapping, remarks=('map.csv:2:8 (Max): too much',))
+    assert report_of(odd, data_bits=7).remarks()[:2] == [
+        Remark(Kind.SETTING, 'Data_Bits 7: DF1 sends bytes of 8 bits; with less the check of '
+                             'nearly every message fails'),
+        Remark(Kind.SETTING, 'map.csv:2:8 (Max): too much', 3)]
 
 
 def texts(report: Report, kind: Kind) -> list[str]:

@@ -104,6 +104,18 @@ def test_string_has_no_layout(tmp_path: Path, address: str, cells: dict[str, obj
     assert new_message(make_mapping(tmp_path, address, **cells)) == String()
 
 
+def padded(wire: bytes) -> bytes:
+    """
+    Return a message with 0 as padding, which nobody sets.
+
+    CDR aligns the number after the label to 4 bytes; before the label stand the header, the count
+    of dimensions and the length of the label.
+    """
+    end = 12 + int.from_bytes(wire[8:12], 'little')
+    count = -end % 4
+    return wire[:end] + bytes(count) + wire[end + count:]
+
+
 @pytest.mark.parametrize('length', [1, 2, 3, 7])
 @pytest.mark.parametrize(('address', 'cells', 'values'), [
     ('B3:1/3', {}, [1, 0, 0, 1, 1, 0, 1]), ('N7:3', {}, [-1, 0, 1, 256, -32768, 32767, 7]),
@@ -121,7 +133,7 @@ def test_array_that_is_encoded_is_the_message(
         read = mapping.codec.decode(mapping.codec.encode(given)) if mapping.address.bit is None \
             else array('B', map(int, given))
         message.data = given
-        assert encode(read) == serialize_message(message)
+        assert padded(encode(read)) == padded(serialize_message(message))
         assert deserialize_message(encode(read), type(message)) == message
 
 

@@ -211,8 +211,10 @@ def test_program_mode_and_fault_are_warnings(bridge: Bridge) -> None:
     bridge.until(WARN, 'WARN: station 2 active, but in program mode (REM PROG)')
     bridge.simulator.say('mode 2 fault')
     values = bridge.until(
-        WARN, 'WARN: station 2 active, but major error 0x0020, processor halted (REM PROG)')
-    assert values['faults'] == 'major error 0x0020, processor halted'
+        WARN, 'WARN: station 2 active, but major error 0x0020 (minor error at the end of a scan), '
+        'processor halted (REM PROG)')
+    assert values['faults'] == (
+        'major error 0x0020 (minor error at the end of a scan), processor halted')
     assert values['error replies'] == '0'
     bridge.simulator.say('mode 2 run')
     assert bridge.until(OK, 'OK: station 2 active')['mode'].startswith('RUN (')

@@ -24,7 +24,6 @@ from abdf1_ros.settings.csv_table import read_good_rows, read_rows, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 KNOWN = ('Tag', 'Address', 'Length')
 
@@ -309,7 +308,6 @@ def test_endless_file_is_refused() -> None:
         read_rows('/dev/zero', KNOWN)
 
 
-@PROPERTY
 @given(content=st.one_of(
     st.binary(max_size=200),
     st.binary(max_size=100).map(lambda tail: b'Tag,Address,Length\n' + tail),

@@ -22,7 +22,6 @@ from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 # What rcl accepts as a relative name (ROS.md 4.4).
 _LEGAL = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*')
@@ -59,7 +58,6 @@ def test_nothing_is_left_of_text_without_letter_or_digit(text: str) -> None:
     assert sanitise(text) == ''
 
 
-@PROPERTY
 @given(st.text())
 def test_any_text_becomes_a_legal_name_or_nothing(text: str) -> None:
     name = sanitise(text)
@@ -67,7 +65,6 @@ def test_any_text_becomes_a_legal_name_or_nothing(text: str) -> None:
     assert '__' not in name and not name.endswith('_')
 
 
-@PROPERTY
 @given(st.text())
 def test_a_name_stays_as_it_is(text: str) -> None:
     assert sanitise(sanitise(text)) == sanitise(text)

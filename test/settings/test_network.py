@@ -32,7 +32,6 @@ from abdf1_ros.settings.network import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 # Column, field, default, good values, bad values (S0, network table).
 NUMBERS = [
@@ -287,7 +286,6 @@ def test_fault_of_an_override_names_the_parameter() -> None:
         '255; Station = "-1" should be a whole number from 0 to 254']
 
 
-@PROPERTY
 @given(st.sampled_from(sorted(FIELDS)), st.text(max_size=8))
 def test_any_text_gives_a_network_or_a_configuration_error(name: str, text: str) -> None:
     try:

@@ -27,12 +27,10 @@ from abdf1_ros.settings.strings import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 _TEXTS = st.text(st.characters(max_codepoint=255), max_size=82)
 
 
-@PROPERTY
 @given(_TEXTS)
 def test_counted_strings_survive_a_round_trip(text: str) -> None:
     words = encode_counted(text)
@@ -40,7 +38,6 @@ def test_counted_strings_survive_a_round_trip(text: str) -> None:
     assert decode_counted(words) == text
 
 
-@PROPERTY
 @given(_TEXTS, st.integers(0, 5))
 def test_packed_strings_survive_a_round_trip_but_for_nuls_behind_them(
         text: str, more: int) -> None:

@@ -28,7 +28,6 @@ from abdf1_ros.settings.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.BOOL: st.integers(0, 1),
@@ -46,7 +45,6 @@ _WORD_TYPES = [kind for kind in _NUMBERS if kind is not ValueType.BOOL]
 def test_values_survive_a_round_trip(kind: ValueType) -> None:
     orders = list(WordOrder) if kind.words == 2 else [WordOrder.LOW]
 
-    @PROPERTY
     @given(st.lists(_NUMBERS[kind], min_size=1, max_size=20), st.sampled_from(orders))
     def check(values: list[float], order: WordOrder) -> None:
         codec = Codec(kind, len(values), word_order=order)
@@ -59,7 +57,6 @@ def test_values_survive_a_round_trip(kind: ValueType) -> None:
     check()
 
 
-@PROPERTY
 @given(st.lists(st.integers(0, 1), min_size=1, max_size=50), st.integers(0, 15),
        st.binary(min_size=8, max_size=8))
 def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
@@ -78,7 +75,6 @@ def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
     assert decoded == array('B', values)
 
 
-@PROPERTY
 @given(st.text(st.characters(max_codepoint=255), max_size=82))
 def test_strings_survive_a_round_trip(text: str) -> None:
     for codec in (Codec(ValueType.STRING, 1), Codec(ValueType.STRING, 41, packed=True)):
@@ -90,7 +86,6 @@ def test_strings_survive_a_round_trip(text: str) -> None:
 
 @pytest.mark.parametrize('kind', list(ValueType))
 def test_any_words_give_values_or_a_format_error(kind: ValueType) -> None:
-    @PROPERTY
     @given(st.integers(1, 5), st.integers(0, 15), st.data())
     def check(length: int, bit: int, data: st.DataObject) -> None:
         codec = Codec(kind, 1 if kind is ValueType.STRING else length, bit)

@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+import signal
 import time
 from typing import Any
 
@@ -106,6 +107,15 @@ class Rig:
         """Tell whether the true speeds and those set points are all that has ever come."""
         return {tuple(values_in(message)) for message in self.speeds} <= {SPEEDS} and \
             {values_in(message)[0] for message in self.setpoint} <= {*setpoints}
+
+    def kill_simulator(self) -> None:
+        """
+        Let the PLCs lose their power.
+
+        The name of their terminal goes first: it would stay, and soon lead to another test's.
+        """
+        self.files.port.unlink(missing_ok=True)
+        self.simulator.send(signal.SIGKILL)
 
     def restart_simulator(self) -> None:
         """Start the simulator that has ended anew."""

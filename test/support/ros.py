@@ -322,11 +322,15 @@ def until_status(inbox: Inbox, name: str, level: bytes,
 
 
 class Plcs:
-    """Simulated PLCs in this process, on a pseudo-terminal."""
+    """
+    Simulated PLCs in this process, on a pseudo-terminal.
+
+    Its name goes away with it. The number of a terminal is soon another test's.
+    """
 
     def __init__(self, data: Path) -> None:
         self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
-        self._line = PtyLine(None)
+        self._line = PtyLine(str(data.with_name('plcs')))
         self.port = self._line.name
         self.faults: list[Exception] = []
         machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)

@@ -319,7 +319,8 @@ def test_detect_tries_in_order_and_stops_at_the_first_answer(
         tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
-        said = call(main, capsys, 'detect', '--port', port, '--stations', '9,2', '--timeout', '80')
+        said = call(main, capsys, 'detect', '--port', port, '--stations', '9,2', '--timeout',
+                    '300')
     assert said.status == 0
     assert said.lines[0].startswith('19200 baud, half duplex, BCC: station 2 SLC 5/03')
     assert said.lines[1:] == [

@@ -22,7 +22,6 @@ from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 PLC2 = PlcType.PLC2
 
@@ -35,7 +34,6 @@ def test_words_and_bits_are_octal(text: str, word: int, bit: int | None, shown: 
     assert (address.offset, address.bit, str(address)) == (word, bit, shown)
 
 
-@PROPERTY
 @given(st.integers(0, 0x7FFF), st.one_of(st.none(), st.integers(0, 15)))
 def test_every_address_is_read_back(word: int, bit: int | None) -> None:
     address = Address.parse(f'{word:o}' + ('' if bit is None else f'/{bit:o}'), PLC2)

@@ -22,7 +22,6 @@ from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, B
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import vector
 
 changes = st.builds(
@@ -46,7 +45,6 @@ def test_bit_write_has_four_bytes_for_each_byte() -> None:
     assert request.encode() == bytes.fromhex('20 00 01 80 21 00 00 0F')
 
 
-@PROPERTY
 @given(st.lists(changes, min_size=1, max_size=60))
 def test_bit_write_is_read_back(entries: list[ByteChange]) -> None:
     request = BasicBitWrite(tuple(entries))

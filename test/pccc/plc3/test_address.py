@@ -23,7 +23,6 @@ from abdf1_ros.pccc.plc3.address import last_element, SECTIONS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 PLC3 = PlcType.PLC3
 
@@ -46,7 +45,6 @@ def test_both_forms_name_the_same_place(text: str, levels: str, shown: str,
     assert (str(address), address.offset) == (shown, offset)
 
 
-@PROPERTY
 @given(st.sampled_from(list(SECTIONS)), st.integers(0, 999), st.data(),
        st.one_of(st.none(), st.integers(0, 15)))
 def test_every_address_is_read_back(kind: FileType, file: int, data: st.DataObject,

@@ -22,7 +22,6 @@ from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 
 levels = st.integers(0, 0xFFFF)
 
@@ -45,7 +44,6 @@ def test_levels_that_are_left_out_have_their_default(encoded: str,
     assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
 
 
-@PROPERTY
 @given(st.builds(ExtendedAddress, levels, levels, levels, levels))
 def test_every_address_is_read_back(address: ExtendedAddress) -> None:
     reader = Reader(address.encode())

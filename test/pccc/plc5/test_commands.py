@@ -32,7 +32,6 @@ from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import commands, Vector, without_area
 
 COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {
@@ -158,7 +157,6 @@ def test_vectors_have_every_command() -> None:
     assert {entry.fnc for entry in commands(*COMMANDS)} == set(COMMANDS)
 
 
-@PROPERTY
 @given(addresses, words, words, words)
 def test_typed_read_is_read_back(address: SystemAddress, size: int, offset: int,
                                  total: int) -> None:
@@ -166,7 +164,6 @@ def test_typed_read_is_read_back(address: SystemAddress, size: int, offset: int,
     assert TypedRead.read(Reader(command.encode()[1:])) == command
 
 
-@PROPERTY
 @given(addresses, values, words, words)
 def test_typed_write_is_read_back(address: SystemAddress, data: TypedData, offset: int,
                                   total: int) -> None:
@@ -174,14 +171,12 @@ def test_typed_write_is_read_back(address: SystemAddress, data: TypedData, offse
     assert TypedWrite.read(Reader(command.encode()[1:])) == command
 
 
-@PROPERTY
 @given(st.lists(st.builds(BitSet, addresses, words, words), min_size=1, max_size=10))
 def test_read_modify_write_is_read_back(sets: list[BitSet]) -> None:
     command = ReadModifyWrite(tuple(sets))
     assert ReadModifyWrite.read(Reader(command.encode()[1:])) == command
 
 
-@PROPERTY
 @given(st.sampled_from(sorted(COMMANDS)), st.binary(max_size=30))
 def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
     reader = Reader(data)

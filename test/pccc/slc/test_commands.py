@@ -34,7 +34,6 @@ from abdf1_ros.pccc.slc.commands import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.properties import PROPERTY
 from support.vectors import commands, Vector
 
 Command = LogicalRead | LogicalWrite | MaskedWrite
@@ -82,7 +81,6 @@ def test_vectors_have_every_command() -> None:
     assert {entry.fnc for entry in commands(*READERS)} == set(READERS)
 
 
-@PROPERTY
 @given(addresses, st.integers(0, 255), st.integers(0, 0xFFFF), st.binary(max_size=255))
 def test_commands_are_read_back(address: LogicalAddress, size: int, mask: int,
                                 data: bytes) -> None:
@@ -91,7 +89,6 @@ def test_commands_are_read_back(address: LogicalAddress, size: int, mask: int,
         assert type(command).read(Reader(command.encode()[1:])) == command
 
 
-@PROPERTY
 @given(short_addresses, st.integers(0, 255), st.binary(max_size=255))
 def test_short_commands_are_read_back(address: LogicalAddress, size: int, data: bytes) -> None:
     for command in (LogicalRead(address, size), LogicalWrite(address, data)):
@@ -99,7 +96,6 @@ def test_short_commands_are_read_back(address: LogicalAddress, size: int, data: 
         assert READERS[encoded[0]](Reader(encoded[1:])) == command
 
 
-@PROPERTY
 @given(st.sampled_from(sorted(READERS)), st.binary(max_size=20))
 def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
     reader = Reader(data)

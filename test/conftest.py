@@ -12,12 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one setting of all property tests: the same examples in every run."""
+
+"""What holds for all tests: property tests try the same examples in every run, without a clock."""
 
 from __future__ import annotations
 
 from hypothesis import HealthCheck, settings
 
-PROPERTY = settings(
-    derandomize=True, max_examples=150, deadline=None, database=None,
+settings.register_profile(
+    'abdf1_ros', derandomize=True, max_examples=150, deadline=None, database=None,
     suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile('abdf1_ros')

@@ -1,0 +1,117 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What an SLC 500 or MicroLogix says of itself: 24 bytes (M 10-3, 10-4, 10-6)."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.identity import (
+    code_of,
+    Identity,
+    Mode,
+    mode_of,
+    name_in,
+    named,
+    release,
+    word_at,
+)
+from abdf1_ros.pccc.slc.faults import major_error
+
+EXTENDED = 0xEE  # byte 2: interface and processor type follow, then a name
+SIZE = 24
+
+FULL_DUPLEX_PORT = 0x34
+HALF_DUPLEX_PORT = 0x36
+SLC_5_03 = 0x49
+_MICROLOGIX_1000 = 0x58
+
+# Byte 4; the codes from 78 on are those that drivers in the field know.
+_MODELS = {
+    0x18: 'SLC 5/01', 0x1A: 'SLC 500 fixed', 0x25: 'SLC 5/02', SLC_5_03: 'SLC 5/03',
+    0x5B: 'SLC 5/04', _MICROLOGIX_1000: 'MicroLogix 1000', 0x78: 'SLC 5/05',
+    0x88: 'MicroLogix 1200', 0x89: 'MicroLogix 1500 LSP', 0x8C: 'MicroLogix 1500 LRP',
+    0x9C: 'MicroLogix 1100'}
+
+# What the name of a model begins with; 5/ and 1747 are any SLC 500.
+_NAMES = {
+    '5/01': 'SLC 5/01', '5/02': 'SLC 5/02', '5/03': 'SLC 5/03', '5/04': 'SLC 5/04',
+    '5/05': 'SLC 5/05', '500': 'SLC 500 fixed', '1761': 'MicroLogix 1000',
+    '1762': 'MicroLogix 1200', '1763': 'MicroLogix 1100', '1764': 'MicroLogix 1500',
+    '1766': 'MicroLogix 1400', '5/': '', '1747': ''}
+
+MODES = {
+    0x00: Mode.REMOTE_DOWNLOAD, 0x01: Mode.REMOTE_PROGRAM, 0x03: Mode.REMOTE_SUSPEND,
+    0x06: Mode.REMOTE_RUN, 0x07: Mode.REMOTE_TEST, 0x08: Mode.REMOTE_TEST_SCAN,
+    0x09: Mode.REMOTE_TEST_STEP, 0x10: Mode.DOWNLOAD, 0x11: Mode.PROGRAM, 0x1B: Mode.SUSPEND,
+    0x1E: Mode.RUN}
+
+MAJOR_ERROR_HALTED = 0x20  # byte 20
+_NO_OWNER = 0xFC  # byte 24: nobody owns the program
+_MINOR_ERROR_LEFT = 0x0020  # the major error of an emulated processor
+
+
+def decode(data: bytes) -> Identity | None:
+    """Read the data of a reply to 06/03; None when they are not in this form."""
+    if len(data) < SIZE or data[1] != EXTENDED:
+        return None
+    code, name = data[3], name_in(data[5:16])
+    model, remarks = _model(code, name)
+    if not model:
+        return Identity('', name or f'processor 0x{code:02X}', *release(data[4]), name=name,
+                        interface=data[2])
+    mode, mode_text = mode_of(MODES, data[18] & 0x1F)
+    error = word_at(data, 16)
+    halted = bool(data[19] & MAJOR_ERROR_HALTED)
+    faults = (f'{major_error(error)}, processor halted',) if halted else ()
+    remarks += named({
+        f'last {major_error(error)}': error and not halted,
+        'forces active': data[18] & 0x20, 'forces installed': data[18] & 0x40,
+        'testing edits': data[0] & 0x40, 'edits in the processor': data[0] & 0x80,
+        'program directory corrupted': data[23] & 0x01})
+    return Identity('SLC', model, *release(data[4]), mode, mode_text, faults, remarks, name,
+                    word_at(data, 20), f'{data[22]} K', data[2])
+
+
+def is_micrologix_1000(identity: Identity) -> bool:
+    """Tell the one of its family whose counters differ."""
+    return identity.model == _MODELS[_MICROLOGIX_1000]
+
+
+def _model(code: int, name: str) -> tuple[str, tuple[str, ...]]:
+    """
+    Return the model, empty for one of another family, and what is odd about it.
+
+    Codes of newer processors come from drivers in the field only, so where the code and the
+    name disagree the name counts.
+    """
+    by_code = _MODELS.get(code, '')
+    by_name = next((model or name for start, model in _NAMES.items() if name.startswith(start)),
+                   '')
+    if not by_name or by_code.startswith(by_name):
+        return by_code, ()
+    return by_name, named({
+        f'its processor code 0x{code:02X} is that of a {by_code}': len(by_code)})
+
+
+def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
+    """
+    Return the data of the reply of an SLC 5/03 to 06/03.
+
+    What does not exist here (memory, programs) is 0.
+    """
+    port = FULL_DUPLEX_PORT if is_full_duplex else HALF_DUPLEX_PORT
+    error = _MINOR_ERROR_LEFT if is_faulted else 0
+    return (bytes((0, EXTENDED, port, SLC_5_03, 0)) + b'5/03'.ljust(11)
+            + error.to_bytes(2, 'little')
+            + bytes((code_of(MODES, mode), MAJOR_ERROR_HALTED * is_faulted, 0, 0, 0, _NO_OWNER)))

@@ -1,0 +1,88 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is odd about settings that are valid: they are run with, and somebody may wonder later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+
+from abdf1_ros.df1.master_line import MIN_RESPONSE_TIME
+from abdf1_ros.errors import Problem
+from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.station_lists import octal_remarks
+
+_ACK_SIZE = 2
+
+
+def network_remarks(network: Network) -> Iterator[str]:
+    """Yield what is odd about the settings of a line."""
+    yield from network.remarks
+    if network.data_bits < 8:
+        yield (f'Data_Bits {network.data_bits}: DF1 sends bytes of 8 bits; with less the check of '
+               'nearly every message fails')
+    if network.mode != 'Slave':
+        yield from _time_remarks(network)
+
+
+def _time_remarks(network: Network) -> Iterator[str]:
+    least = (MIN_RESPONSE_TIME + _ACK_SIZE * network.timing.char_time) * 1000
+    if network.timeout < least:
+        yield (f'Timeout {network.timeout} ms: an ACK takes {least:.0f} ms on this line, '
+               f'{MIN_RESPONSE_TIME * 1000:.0f} ms until a station answers and two characters at '
+               f'{network.baud} baud; answers may come too late')
+    if network.timeout >= network.cmd_timeout:
+        yield (f'Timeout {network.timeout} ms is not shorter than Cmd_Timeout '
+               f'{network.cmd_timeout} ms: after one lost frame there is no time to repeat it')
+    # Before the reply come the command and, in half duplex, the poll.
+    times = 1 if network.mode == 'Peer' else 2
+    if times * network.tx_delay >= network.cmd_timeout:
+        yield (f'TX_Delay {network.tx_delay} ms comes {"once" if times == 1 else "twice"} before '
+               f'a reply can come, which is all of Cmd_Timeout {network.cmd_timeout} ms')
+
+
+def row_remarks(row: Row, mapping: Mapping) -> Iterator[str]:
+    """Yield what is odd about a row of the map, each with its place."""
+    yield from octal_remarks(row)
+    yield from _name_remarks(row, mapping)
+    if not mapping.writes:
+        return
+    if not mapping.serves and mapping.address.file_type is FileType.INPUT:
+        yield _at(row, 'Command', f'{mapping.address} is an input: the PLC overwrites what is '
+                                  'written there with its next scan')
+    if not mapping.serves and mapping.address.file_type is FileType.STATUS:
+        yield _at(row, 'Command', f'{mapping.address} is in the status file: a write may change '
+                                  'how the processor runs')
+    low, high = mapping.limits
+    if mapping.minimum < low and mapping.minimum != -math.inf:
+        yield _at(row, 'Min', f'Min {mapping.minimum:.10g} is below {low:.10g}, the least that '
+                              f'{mapping.type.value} can hold here')
+    if mapping.maximum > high and mapping.maximum != math.inf:
+        yield _at(row, 'Max', f'Max {mapping.maximum:.10g} is above {high:.10g}, the most that '
+                              f'{mapping.type.value} can hold here')
+
+
+def _name_remarks(row: Row, mapping: Mapping) -> Iterator[str]:
+    column = 'Topic' if row.get('Topic') else 'Tag'
+    text = row.get(column)
+    if text.strip('/') != mapping.topic:
+        yield _at(row, column, f'{column} "{text}" becomes the topic {mapping.topic}')
+
+
+def _at(row: Row, column: str, text: str) -> str:
+    return str(Problem(row.where(column), text))
