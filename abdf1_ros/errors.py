@@ -75,6 +75,14 @@ class NeverTaken(LinkError):
     message = Message.NTC_NAK_LIMIT_EXCEEDED
 
 
+class CommandExpired(LinkError):
+    """The command was too old to be sent, or to be sent once more."""
+
+    def __str__(self) -> str:
+        """Return that; the specification has no number for it."""
+        return 'too old to be sent once more' if self.sent else 'too old to be sent'
+
+
 class PortLost(LinkError):
     """The port failed or was closed while the transaction ran; the argument says how."""
 

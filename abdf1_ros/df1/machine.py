@@ -26,7 +26,7 @@ driving loop (a thread with a port, or a test with a virtual line) does this::
     machine.start(now)
     while ...:
         port.write(machine.data_to_send())
-        data = port.read(until=machine.deadline)  # but not before machine.spare_time is over
+        data = port.read(until=machine.next_call)  # but not before machine.spare_time is over
         machine.receive_data(data, now) if data else machine.handle_timeout(now)
 """
 
@@ -35,12 +35,13 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Duplex, FrameDecoder, Symbol
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
+from abdf1_ros.errors import CommandExpired
 
 
 class Step(NamedTuple):
@@ -50,12 +51,14 @@ class Step(NamedTuple):
     ``frame`` goes on the line (empty: only listen; None: rest until the time is up or
     ``Machine.wake``, deaf to a half-duplex line). ``timeout`` is in seconds from the moment the
     last byte has left (0: do not wait, None: no limit, KEEP: what is left of the time of the
-    last step). ``delay`` seconds pass before the frame goes out.
+    last step). ``delay`` seconds pass before the frame goes out. After ``expires`` (clock value
+    in s) it does not go out any more: CommandExpired is raised at the ``yield``.
     """
 
     frame: bytes | None
     timeout: float | None
     delay: float = 0.0
+    expires: float = math.inf
 
 
 # What an operating system or a device server may hold bytes of a frame back (s).
@@ -103,6 +106,16 @@ class _Incoming(NamedTuple):
     is_in_time: bool = False
 
 
+class Background(Protocol):
+    """What has to be done in time whatever the line is busy with."""
+
+    def expire(self, now: float) -> None:
+        """Do what needs no line, such as ending what has waited too long for it."""
+
+    def next_expiry(self) -> float | None:
+        """Return when there is something to do next (clock value in s), None for never."""
+
+
 class Machine:
     """
     Run one procedure over one line.
@@ -116,7 +129,8 @@ class Machine:
     All others come from ``data_to_send``.
 
     ``reply_size`` is the bytes behind the header of the reply that is waited for, if it tells no
-    error; 0 where that is not known.
+    error; 0 where that is not known. ``late`` is the sum of the seconds by which it was called
+    after a deadline of its procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -128,6 +142,8 @@ class Machine:
         self.deadline: float | None = None
         self.send_at_once: Callable[[bytes], None] | None = None
         self.reply_size = 0
+        self.background: Background | None = None
+        self.late = 0.0
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
@@ -144,6 +160,14 @@ class Machine:
         self._echo_due = 0
         self._due = -math.inf  # the deadline, before a message was heard out
         self._message = _Incoming()
+
+    @property
+    def next_call(self) -> float | None:
+        """Return when to call ``handle_timeout`` (clock value in s), None for never."""
+        expiry = self.background.next_expiry() if self.background else None
+        if expiry is None or self.deadline is None:
+            return self.deadline if expiry is None else expiry
+        return min(expiry, self.deadline)
 
     @property
     def char_time(self) -> float:
@@ -226,10 +250,14 @@ class Machine:
         self.deadline = max(self.deadline, min(now + self._pause_limit, limit))
 
     def handle_timeout(self, now: float) -> None:
-        """Take note that the clock reads ``now``; does nothing before the deadline."""
+        """Take note that the clock reads ``now``; does nothing before ``next_call``."""
         self.now = now
+        if self.background is not None and (expiry := self.background.next_expiry()) is not None \
+                and expiry <= now:
+            self.background.expire(now)
         if self.deadline is None or now < self.deadline:
             return
+        self.late += now - self.deadline
         if self._pending is not None:
             self._transmit(self._pending)
         else:
@@ -249,6 +277,8 @@ class Machine:
     def wake(self, now: float) -> None:
         """End a rest early: there may be something new to do."""
         self.now = now
+        if self.background is not None and self._procedure is not None:
+            self.background.expire(now)
         if self._resting:
             self._resume(None)
             self._deliver_symbols()
@@ -282,17 +312,19 @@ class Machine:
         """Tell whether what comes now proves that what we have sent has left."""
         return self._is_half_duplex or symbol in _RESPONSES
 
-    def _resume(self, symbol: Symbol | None) -> None:
+    def _resume(self, symbol: Symbol | None, error: CommandExpired | None = None) -> None:
         """Run the procedure up to a step that has to wait."""
         procedure = self._procedure
         while procedure is not None:
             try:
-                step = procedure.send(symbol)
+                step = procedure.throw(error) if error else procedure.send(symbol)
             except StopIteration:
                 self._procedure, self.deadline = None, None
                 return
-            symbol = None
-            if not self._take_step(step):
+            symbol, error = None, None
+            if self.now > step.expires:
+                error = CommandExpired()
+            elif not self._take_step(step):
                 return
 
     def _take_step(self, step: Step) -> bool:
@@ -327,7 +359,9 @@ class Machine:
 
     def _transmit(self, step: Step) -> None:
         self._pending, self.deadline = None, self._kept_deadline
-        if self._put_on_line(step):
+        if self.now > step.expires:
+            self._resume(None, CommandExpired())
+        elif self._put_on_line(step):
             self._resume(None)
 
     def _set_deadline(self, timeout: float | None, start: float) -> None:

@@ -38,6 +38,7 @@ Messages between slaves that are to be passed on take turns with transactions of
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+import math
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Symbol
@@ -46,7 +47,7 @@ from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, T
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
+from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
 
@@ -83,7 +84,11 @@ class HalfDuplexMaster:
 
     def _carry_out(self, task: Task) -> Talk:
         try:
-            reply = yield from self.exchange(task.command, reply_size=task.reply_size)
+            reply = yield from self.exchange(task.command, reply_size=task.reply_size,
+                                             expires=task.expires)
+        except CommandExpired as error:
+            task.sent = error.sent
+            task.fail(error)
         except (StationInactive, CommandTimeout, WrongCommandCode) as error:
             task.sent = self.command_sent
             task.fail(error)
@@ -94,16 +99,17 @@ class HalfDuplexMaster:
             task.reply(reply)
 
     def exchange(self, command: Packet, station: int | None = None,
-                 reply_size: int = 0) -> Generator[Step, Symbol | None, Packet]:
+                 reply_size: int = 0, expires: float = math.inf
+                 ) -> Generator[Step, Symbol | None, Packet]:
         """
         Send ``command`` and return the reply to it.
 
         ``station`` is the address on this line; it differs from the command's DST only behind
-        a gateway (M 3-7). ``reply_size`` is that of a task. While this runs and after it,
-        ``command_sent`` tells whether the command has been on the line: without a reply its
-        outcome is then unknown. A broadcast has no reply; the one returned for it is our own.
+        a gateway (M 3-7). ``reply_size`` and ``expires`` are those of a task. While this runs and
+        after it, ``command_sent`` tells whether the command has been on the line: without a reply
+        its outcome is then unknown. A broadcast has no reply; the one returned for it is our own.
 
-        Raises StationInactive, CommandTimeout or WrongCommandCode.
+        Raises StationInactive, CommandTimeout, CommandExpired or WrongCommandCode.
         """
         number = command.dst if station is None else station
         started = self._machine.now
@@ -111,7 +117,7 @@ class HalfDuplexMaster:
         if number != BROADCAST and not self._stations[number].active:
             yield from self._line.revive(number)
         self.command_sent = True
-        yield from self._line.deliver(number, command)
+        yield from self._line.deliver(number, command, expires)
         if number == BROADCAST:
             return command.reply()
         try:

@@ -28,6 +28,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Generator
 from dataclasses import dataclass
+import math
 from typing import NoReturn, TypeGuard
 
 from abdf1_ros.df1 import frames
@@ -38,7 +39,7 @@ from abdf1_ros.df1.machine import LISTEN_ON, Machine, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.errors import StationInactive
+from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
 
 # What an operating system or USB adapter may hold a byte back; no wait is shorter, so that
@@ -116,7 +117,8 @@ class MasterLine:
         self._forwards: deque[Packet] = deque()
         self._next_revival = 0.0
 
-    def deliver(self, number: int, packet: Packet) -> Generator[Step, Symbol | None, None]:
+    def deliver(self, number: int, packet: Packet, expires: float = math.inf
+                ) -> Generator[Step, Symbol | None, None]:
         """Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12)."""
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self._count_sent(packet)
@@ -126,7 +128,12 @@ class MasterLine:
             return
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
-            answer = yield from self._ask(frame, number, _MESSAGE_ANSWERS)
+            try:
+                answer = yield from self._ask(frame, number, _MESSAGE_ANSWERS, 0.0, expires)
+            except CommandExpired as error:
+                self.counters.messages_sent -= 1
+                error.sent = retry > 1
+                raise
             if isinstance(answer, Control) and answer.code is Code.ACK:
                 self.stations.heard(number, self.machine.now)
                 return
@@ -201,7 +208,8 @@ class MasterLine:
         return answer
 
     def _ask(self, frame: bytes, number: int, wanted: tuple[Code, ...],
-             delay: float = 0.0) -> Generator[Step, Symbol | None, Symbol | None]:
+             delay: float = 0.0, expires: float = math.inf
+             ) -> Generator[Step, Symbol | None, Symbol | None]:
         """
         Send ``frame``; return a ``wanted`` control symbol, any slave's frame, or None.
 
@@ -210,7 +218,7 @@ class MasterLine:
         expected from then on, or that of our ACK would be taken for the next station's.
         """
         self._last_code = 0
-        step = Step(frame, self._timeout, delay)
+        step = Step(frame, self._timeout, delay, expires)
         while (symbol := (yield step)) is not None:
             step = LISTEN_ON
             if isinstance(symbol, Control):

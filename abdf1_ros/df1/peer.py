@@ -40,6 +40,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+import math
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
@@ -51,7 +52,12 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
+from abdf1_ros.errors import (
+    CommandExpired,
+    CommandTimeout,
+    StationInactive,
+    WrongCommandCode,
+)
 from abdf1_ros.messages import Event, Message
 
 # Repeated NAKs mostly mean that the other end is out of buffers: from the second on, each
@@ -159,9 +165,15 @@ class FullDuplexPeer:
         self._counters.commands_sent += 1
         task.sent = True
         # A station that did not answer last time gets one try, not a whole cycle of them.
-        delivered = yield from self._transfer(
-            task.command, lambda: key not in self._outstanding,
-            is_probe=not self._stations[number].active)
+        try:
+            delivered = yield from self._transfer(
+                task.command, lambda: key not in self._outstanding,
+                is_probe=not self._stations[number].active, expires=task.expires)
+        except CommandExpired as error:
+            if self._outstanding.pop(key, None):
+                task.sent = error.sent
+                task.fail(error)
+            return
         if delivered is not None:
             entry.deadline = delivered + self._settings.cmd_timeout
         elif self._outstanding.pop(key, None):
@@ -175,7 +187,8 @@ class FullDuplexPeer:
         yield from self._transfer(reply, lambda: False, is_probe=False)
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
-                  is_probe: bool) -> Generator[Step, Symbol | None, float | None]:
+                  is_probe: bool, expires: float = math.inf
+                  ) -> Generator[Step, Symbol | None, float | None]:
         """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
         station = packet.dst
@@ -183,7 +196,13 @@ class FullDuplexPeer:
         sending = message
         while True:
             self._counters.messages_sent += sending is message
-            response = yield from self._response(sending, is_answered)
+            try:
+                response = yield from self._response(
+                    sending, is_answered, expires if sending is message else math.inf)
+            except CommandExpired as error:
+                self._counters.messages_sent -= 1
+                error.sent = naks + enqs > 0
+                raise
             if response in (Code.ACK, Code.STX):
                 break
             if response is Code.NAK:
@@ -221,11 +240,11 @@ class FullDuplexPeer:
             yield from self._listen(_LATE_ACK)
         return delivered
 
-    def _response(self, sending: bytes,
-                  is_answered: Callable[[], bool]) -> Generator[Step, Symbol | None, Code | None]:
+    def _response(self, sending: bytes, is_answered: Callable[[], bool],
+                  expires: float) -> Generator[Step, Symbol | None, Code | None]:
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
         self._machine.decoder.last_byte = 0
-        symbol = yield Step(sending, self._timeout)
+        symbol = yield Step(sending, self._timeout, expires=expires)
         while symbol is not None:
             if symbol in (Control(Code.ACK), Control(Code.NAK)):
                 assert isinstance(symbol, Control)

@@ -52,7 +52,13 @@ from abdf1_ros.df1.master_line import (
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
+from abdf1_ros.errors import (
+    CommandExpired,
+    CommandTimeout,
+    LinkError,
+    StationInactive,
+    WrongCommandCode,
+)
 from abdf1_ros.messages import Event, Message
 
 # "At least four" may leave between two polls (1766-RM001).
@@ -301,7 +307,7 @@ class StandardPollingMaster:
         else:
             task.reply(reply)
 
-    def _end(self, number: int, error: StationInactive | CommandTimeout) -> None:
+    def _end(self, number: int, error: LinkError) -> None:
         """End the command that waits for a reply of a station, if there is one."""
         entry = self._outstanding.pop(number, None)
         if entry is not None:
@@ -342,6 +348,9 @@ class StandardPollingMaster:
         self._outstanding[number] = _Outstanding(
             task, self._machine.now + self._settings.cmd_timeout)
         try:
-            yield from self._line.deliver(number, task.command)
+            yield from self._line.deliver(number, task.command, task.expires)
         except StationInactive as error:
+            self._end(number, error)
+        except CommandExpired as error:
+            task.sent = error.sent
             self._end(number, error)

@@ -31,7 +31,7 @@ from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandTimeout, LinkError, WrongCommandCode
+from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
 # How often (s) a slave looks what has become overdue.
@@ -96,8 +96,13 @@ class SlaveLink:
         """Take note that the master has polled us."""
         self.last_poll = self._machine.now
         entry = self._outstanding
-        if entry is not None and not entry.is_delivered:
-            entry.deadline = self.last_poll + self._cmd_timeout
+        if entry is None or entry.is_delivered:
+            return
+        entry.deadline = self.last_poll + self._cmd_timeout
+        if self.last_poll > entry.task.expires:
+            self._outstanding = None
+            self._slave.withdraw()
+            entry.task.fail(CommandExpired())
 
     def next_command(self) -> Packet | None:
         """Return a command to send now, one at a time."""

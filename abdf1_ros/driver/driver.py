@@ -41,17 +41,28 @@ from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler, waited_too_long
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.transactions import carry_out
-from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.errors import CommandExpired, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.status import is_address_fault
-from abdf1_ros.plan.forecast import intervals, line_model, longest_wait, scan_time
+from abdf1_ros.plan.forecast import (
+    block_time,
+    intervals,
+    line_model,
+    longest_transaction,
+    longest_wait,
+    scan_time,
+)
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
+
+# A read of several packets lets others go between them. On a busy line so many times its own time
+# passes until it has had all its turns.
+_TURNS_OF_A_READ = 10
 
 _NOT_OPEN = 'the port is not open'
 
@@ -93,10 +104,15 @@ class Driver:
         self.is_online = False
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._has_begun_write = False
-        self._tasks = JobTasks(network.station, settings.first_tns)
+        timing = network.timing
+        # The waiting before a transmission is wanted: before a probe, and before the command.
+        self._tasks = JobTasks(
+            network.station, settings.first_tns, settings.write_timeout + 2 * timing.tx_delay,
+            timing.char_time)
         self._settings = settings
         self._listener = listener
         self._served = self._make_served()
+        self.machine.background = self
         self.link = make_link(network, settings, self.machine, self.stations,
                               self._serve, listener.happened)
         planner = Planner(line_model(network), settings.default_period)
@@ -215,7 +231,8 @@ class Driver:
         return Served(plc_type, self.mappings, self._serve_written, counters, mode == 'Peer')
 
     def _job(self, block: Block) -> ReadJob:
-        return ReadJob(block, [self.points[mapping] for mapping in block.mappings])
+        longest = longest_transaction(self.network) + _TURNS_OF_A_READ * block_time(block)
+        return ReadJob(block, [self.points[mapping] for mapping in block.mappings], longest)
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command: of a write first, but after some in a row of anything else."""
@@ -231,33 +248,42 @@ class Driver:
             write = self._scheduler.next_write(now, busy)
         self._has_begun_write = write is not None
         if write is not None:
-            return self._tasks.start(write.mapping.station, self._write_steps(write))
+            return self._tasks.start(write.mapping.station, self._write_steps(write), now,
+                                     requested=write.requested)
         if under_way is None:
             return None
         self._scheduler.write_goes_on()
-        return self._tasks.take(under_way)
+        return self._tasks.take(under_way, now)
 
     def _next_other(self, now: float, busy: Container[int]) -> Task | None:
         """Return the next check or read."""
         check = self.health.next_check(now, busy)
         if check is not None:
-            return self._tasks.start(check.station, self.health.steps(check))
+            return self._tasks.start(check.station, self.health.steps(check), now)
         job = self._scheduler.next_read(now, busy)
         if job is None:
             return None
-        return self._tasks.start(job.station, self._read_steps(job, now), job.reply_size)
+        return self._tasks.start(
+            job.station, self._read_steps(job, now), now, reply_size=job.reply_size)
 
     def next_due(self) -> float | None:
         """Return when there is something to do next (clock value in s), None for never."""
-        moments = (self._scheduler.next_due(), self.health.next_due(),
-                   self._read_backs.next_due())
+        moments = self._scheduler.next_due(), self.health.next_due()
         return min((moment for moment in moments if moment is not None), default=None)
 
     def expire(self, now: float) -> None:
         """Do what needs no line: store what we serve, end what has waited too long for it."""
         self._sort_inbox(now)
         self._scheduler.expire(now)
+        self._tasks.expire(now)
         self._read_backs.expire(now)
+
+    def next_expiry(self) -> float | None:
+        """Return when ``expire`` has something to do (clock value in s), None for never."""
+        due = self._read_backs.next_due()
+        first = min(self._scheduler.next_expiry(), self._tasks.next_expiry(),
+                    math.inf if due is None else due)
+        return None if math.isinf(first) else first
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
@@ -324,7 +350,7 @@ class Driver:
     def _read_steps(self, job: ReadJob, now: float) -> Steps:
         """Read one packet of a job."""
         try:
-            data = yield from job.read_on(now)
+            data = yield from job.read_on(now, self.machine.late)
         except RemoteError as error:
             self.stations[job.station].remote_errors += 1
             self._read_failed(job, str(error), is_address_fault(error))
@@ -333,7 +359,12 @@ class Driver:
         except LinkError as error:
             self._link_failed(job.station, job.points, error)
         else:
-            if data is not None:
+            reason = job.why_too_old(self.machine.now, self.machine.late)
+            if reason:
+                job.begin_anew()
+                for point in job.points:
+                    point.fail(f'read again: {reason}')
+            elif data is not None:
                 self._read_done(job, data)
         finally:
             self._scheduler.finished(job, self.machine.now)
@@ -406,7 +437,7 @@ class Driver:
             self._read_backs.add(write, ending, self.blocks, self.machine.now)
         else:
             self._end_write(write, ending.outcome, ending.detail)
-        if isinstance(ending.error, LinkError):
+        if isinstance(ending.error, LinkError) and not isinstance(ending.error, CommandExpired):
             self._link_failed(station, (), ending.error)
             if station != BROADCAST and not self.stations[station].active:
                 self._scheduler.unanswered(self.machine.now)

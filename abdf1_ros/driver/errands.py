@@ -101,9 +101,9 @@ class Errands:
         """Return the next command of the order under way, or the first of the next one."""
         under_way = self._tasks.waiting(busy)
         if under_way is not None:
-            return self._tasks.take(under_way)
+            return self._tasks.take(under_way, now)
         errand = next(self._waiting.take(), None)
-        return self._tasks.start(errand.station, errand.steps()) if errand else None
+        return self._tasks.start(errand.station, errand.steps(), now) if errand else None
 
     def next_due(self) -> float | None:
         """Return None: nothing comes by itself."""

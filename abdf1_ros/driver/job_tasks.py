@@ -24,10 +24,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Generator
 from inspect import GEN_CLOSED, getgeneratorstate
+import math
 from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import LinkError
+from abdf1_ros.errors import CommandExpired, LinkError
 from abdf1_ros.pccc.dialect import Request
 
 Steps = Generator[Request, Packet, None]
@@ -40,10 +41,15 @@ class JobTasks:
     All jobs under way, and the transaction numbers of their commands.
 
     ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts
-    the replies.
+    the replies. A command of a job that was ``requested`` at a moment is sent within
+    ``patience`` seconds of it, or of the command before it, whose own time on the line, at
+    ``char_time`` s a character, does not count.
     """
 
-    def __init__(self, station: int, first_tns: int) -> None:
+    def __init__(self, station: int, first_tns: int, patience: float = math.inf,
+                 char_time: float = 0.0) -> None:
+        self.patience = patience
+        self.char_time = char_time
         self.transactions = 0
         self._station = station
         self._tns = first_tns
@@ -51,9 +57,16 @@ class JobTasks:
         self._tasks: set[JobTask] = set()
         self._waiting: deque[JobTask] = deque()
 
-    def start(self, station: int, steps: Steps, reply_size: int = 0) -> JobTask:
-        """Return the task of a new job, with its first command, whose reply has that size."""
-        task = JobTask(self, station, steps, reply_size)
+    def start(self, station: int, steps: Steps, now: float, *, reply_size: int = 0,
+              requested: float | None = None) -> JobTask:
+        """
+        Return the task of a new job, with its first command, whose reply has that size.
+
+        What somebody has ``requested`` is not sent any more when it is too old; all else is.
+        """
+        expires = math.inf if requested is None else requested + self.patience
+        task = JobTask(self, station, steps, reply_size, expires)
+        task.taken = now
         self._tasks.add(task)
         return task
 
@@ -61,10 +74,21 @@ class JobTasks:
         """Return a task whose next command waits to be sent, but not to a ``busy`` station."""
         return next((task for task in self._waiting if task.station not in busy), None)
 
-    def take(self, task: JobTask) -> JobTask:
+    def take(self, task: JobTask, now: float) -> JobTask:
         """Return a waiting task that is now to be sent."""
         self._waiting.remove(task)
+        task.taken = now
         return task
+
+    def expire(self, now: float) -> None:
+        """End the jobs whose next command has waited too long."""
+        for task in [task for task in self._waiting if now >= task.expires]:
+            self._waiting.remove(task)
+            task.fail(CommandExpired())
+
+    def next_expiry(self) -> float:
+        """Return when a waiting command will have waited too long (clock value in s)."""
+        return min((task.expires for task in self._waiting), default=math.inf)
 
     def fail(self, error: LinkError) -> None:
         """End every job with ``error``."""
@@ -94,11 +118,14 @@ class JobTasks:
 
 
 class JobTask:
-    """A job as the link sees it."""
+    """A job as the link sees it; ``taken`` is when the link took its command."""
 
-    def __init__(self, tasks: JobTasks, station: int, steps: Steps, reply_size: int) -> None:
+    def __init__(self, tasks: JobTasks, station: int, steps: Steps, reply_size: int,
+                 expires: float) -> None:
         self.sent = False
         self.reply_size = reply_size
+        self.expires = expires
+        self.taken = 0.0
         self.station = station
         self._tasks = tasks
         self._steps = steps
@@ -126,5 +153,8 @@ class JobTask:
             self._tasks.advanced(self, is_done=True)
             raise
         self.sent, self.reply_size = False, 0
+        if self.expires < math.inf:
+            line_time = len(self.command.encode()) * self._tasks.char_time
+            self.expires = max(self.expires, self.taken + line_time + self._tasks.patience)
         self.command = self._tasks.new_command(self.station, request)
         self._tasks.advanced(self, is_done=False)

@@ -44,6 +44,10 @@ from abdf1_ros.plan.planner import Block
 _TURNS = 4
 _MOST_ENTRIES = 4  # for each read
 
+# A reply that was waited for so much longer (s) than there is any reason to tells of the past:
+# this process was paused, or its host, and nobody knows how long the reply has lain there.
+MOST_LATE = 0.2
+
 
 class ReadJob:
     """
@@ -52,11 +56,14 @@ class ReadJob:
     ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
     between its last two good reads and ``longest`` the greatest of these; an outage of the
     station does not count. ``is_hastened`` tells that a write has changed what it shows, the
-    last time at ``hastened``. ``started`` is when the read under way or the last one began.
+    last time at ``hastened``. ``started`` is when the read under way or the last one began, and
+    ``late`` what ``Machine.late`` was then. Packets that come within ``longest_read`` seconds are
+    of one read. ``is_to_repeat`` tells that the last read was dropped.
     ``ticket`` is the queue's: the entry that counts.
     """
 
-    def __init__(self, block: Block, points: Sequence[ReadPoint]) -> None:
+    def __init__(self, block: Block, points: Sequence[ReadPoint],
+                 longest_read: float = math.inf) -> None:
         self.block = block
         self.points = tuple(points)
         # Needed at every read, and always the same.
@@ -69,6 +76,9 @@ class ReadJob:
         self.is_hastened = False
         self.hastened = -math.inf
         self.started = 0.0
+        self.late = 0.0
+        self.is_to_repeat = False
+        self._longest_read = longest_read
         self.ticket = 0
         self._last_done: float | None = None
         self._packets: list[bytes] = []
@@ -88,7 +98,7 @@ class ReadJob:
         """Tell whether there are packets already, and more to come."""
         return bool(self._packets)
 
-    def read_on(self, now: float) -> Generator[Request, Packet, bytes | None]:
+    def read_on(self, now: float, late: float) -> Generator[Request, Packet, bytes | None]:
         """
         Read one packet; return all words after the last, None before.
 
@@ -97,12 +107,31 @@ class ReadJob:
         packets, self._packets = self._packets, []
         number = len(packets)
         if not number:
-            self.started = now
+            self.started, self.late, self.is_to_repeat = now, late, False
         packets.append((yield from read_packet(self.block, number, self._commands[number])))
         if len(packets) == len(self._commands):
             return b''.join(packets)
         self._packets = packets
         return None
+
+    def why_too_old(self, now: float, late: float) -> str:
+        """
+        Return why what has been read is not worth having, empty where it is.
+
+        Between its first command and now all of this process has stood still, or so much else
+        has had the line that the words of one value would be of different ages.
+        """
+        if late - self.late > MOST_LATE:
+            return f'this process, or its host, stood still for {late - self.late:.1f} s'
+        spent = now - self.started
+        if len(self._commands) > 1 and spent > self._longest_read:
+            return f'its packets took {spent:.1f} s, more than {self._longest_read:.1f} s'
+        return ''
+
+    def begin_anew(self) -> None:
+        """Drop what has been read; all of it is due again."""
+        self._packets = []
+        self.is_to_repeat = True
 
     def done(self, now: float) -> None:
         """Take note of a good read."""

@@ -29,6 +29,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Iterable
 import itertools
+import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
@@ -64,6 +65,7 @@ class Scheduler:
         self._writes: deque[Write] = deque()
         self._writes_under_way: list[Write] = []
         self._writes_in_a_row = 0
+        self._next_expiry = math.inf
         self._reads = ReadQueue()
         self._parked: dict[int, deque[ReadJob]] = {}
         self._next_probe = 0.0
@@ -149,15 +151,26 @@ class Scheduler:
 
     def expire(self, now: float) -> None:
         """End the writes that have waited too long."""
+        self._next_expiry = math.inf
         for write in list(self._writes):
             detail = self._hindrance(write, now)
             if detail:
                 self._writes.remove(write)
                 self._report(write.result(Outcome.NOT_SENT, detail, now))
+            else:
+                self._next_expiry = min(self._next_expiry, self._expiry(write))
+
+    def next_expiry(self) -> float:
+        """Return when ``expire`` has something to do (clock value in s), infinite for never."""
+        return self._next_expiry
+
+    def _expiry(self, write: Write) -> float:
+        """Return the clock value (s) after which a write is too old."""
+        return write.requested + self._write_timeout
 
     def _hindrance(self, write: Write, now: float) -> str:
         """Return why a write is not to be sent any more, empty if it is."""
-        if now - write.requested > self._write_timeout:
+        if now >= self._expiry(write):
             return waited_too_long(self._write_timeout)
         station = write.mapping.station
         # A write has just found it inactive, and others want the line.
@@ -201,7 +214,7 @@ class Scheduler:
             self._park(job)
             return
         self.release(job.station, now)
-        if job.is_under_way:
+        if job.is_under_way or job.is_to_repeat:
             self._reads.put(job, job.due)
         elif job.started < job.hastened:  # it had begun before the write
             self._reads.put(job, now)
@@ -257,6 +270,7 @@ class Scheduler:
         in between of the same words is overtaken: then the older value goes out as well, or two
         such topics would put each other off for ever.
         """
+        self._next_expiry = min(self._next_expiry, self._expiry(write))
         older = [] if write.is_pulse else [
             old for old in self._writes if old.mapping is write.mapping]
         if not older:

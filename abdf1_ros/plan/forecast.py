@@ -87,6 +87,16 @@ def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_
                default=0.0)
 
 
+def longest_transaction(network: Network) -> float:
+    """
+    Return the seconds that a transaction takes at most, every repetition included (S0).
+
+    What the frames take on the line comes on top.
+    """
+    tries = network.nak_retries + 1 + network.enq_retries + 1
+    return (tries * network.timeout + network.cmd_timeout) / 1000
+
+
 def needed_baud(network: Network, mappings: Iterable[Mapping], default_period: float,
                 response_time: float = USUAL_RESPONSE_TIME) -> int | None:
     """Return the lowest baud rate at which every period can be kept; None: not at any."""

@@ -354,7 +354,7 @@ class LinkThread(threading.Thread):
             self._while_sending()
             if is_terminal and (spare_time := machine.spare_time):
                 self._pause(spare_time)
-            deadline = machine.deadline
+            deadline = machine.next_call
             timeout = None if deadline is None else max(0.0, deadline - clock())
             data = self._read(port, timeout)
             # First: after a pause of this process the answer that lies in the buffer came too

@@ -107,6 +107,7 @@ class Sending:
         self.command = command
         self.sent = False
         self.reply_size = 0
+        self.expires = math.inf
         self._report = report
 
     def reply(self, packet: Packet) -> None:

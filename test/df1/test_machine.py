@@ -35,6 +35,7 @@ from abdf1_ros.df1.frames import (
 )
 from abdf1_ros.df1.machine import KEEP, LineTiming, LISTEN_ON, Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import CommandExpired
 import pytest
 
 FRAME = b'0123456789'
@@ -563,3 +564,90 @@ def iter_steps(*steps: Step) -> Procedure:
     """Return a procedure of ``steps`` that does not care for answers."""
     for step in steps:
         yield step
+
+
+class Asked:
+    """A procedure that sends a command which expires, and what it was told."""
+
+    def __init__(self, expires: float, delay: float = 0.0) -> None:
+        self.told: list[str] = []
+        self._step = Step(FRAME, 1.0, delay, expires)
+        self.machine = Machine(self.run, checksum=Checksum.CRC)
+
+    def run(self, machine: Machine) -> Procedure:
+        """Send until the command has expired."""
+        try:
+            while True:
+                yield self._step
+                self.told.append('silence')
+        except CommandExpired:
+            self.told.append('expired')
+        yield Step(None, None)
+
+
+def test_command_that_has_expired_does_not_leave() -> None:
+    asked = Asked(expires=4.0)
+    asked.machine.start(5.0)
+    assert (asked.told, asked.machine.data_to_send()) == (['expired'], b'')
+
+
+def test_command_that_expires_before_its_repetition_is_not_repeated() -> None:
+    asked = Asked(expires=5.5)
+    asked.machine.start(5.0)
+    assert asked.machine.data_to_send() == FRAME
+    asked.machine.handle_timeout(6.0)
+    assert (asked.told, asked.machine.data_to_send()) == (['silence', 'expired'], b'')
+
+
+def test_command_that_expires_while_it_waits_for_its_delay_does_not_leave() -> None:
+    asked = Asked(expires=5.5, delay=0.25)
+    asked.machine.start(5.0)
+    asked.machine.handle_timeout(9.0)  # a pause
+    assert (asked.told, asked.machine.data_to_send()) == (['expired'], b'')
+
+
+def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), Step(FRAME, 1.0), Step(None, None))
+    bench.machine.start(0.0)
+    bench.machine.handle_timeout(0.5)
+    bench.machine.handle_timeout(1.25)
+    bench.machine.receive_data(ACK, 2.0)
+    assert bench.machine.late == 0.25
+    bench.machine.handle_timeout(5.0)
+    assert bench.machine.late == 2.25
+
+
+class Clockwork:
+    """Something that has to be done at a time, whatever the line does."""
+
+    def __init__(self, due: float | None) -> None:
+        self.due = due
+        self.done: list[float] = []
+
+    def expire(self, now: float) -> None:
+        """Do it once."""
+        self.done.append(now)
+        self.due = None
+
+    def next_expiry(self) -> float | None:
+        """Return when."""
+        return self.due
+
+
+@pytest.mark.parametrize('due, call', [(None, 2.0), (1.5, 1.5), (3.0, 2.0)])
+def test_background_has_its_time_while_a_step_waits(due: float | None, call: float) -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(None, None))
+    bench.machine.background = clockwork = Clockwork(due)
+    bench.machine.start(1.0)
+    assert bench.machine.next_call == call
+    bench.machine.handle_timeout(1.75)
+    assert clockwork.done == ([1.75] if due == 1.5 else [])
+    assert bench.got == []
+
+
+def test_background_is_asked_when_the_machine_is_woken() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(None, None))
+    bench.machine.background = clockwork = Clockwork(None)
+    bench.machine.start(1.0)
+    bench.machine.wake(1.5)
+    assert clockwork.done == [1.5]

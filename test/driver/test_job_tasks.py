@@ -16,12 +16,15 @@
 
 from __future__ import annotations
 
+import math
+
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.errors import CommandTimeout, LinkError, PortLost
 import pytest
 
 OURS = 5
+NOW = 50.0
 
 
 class Job:
@@ -42,13 +45,13 @@ class Job:
 
 def test_job_is_one_command_after_the_other() -> None:
     job, tasks = Job(), JobTasks(OURS, 0x10)
-    task = tasks.start(1, job.steps())
+    task = tasks.start(1, job.steps(), NOW)
     assert task.command == Packet(1, OURS, 0x0F, 0, 0x11, b'a')
     assert tasks.waiting(()) is None  # whoever has started it sends it
     task.sent = True
     task.reply(task.command.reply(b'one'))
     assert (tasks.waiting((1,)), tasks.waiting((2,))) == (None, task)
-    assert tasks.take(task) is task
+    assert tasks.take(task, NOW) is task
     assert tasks.waiting(()) is None
     assert (task.command, task.sent) == (Packet(1, OURS, 0x0F, 0, 0x12, b'b'), False)
     task.reply(task.command.reply(b'two'))
@@ -57,7 +60,7 @@ def test_job_is_one_command_after_the_other() -> None:
 
 
 def test_size_of_the_reply_is_that_of_the_first_command() -> None:
-    task = JobTasks(OURS, 0).start(1, Job().steps(), 20)
+    task = JobTasks(OURS, 0).start(1, Job().steps(), NOW, reply_size=20)
     assert task.reply_size == 20
     task.reply(task.command.reply(bytes(20)))
     assert task.reply_size == 0
@@ -65,11 +68,11 @@ def test_size_of_the_reply_is_that_of_the_first_command() -> None:
 
 def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
     job, tasks = Job(), JobTasks(OURS, 0)
-    task = tasks.start(1, job.steps())
+    task = tasks.start(1, job.steps(), NOW)
     task.fail(CommandTimeout())
     assert [error.sent for error in job.errors] == [False]
     other = Job()
-    task = tasks.start(1, other.steps())
+    task = tasks.start(1, other.steps(), NOW)
     task.sent = True
     task.fail(CommandTimeout())
     assert [error.sent for error in other.errors] == [True]
@@ -78,7 +81,7 @@ def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
 
 def test_all_jobs_end_with_the_port() -> None:
     jobs, tasks = (Job(), Job()), JobTasks(OURS, 0)
-    first, _ = (tasks.start(station, job.steps()) for station, job in enumerate(jobs))
+    first, _ = (tasks.start(station, job.steps(), NOW) for station, job in enumerate(jobs))
     first.reply(first.command.reply(b'one'))
     tasks.fail(PortLost('unplugged'))
     assert [str(error) for job in jobs for error in job.errors] == ['port lost: unplugged'] * 2
@@ -91,7 +94,7 @@ def test_error_in_a_job_ends_it() -> None:
         raise ZeroDivisionError
 
     tasks = JobTasks(OURS, 0)
-    task = tasks.start(1, steps())
+    task = tasks.start(1, steps(), NOW)
     with pytest.raises(ZeroDivisionError):
         task.reply(task.command.reply())
     tasks.fail(PortLost('unplugged'))  # there is nothing left to be ended
@@ -114,7 +117,35 @@ def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> 
 def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
     job, tasks = Job(), JobTasks(OURS, 0)
     steps = job.steps()
-    tasks.start(1, steps)
+    tasks.start(1, steps, NOW)
     steps.close()
     tasks.fail(PortLost('unplugged'))
     assert job.errors == []
+
+
+def test_job_that_nobody_has_asked_for_does_not_expire() -> None:
+    tasks = JobTasks(OURS, 0, patience=2.0)
+    task = tasks.start(1, Job().steps(), NOW)
+    task.reply(task.command.reply())
+    assert (task.expires, tasks.next_expiry()) == (math.inf, math.inf)
+
+
+def test_command_expires_by_the_request_or_by_the_command_before() -> None:
+    tasks = JobTasks(OURS, 0, patience=2.0, char_time=0.01)
+    task = tasks.start(1, Job().steps(), NOW, requested=NOW - 0.5)
+    assert task.expires == NOW + 1.5
+    size = len(task.command.encode())
+    task.reply(task.command.reply())
+    assert task.expires == pytest.approx(NOW + 2.0 + 0.01 * size)
+    assert tasks.next_expiry() == task.expires
+
+
+@pytest.mark.parametrize('after, errors', [(-0.001, 0), (0.0, 1), (4.0, 1)])
+def test_job_ends_whose_next_command_has_waited_too_long(after: float, errors: int) -> None:
+    job, tasks = Job(), JobTasks(OURS, 0, patience=2.0)
+    task = tasks.start(1, job.steps(), NOW, requested=NOW)
+    task.sent = True
+    task.reply(task.command.reply())
+    tasks.expire(task.expires + after)
+    assert [str(error) for error in job.errors] == ['too old to be sent'] * errors
+    assert (tasks.waiting(()) is None) == bool(errors)

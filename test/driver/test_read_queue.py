@@ -232,7 +232,7 @@ def test_packets_of_a_long_block_go_one_by_one_and_others_between_them() -> None
 
 def read_packet_of(job: ReadJob, now: float) -> bytes | None:
     """Have a job read its next packet; return what it returns."""
-    steps = job.read_on(now)
+    steps = job.read_on(now, 0.0)
     cmd, _ = next(steps)
     try:
         steps.send(Packet(0, 1, cmd | 0x40, 0, 1, bytes(2 * job.block.requests[0].words)))
@@ -246,7 +246,7 @@ def test_long_read_begins_anew_after_an_error() -> None:
     job = make_job(length=236)
     assert read_packet_of(job, 1.0) is None
     assert (job.is_under_way, job.started) == (True, 1.0)
-    steps = job.read_on(2.0)
+    steps = job.read_on(2.0, 0.0)
     next(steps)
     with pytest.raises(RemoteError):
         steps.throw(RemoteError(0x10, 0, 'refused'))

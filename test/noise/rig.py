@@ -66,6 +66,7 @@ class _WatchedTask:
     def __init__(self, task: Task, end: DriverEnd) -> None:
         self.command = task.command
         self.reply_size = task.reply_size
+        self.expires = task.expires
         self.begun = end.driver.machine.now
         self._task = task
         self._end = end

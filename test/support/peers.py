@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import asdict
+import math
 
 from abdf1_ros.df1.frames import Duplex, message_frame
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
@@ -39,6 +40,7 @@ class Errand:
         self.command = command
         self.sent = False
         self.reply_size = 0
+        self.expires = math.inf
         self.result: Packet | LinkError | None = None
         self.begun = clock()
         self.ended: float | None = None

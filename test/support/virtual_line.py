@@ -110,6 +110,10 @@ class VirtualLine:
         machine.wake(self.now)
         self._take(self._machines.index(machine))
 
+    def pause(self, machine: Machine, seconds: float) -> None:
+        """Stop a machine's process; what comes waits for it, as its own deadlines do."""
+        self._away[self._machines.index(machine)] = self.now + seconds
+
     def run(self, until: Callable[[], bool], limit: float) -> None:
         """Let time pass until ``until()``; fail after ``limit`` seconds, or when all is still."""
         end = self.now + limit
@@ -130,8 +134,8 @@ class VirtualLine:
         arrival = self._arrivals[0][0] if self._arrivals else math.inf
         first, deadline = -1, math.inf
         for index, machine in enumerate(self._machines):
-            if machine.deadline is not None:
-                due = max(machine.deadline, self._away[index])
+            if (moment := machine.next_call) is not None:
+                due = max(moment, self._away[index])
                 if due < deadline:
                     first, deadline = index, due
         if min(arrival, deadline) > end or first < 0 and not self._arrivals:
@@ -143,6 +147,7 @@ class VirtualLine:
                 return True
             if self.now == self._away[first]:
                 data += self._rest_for(first)
+                self._machines[first].handle_timeout(self.now)  # in the order of LinkThread
             self._machines[first].receive_data(data, self.now)
             self._away[first] = self.now + self._machines[first].spare_time
         else:
