@@ -35,6 +35,7 @@ import signal
 import sys
 import time
 
+from abdf1_ros.cli.sniff_report import ReportBundle
 from abdf1_ros.cli.terminal import (
     drop_output,
     interruptible,
@@ -78,6 +79,7 @@ examples:
   sniff line.cap.1 line.cap
   sniff --json line.cap | jq 'select(.latency_ms > 100)'
   sniff --summary --binary recorded.bin
+  sniff --report line.zip line.cap --settings net.csv map.csv
 """
 
 
@@ -88,6 +90,8 @@ class _Output:
         self._options = options
         self._session: Session | None = None
         self._summary = Summary(options.baud)
+        self._bundle = _bundle(options)
+        self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
         self._shows_progress = sys.stderr.isatty() and (
             options.summary or not sys.stdout.isatty())
@@ -129,6 +133,20 @@ class _Output:
         for entry in self.begin({}).finish():
             self._print(entry)
         self.sum_up()
+        if self._bundle:
+            self._write_bundle(self._bundle)
+
+    def _write_bundle(self, bundle: ReportBundle) -> None:
+        """Write what a report needs."""
+        path = self._options.report
+        try:
+            bundle.write(path, self._summary, self.begin({}).kind)
+        except OSError as error:
+            self.has_failed = True
+            _say(f'--report: {reason_of(error.filename or path, error)}')
+        else:
+            _say(f'{path}: what it holds is in its README.txt; look through it before you pass '
+                 'it on')
 
     def sum_up(self) -> None:
         """Print the summary."""
@@ -141,10 +159,17 @@ class _Output:
 
     def _print(self, entry: Entry) -> None:
         self._summary.add(entry)
+        if self._bundle:
+            self._bundle.add(entry)
         if self._options.json and not self._options.summary:
             print(json_line(entry))
         elif not self._options.summary:
             print(text_line(entry, self._colour))
+
+
+def _bundle(options: argparse.Namespace) -> ReportBundle | None:
+    return ReportBundle(options.files, options.settings, options.conformance,
+                        options.anonymous) if options.report else None
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -201,6 +226,15 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--summary', action='store_true', help='print the summary only')
     parser.add_argument('--save', metavar='FILE',
                         help='also write what a port or a tap hears into a capture')
+    parser.add_argument('--report', metavar='ZIP',
+                        help='make a bundle of captures for a report: bytes, words, summary, '
+                             'processors, versions')
+    parser.add_argument('--settings', metavar='FILE', nargs='+', default=[],
+                        help='net and map CSV for the bundle')
+    parser.add_argument('--conformance', metavar='FILE', nargs='+', default=[],
+                        help='results of conform for the bundle')
+    parser.add_argument('--anonymous', action='store_true',
+                        help='leave values, tags and topics out of the bundle')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end after so many seconds')
     options = parser.parse_args(args)
@@ -212,6 +246,10 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--save is for --port and --tap')
     if options.binary and not options.files:
         parser.error('--binary is for files')
+    if options.report and (not options.files or options.binary):
+        parser.error('--report is for captures: record one with --save, or trace_file of the node')
+    if not options.report and (options.settings or options.conformance or options.anonymous):
+        parser.error('--settings, --conformance and --anonymous are for --report')
     return options
 
 
@@ -246,7 +284,7 @@ def _decode_files(options: argparse.Namespace, output: _Output) -> int:
         _say(str(error))
     if not status or not output.is_empty:
         output.end()
-    return status
+    return EXIT_USAGE if output.has_failed else status
 
 
 def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:

@@ -1,0 +1,179 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The bundle of ``sniff --report``: what a report about a line needs, in one ZIP file.
+
+It holds no names of users or hosts. With ``is_anonymous`` it also leaves out what was in the data
+tables: the data of messages, and the names of tags and topics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+import csv
+from dataclasses import dataclass, field, replace
+from importlib.metadata import PackageNotFoundError, version
+import io
+import json
+from pathlib import Path
+import platform
+import re
+from zipfile import ZIP_DEFLATED, ZipFile
+
+from abdf1_ros.df1.listener import LineKind
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import Abdf1Error
+from abdf1_ros.pccc.diagnostic_status import decode_identity
+from abdf1_ros.sniffer.entries import Entry, Kind
+from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
+from abdf1_ros.sniffer.summary import Summary
+
+_STATUS_REQUEST = 0x06, b'\x03'  # CMD, and FNC as the first byte of its data
+
+# A bundle is to be mailed: of a long recording the first entries are told, the capture has all.
+_MOST_ENTRIES = 100_000
+
+_PRIVATE = re.compile('tag|topic', re.IGNORECASE)
+
+_CONTENTS = {
+    'summary.txt': 'what was seen on the line, counted',
+    'summary.json': 'the same for programs',
+    'processors.txt': 'what each processor says it is (its diagnostic status)',
+    'entries.txt': 'every poll, command and reply in words',
+    'entries.json': 'the same for programs, one a line, without the data of messages',
+    'versions.json': 'the versions of abdf1_ros, Python and the operating system',
+    'capture/': 'the bytes as they were recorded',
+    'settings/': 'the files given with --settings',
+    'conformance/': 'the files given with --conformance',
+}
+
+
+@dataclass(slots=True)
+class ReportBundle:
+    """
+    Collects what ``sniff`` decodes, then writes it.
+
+    ``captures`` are the recordings, ``settings`` net and map CSV, ``conformance`` results of
+    ``conform``. ``write`` raises OSError where a file cannot be read or written.
+    """
+
+    captures: Sequence[str]
+    settings: Sequence[str] = ()
+    conformance: Sequence[str] = ()
+    is_anonymous: bool = False
+    _entries: list[Entry] = field(default_factory=list)
+    _asked: set[tuple[int, int, int]] = field(default_factory=set)
+    _processors: dict[int, str] = field(default_factory=dict)
+
+    def add(self, entry: Entry) -> None:
+        """Take note of an entry."""
+        if len(self._entries) < _MOST_ENTRIES:
+            self._entries.append(entry)
+        packet = entry.packet
+        if packet is None or not entry.valid:
+            return
+        if entry.kind is Kind.COMMAND and (packet.cmd, packet.data) == _STATUS_REQUEST:
+            self._asked.add((packet.dst, packet.src, packet.tns))
+        elif entry.kind is Kind.REPLY and (packet.src, packet.dst, packet.tns) in self._asked:
+            self._take_status(packet)
+
+    def _take_status(self, reply: Packet) -> None:
+        if reply.sts:
+            return
+        try:
+            identity = decode_identity(reply.data)
+        except Abdf1Error as error:
+            self._processors[reply.src] = f'{reply.data.hex(" ")} ({error})'
+            return
+        faults = ', '.join((*identity.faults, *identity.remarks))
+        self._processors[reply.src] = (
+            f'{identity}{f"; {faults}" if faults else ""}; status {reply.data.hex(" ")}')
+
+    def write(self, path: str, summary: Summary, kind: LineKind) -> None:
+        """Write the bundle."""
+        texts = {
+            'summary.txt': '\n'.join(summary_lines(summary, kind)),
+            'summary.json': summary_json(summary, kind),
+            'processors.txt': '\n'.join(
+                f'station {station}: {text}'
+                for station, text in sorted(self._processors.items()))
+                or 'no diagnostic status was seen',
+            'versions.json': json.dumps(_versions(), indent=1)}
+        if self.is_anonymous:
+            texts['entries.json'] = '\n'.join(map(json_line, map(_without_data, self._entries)))
+        else:
+            texts['entries.txt'] = '\n'.join(map(text_line, self._entries))
+            texts |= {f'capture/{Path(name).name}': Path(name).read_text('ascii', 'replace')
+                      for name in self.captures}
+        for folder, names in (('settings', self.settings), ('conformance', self.conformance)):
+            for name in names:
+                text = Path(name).read_text('utf-8-sig', 'replace')
+                texts[f'{folder}/{Path(name).name}'] = (
+                    _without_names(text) if self.is_anonymous and folder == 'settings' else text)
+        with ZipFile(path, 'w', ZIP_DEFLATED) as bundle:
+            bundle.writestr('README.txt', self._readme(texts))
+            for name, text in texts.items():
+                bundle.writestr(name, text + '\n')
+
+    def _readme(self, names: Iterable[str]) -> str:
+        lines = ['A report about a DF1 line, made by "sniff --report" of abdf1_ros.', '',
+                 'What it holds:']
+        lines += [f'  {name:16} {text}' for name, text in _CONTENTS.items()
+                  if any(entry.startswith(name) for entry in names)]
+        lines += ['', 'It holds no names of users or hosts.']
+        if self.is_anonymous:
+            lines.append('It was made with --anonymous: the data of messages and the bytes of the '
+                         'recording are left out, tags and topics are numbered.')
+        else:
+            lines.append('The recording shows the values that were in the data tables. '
+                         '--anonymous leaves them out.')
+        return '\n'.join([*lines, ''])
+
+
+def _versions() -> dict[str, str]:
+    try:
+        ours = version('abdf1_ros')
+    except PackageNotFoundError:
+        ours = 'source tree'
+    return {'abdf1_ros': ours, 'python': platform.python_version(),
+            'system': f'{platform.system()} {platform.release()} {platform.machine()}'}
+
+
+def _without_data(entry: Entry) -> Entry:
+    """Return an entry without the data of its message, and without words that quote them."""
+    packet = entry.packet
+    if packet is None:
+        return replace(entry, text='')
+    # The first byte of a command is its FNC. The words before the colon are stations and TNS.
+    data = packet.data[:1] if entry.kind is Kind.COMMAND else b''
+    return replace(entry, packet=replace(packet, data=data), text=entry.text.partition(':')[0])
+
+
+def _without_names(text: str) -> str:
+    """Return a CSV with its tags and topics numbered; comments go."""
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
+    if not lines:
+        return ''
+    delimiter = max(',;\t', key=lines[0].count)
+    rows = list(csv.reader(lines, delimiter=delimiter))
+    private = {column: name.strip().lower() for column, name in enumerate(rows[0])
+               if _PRIVATE.search(name)}
+    out = io.StringIO()
+    writer = csv.writer(out, delimiter=delimiter, lineterminator='\n')
+    writer.writerow(rows[0])
+    for number, row in enumerate(rows[1:], 1):
+        writer.writerow([f'{private[column]}_{number}' if column in private and cell.strip()
+                         else cell for column, cell in enumerate(row)])
+    return out.getvalue().rstrip('\n')

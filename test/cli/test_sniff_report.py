@@ -1,0 +1,127 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bundle for a report, and what an anonymous one leaves out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from zipfile import ZipFile
+
+from abdf1_ros.cli.sniff import main
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+import pytest
+from support.vectors import pair
+
+READ = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
+WRITE = Packet(2, 5, 0x0F, 0, 0x1235, bytes.fromhex('AA 02 07 89 01 00 B7 2A'))
+
+
+def _frames() -> list[tuple[str, bytes]]:
+    said: list[tuple[str, bytes]] = []
+    for command, data in ((READ, bytes.fromhex('D2 04 FE FF')), (WRITE, b'')):
+        said += [('>', frames.master_frame(2, command.encode(), Checksum.CRC)),
+                 ('<', frames.ACK), ('>', frames.poll_frame(2)),
+                 ('<', frames.message_frame(command.reply(data).encode(), Checksum.CRC)),
+                 ('>', frames.ACK)]
+    return said
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> str:
+    path = tmp_path / 'line.cap'
+    lines = ['# abdf1_ros capture 1', '# baud: 9600', '# check: CRC', '# duplex: half']
+    lines += [f'{count / 100:.6f} {way} {data.hex(" ")}'
+              for count, (way, data) in enumerate(_frames())]
+    path.write_text('\n'.join([*lines, '']), encoding='ascii')
+    return str(path)
+
+
+def bundle_of(tmp_path: Path, capture: str, *options: str) -> dict[str, str]:
+    """Return the files of a bundle."""
+    (tmp_path / 'map.csv').write_text(
+        '# line of the paint shop\nTag,Command,Address,Station,PLC_Type,Topic\n'
+        'paint_booth,Read,N7:0,2,SLC,booth\n', encoding='utf-8')
+    (tmp_path / 'result.json').write_text('{"target": "slave"}', encoding='utf-8')
+    path = str(tmp_path / 'report.zip')
+    assert main([capture, '--summary', '--report', path, '--settings', str(tmp_path / 'map.csv'),
+                 '--conformance', str(tmp_path / 'result.json'), *options]) == 0
+    with ZipFile(path) as bundle:
+        return {name: bundle.read(name).decode() for name in bundle.namelist()}
+
+
+def test_bundle_has_all_that_a_report_needs(
+        tmp_path: Path, capture: str, capsys: pytest.CaptureFixture[str]) -> None:
+    files = bundle_of(tmp_path, capture)
+    assert set(files) == {
+        'README.txt', 'summary.txt', 'summary.json', 'processors.txt', 'versions.json',
+        'entries.txt', 'capture/line.cap', 'settings/map.csv', 'conformance/result.json'}
+    assert files['capture/line.cap'].startswith('# abdf1_ros capture 1\n')
+    assert '1234 -2' in files['entries.txt']
+    assert 'paint_booth' in files['settings/map.csv']
+    assert files['processors.txt'] == 'no diagnostic status was seen\n'
+    assert set(json.loads(files['versions.json'])) == {'abdf1_ros', 'python', 'system'}
+    for name in ('capture/', 'entries.txt', 'settings/'):
+        assert name in files['README.txt']
+    assert 'look through it' in capsys.readouterr().err
+
+
+def test_anonymous_bundle_has_no_values_and_no_names(tmp_path: Path, capture: str) -> None:
+    files = bundle_of(tmp_path, capture, '--anonymous')
+    assert not any(name.startswith('capture/') or name == 'entries.txt' for name in files)
+    everything = '\n'.join(files.values())
+    # The values that were read and written, as numbers and as bytes; and what people call them.
+    for secret in ('1234 -2', 'd204', 'feff', '10935', 'b72a', 'paint', 'booth'):
+        assert secret not in everything.lower(), secret
+    assert 'tag_1,Read,N7:0,2,SLC,topic_1' in files['settings/map.csv']
+    assert '"command": "0F/A2"' in files['entries.json']
+    assert 'numbered' in files['README.txt']
+
+
+def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'status.cap'
+    lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
+    said = pair('diag_status_slc504')
+    lines += [f'{count}.0 {"><"[count]} '
+              f'{frames.message_frame(packet.encode(), Checksum.CRC).hex()}'
+              for count, packet in enumerate(said)]
+    path.write_text('\n'.join([*lines, '']), encoding='ascii')
+    report = tmp_path / 'report.zip'
+    assert main([str(path), '--summary', '--report', str(report)]) == 0
+    with ZipFile(report) as bundle:
+        text = bundle.read('processors.txt').decode()
+    assert text.startswith(f'station {said[1].src}: SLC 5/04 series B revision 3, RUN; status ')
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize('options', [
+    ('--report', '/nowhere/report.zip'), ('--report', 'x.zip', '--settings', '/nowhere/net.csv')])
+def test_file_that_cannot_be_had_is_named(
+        capture: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str], options: tuple[str, ...]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([capture, '--summary', *options]) == 2
+    assert '/nowhere/' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('args', [
+    ('--report', 'x.zip', '--port', 'pty'), ('--anonymous', 'line.cap'),
+    ('--report', 'x.zip', '--binary', 'line.bin')])
+def test_report_is_for_captures(args: tuple[str, ...]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(args)
+    assert end.value.code == 2
