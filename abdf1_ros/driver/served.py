@@ -116,6 +116,9 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
             text = _fault(mapping, network, table)
         elif mapping.station == BROADCAST and network.mode == 'Peer':
             text = 'Station 255 is for a line with many stations, not for Mode Peer'
+        elif mapping.station == network.station and network.mode != 'Peer':
+            text = (f'Station {mapping.station} is our own in the net file, and nobody asks '
+                    'himself; the station to read or write belongs here')
         if text is not None:
             where = Place(path, mapping.line)
             found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))

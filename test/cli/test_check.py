@@ -117,7 +117,7 @@ def test_json_of_errors(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
 
 
 def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    rows = (GOOD_ROW, 'fast,Read,F8:0,5,SLC,,50')
+    rows = (GOOD_ROW, 'fast,Read,F8:0,1,SLC,,50')
     assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0
     content = parsed(capsys)
     assert list(content) == [
@@ -176,7 +176,7 @@ def test_missing_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
                                              capsys: pytest.CaptureFixture[str]) -> None:
-    row = '"a\x1b[2J\u2028error: x",Read,N7:0,5,PLC5,2,10'
+    row = '"a\x1b[2J\u2028error: x",Read,N7:0,1,PLC5,2,10'
     assert check(files, GOOD_NET, (row,)) == 0
     out = capsys.readouterr().out
     assert '\x1b' not in out

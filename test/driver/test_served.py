@@ -469,6 +469,17 @@ def test_full_duplex_line_has_no_broadcast() -> None:
     assert texts(everybody, network=Network()) == []
 
 
+@pytest.mark.parametrize('network, is_wrong', [
+    (Network(station=1), True), (Network(station=1, polling='Standard'), True),
+    (Network(station=1, mode='Slave'), True), (Network(station=1, mode='Peer'), False),
+    (Network(station=2), False)])
+def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> None:
+    ours = [make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', station=1)]
+    assert texts(*ours, network=network) == [
+        'map.csv:2: Item: 1, Station 1 is our own in the net file, and nobody asks himself; '
+        'the station to read or write belongs here'] * 2 * is_wrong
+
+
 def test_problems_go_with_their_rows() -> None:
     good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
     assert [mapping for mapping, _ in line_problems([good, bad], PEER, 'm')] == [bad]
