@@ -101,6 +101,10 @@ class _FaultyPort:
         if not self._plc.faults.silent:
             self._port.write(self._plc.damaged(data))
 
+    def unsent(self) -> int:
+        """Return how many bytes have still to leave."""
+        return self._port.unsent()
+
     def close(self) -> None:
         """Close the port."""
         self._port.close()

@@ -129,8 +129,9 @@ class Machine:
     All others come from ``data_to_send``.
 
     ``reply_size`` is the bytes behind the header of the reply that is waited for, if it tells no
-    error; 0 where that is not known. ``late`` is the sum of the seconds by which it was called
-    after a deadline of its procedure: so long this process, or its host, has not run.
+    error; 0 where that is not known. ``unsent`` asks the port how many bytes have still to leave,
+    as far as it can tell. ``late`` is the sum of the seconds by which it was called after a
+    deadline of its procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -141,6 +142,7 @@ class Machine:
         self.now = 0.0
         self.deadline: float | None = None
         self.send_at_once: Callable[[bytes], None] | None = None
+        self.unsent: Callable[[], int] = lambda: 0
         self.reply_size = 0
         self.background: Background | None = None
         self.late = 0.0
@@ -173,6 +175,16 @@ class Machine:
     def char_time(self) -> float:
         """Return the seconds that a character takes on the line."""
         return self._timing.char_time
+
+    @property
+    def free_at(self) -> float:
+        """Return when what is being sent has left, by its size (clock value in s)."""
+        return self._line_free
+
+    @property
+    def is_sending(self) -> bool:
+        """Tell whether something of what is to be sent has not left yet, as the port says."""
+        return bool(self._out) or self.unsent() > 0
 
     @property
     def spare_time(self) -> float:
@@ -310,7 +322,7 @@ class Machine:
 
     def _answers(self, symbol: Symbol) -> bool:
         """Tell whether what comes now proves that what we have sent has left."""
-        return self._is_half_duplex or symbol in _RESPONSES
+        return self._is_half_duplex or symbol in _RESPONSES and not self.is_sending
 
     def _resume(self, symbol: Symbol | None, error: CommandExpired | None = None) -> None:
         """Run the procedure up to a step that has to wait."""

@@ -83,6 +83,11 @@ class Packet:
         """Return SRC, CMD and TNS, by which a repeated message is known (M 3-4, 4-4)."""
         return self.src, self.cmd, self.tns
 
+    @property
+    def key_of_command(self) -> tuple[int, int, int]:
+        """Return, of a reply, the ``duplicate_key`` of the command that it answers."""
+        return self.dst, self.cmd & ~REPLY_BIT, self.tns
+
     def answers(self, command: Packet) -> bool:
         """Tell whether this is a reply to ``command``, whatever its command code says."""
         return self.is_reply and (self.src, self.dst, self.tns) == (

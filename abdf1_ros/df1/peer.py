@@ -26,13 +26,18 @@ The receiver answers every message at once with ACK or NAK and remembers what it
 an ENQ (M 4-7..4-9). That memory begins as NAK, and falls back to NAK with everything heard
 that was no message: an old ACK must not stand for a new message that got lost.
 
-Responses name no message. A transfer that needed an ENQ is therefore followed by Timeout in
-which responses that come late are passed over; they would stand for the next message. Behind
-a NAK, which came in time, and behind a reply that came before its ACK, a tenth of a second does.
+Responses name no message. What comes while bytes of a message have still to leave is none to it
+(M 4-5: WAIT follows SEND). A transfer that went wrong at first, and the start, are followed by a
+pause in which responses that come late are passed over; they would stand for the next message.
 
 An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
 at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
 A reply that overtakes its ACK counts as one (M 4-13).
+
+A message is sent again when its sender has not understood our response (M 4-5), so a repetition
+comes within the time of its retries, and before an end that asks no more has acknowledged our
+reply. Whatever comes later with the same number is another message: some processors count from 0
+after each power-up, some programs always send 0.
 """
 
 from __future__ import annotations
@@ -47,7 +52,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
-from abdf1_ros.df1.machine import KEEP, Machine, Procedure, Step
+from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
@@ -69,8 +74,15 @@ MAX_WAITING_REPLIES = 8
 
 _MIN_RESPONSE_TIME = 0.02
 
-# How long (s) an ACK may come behind the reply that overtook it, or behind another response.
-_LATE_ACK = 0.1
+# How long (s) a response may come after it was waited for, after another one, or after the reply
+# that overtook it.
+_LATE_RESPONSE = 0.1
+
+# How long (s) the retries of the products take as they come: ACK time-outs of 1 s, and 3 ENQs.
+_RETRY_TIME = 4.0
+
+# How often (s) a look is taken at what has become overdue while a response is waited for.
+_TICK = 0.25
 
 Hearing = Generator[Step, Symbol | None, None]
 
@@ -85,6 +97,12 @@ class PeerSettings:
     timeout: float = 1.0
     cmd_timeout: float = 1.0
     max_outstanding: int = 1
+    duplicate_detection: bool = True
+
+    @property
+    def retry_time(self) -> float:
+        """Return how long (s) the other end may repeat a message, set like us or as it comes."""
+        return max(_RETRY_TIME, (self.enq_retries + 1) * self.timeout)
 
 
 @dataclass(slots=True)
@@ -93,6 +111,26 @@ class _Outstanding:
 
     task: Task
     deadline: float | None = None
+
+
+@dataclass(slots=True)
+class _Accepted:
+    """
+    The last message accepted: its key (M 4-4), and until when (s) it may come again.
+
+    ``is_answered`` tells that our reply to it has been acknowledged, ``is_doubted`` that its
+    sender has asked for a response again, or has had a NAK.
+    """
+
+    key: tuple[int, int, int]
+    deadline: float
+    is_answered: bool = False
+    is_doubted: bool = False
+
+    def is_repeated_by(self, packet: Packet, now: float) -> bool:
+        """Tell whether ``packet`` is this message once more."""
+        is_possible = self.is_doubted or not self.is_answered
+        return is_possible and now < self.deadline and packet.duplicate_key == self.key
 
 
 class FullDuplexPeer:
@@ -121,6 +159,7 @@ class FullDuplexPeer:
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve the other end, for ever."""
         self._forget()
+        yield from self._listen()  # what comes now answers a process before us
         while True:
             self._expire()
             source.expire(self._machine.now)
@@ -141,7 +180,7 @@ class FullDuplexPeer:
         self._replies: deque[Packet] = deque()
         self._outstanding: dict[tuple[int, int], _Outstanding] = {}
         self._last_response = frames.NAK
-        self._last_key: tuple[int, int, int] | None = None
+        self._accepted: _Accepted | None = None
         self._noise = 0
         self._is_aborted = False
 
@@ -184,7 +223,9 @@ class FullDuplexPeer:
     def _send_reply(self, reply: Packet) -> Hearing:
         self._counters.replies_sent += 1
         self._counters.error_messages_sent += reply.sts != 0
-        yield from self._transfer(reply, lambda: False, is_probe=False)
+        delivered = yield from self._transfer(reply, lambda: False, is_probe=False)
+        if self._accepted is not None and self._accepted.key == reply.key_of_command:
+            self._accepted.is_answered = delivered is not None
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
                   is_probe: bool, expires: float = math.inf
@@ -218,7 +259,8 @@ class FullDuplexPeer:
                 self._counters.nak_retries += 1
                 self._note(Message.NTC_NAK_RETRY, naks, Message.ERR_RCVD_NAK_SYMBOL.number,
                            station=station)
-                yield from self._listen((naks - 1) * _NAK_PAUSE)
+                if naks > 1:
+                    yield from self._listen((naks - 1) * _NAK_PAUSE)
                 sending = message
             else:
                 enqs += 1
@@ -234,37 +276,49 @@ class FullDuplexPeer:
                            station=station)
                 sending = frames.ENQ
         delivered = self._machine.now if response in (Code.ACK, Code.STX) else None
-        if enqs:
-            yield from self._listen(self._timeout)
-        elif naks or response is Code.STX:
-            yield from self._listen(_LATE_ACK)
+        if enqs or naks or response is Code.STX:
+            yield from self._listen()
         return delivered
 
     def _response(self, sending: bytes, is_answered: Callable[[], bool],
                   expires: float) -> Generator[Step, Symbol | None, Code | None]:
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
-        self._machine.decoder.last_byte = 0
-        symbol = yield Step(sending, self._timeout, expires=expires)
-        while symbol is not None:
-            if symbol in (Control(Code.ACK), Control(Code.NAK)):
+        machine = self._machine
+        machine.decoder.last_byte = 0
+        symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires)
+        end = machine.free_at + self._timeout
+        while symbol is not None or machine.now < end:
+            answer = b''
+            if symbol in (Control(Code.ACK), Control(Code.NAK)) and not machine.is_sending:
                 assert isinstance(symbol, Control)
                 self._count_response(symbol.code)
                 return symbol.code
-            answer = self._hear(symbol)
+            if symbol is not None:
+                answer = self._hear(symbol)
             if is_answered():
                 yield Step(answer, 0)
                 return Code.STX
-            symbol = yield Step(answer, KEEP)
-        self._note(Message.NTC_ACK_EXPECTED, self._machine.decoder.last_byte, station=None)
+            symbol = yield from self._next(answer, end)
+        self._note(Message.NTC_ACK_EXPECTED, machine.decoder.last_byte, station=None)
         return None
 
-    def _listen(self, seconds: float) -> Hearing:
+    def _listen(self, seconds: float = _LATE_RESPONSE) -> Hearing:
         """Only receive for a while; responses that come now belong to nothing."""
-        if not seconds:
-            return
-        symbol = yield Step(b'', seconds)
-        while symbol is not None:
-            symbol = yield Step(self._hear(symbol), KEEP)
+        end = max(self._machine.now, self._machine.free_at) + seconds
+        symbol = yield from self._next(b'', end)
+        while symbol is not None or self._machine.now < end:
+            symbol = yield from self._next(self._hear(symbol) if symbol else b'', end)
+
+    def _next(self, answer: bytes,
+              end: float) -> Generator[Step, Symbol | None, Symbol | None]:
+        """Send an answer, then return the next symbol up to ``end``, or up to the next tick."""
+        self._expire()
+        left = end - max(self._machine.now, self._machine.free_at)
+        if left > 0:
+            return (yield Step(answer, min(left, _TICK)))
+        if answer:
+            yield Step(answer, 0)
+        return None
 
     def _hear(self, symbol: Symbol) -> bytes:
         """Return what the receiver answers to a symbol (M 4-7..4-9)."""
@@ -272,6 +326,7 @@ class FullDuplexPeer:
         if isinstance(symbol, Frame):
             return self._message(symbol)
         if symbol == Control(Code.ENQ):
+            self._expect_repetition()
             # What was heard since the last response was no message, or it would have had one.
             is_clean = self._machine.decoder.noise == self._noise
             return self._respond(self._last_response if is_clean else frames.NAK)
@@ -299,13 +354,14 @@ class FullDuplexPeer:
             self._counters.invalid_messages += 1
             self._report(wrong_message(packet, packet.src))
             return self._respond(frames.NAK)
-        if packet.duplicate_key == self._last_key:
+        if self._is_repetition(packet):
             self._counters.duplicate_messages += 1
             self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
             return self._respond(frames.ACK)
         if not packet.is_reply and len(self._replies) >= MAX_WAITING_REPLIES:
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
-        self._last_key = packet.duplicate_key
+        self._accepted = _Accepted(
+            packet.duplicate_key, self._machine.now + self._settings.retry_time)
         if packet.is_reply:
             self._take_reply(packet)
         else:
@@ -313,8 +369,19 @@ class FullDuplexPeer:
             self._replies.append(self._serve(packet))
         return self._respond(frames.ACK)
 
+    def _is_repetition(self, packet: Packet) -> bool:
+        """Tell whether this is the last message once more (M 4-4, 4-8)."""
+        return self._settings.duplicate_detection and self._accepted is not None \
+            and self._accepted.is_repeated_by(packet, self._machine.now)
+
+    def _expect_repetition(self) -> None:
+        """Take note that the other end may send its last message again."""
+        if self._accepted is not None:
+            self._accepted.is_doubted = True
+
     def _take_reply(self, packet: Packet) -> None:
-        """Hand a reply to the command it belongs to."""
+        """Hand a reply to the command it belongs to, if it is still waited for."""
+        self._expire()
         self._counters.replies_received += 1
         self._counters.error_messages_received += packet.sts != 0
         entry = self._outstanding.pop((packet.src, packet.tns), None)
@@ -344,6 +411,8 @@ class FullDuplexPeer:
             entry.task.fail(CommandTimeout())
 
     def _respond(self, response: bytes) -> bytes:
+        if response == frames.NAK:
+            self._expect_repetition()
         self._last_response = response
         self._noise = self._machine.decoder.noise
         self._counters.acks_sent += response == frames.ACK

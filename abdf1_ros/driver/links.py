@@ -70,7 +70,7 @@ def make_link(network: Network, settings: DriverSettings, machine: Machine,
     if network.mode == 'Peer':
         peer_settings = PeerSettings(
             network.checksum, network.nak_retries, network.enq_retries, timeout, cmd_timeout,
-            settings.max_outstanding)
+            settings.max_outstanding, settings.duplicate_detection)
         return FullDuplexPeer(machine, peer_settings, stations, serve, report)
     if network.mode == 'Slave':
         slave_settings = SlaveSettings(

@@ -27,10 +27,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 import errno
+import fcntl
 import math
 import os
 import select
 import socket
+import struct
 import termios
 import threading
 import time
@@ -44,6 +46,7 @@ import serial.rfc2217
 import serial.rs485
 
 _READ_SIZE = 4096
+_INT = struct.Struct('i')
 _WRITE_TIMEOUT = 2.0
 
 # A port without a descriptor cannot be waited for together with the wake descriptor; so long (s)
@@ -77,6 +80,9 @@ class Port(Protocol):
 
     def write(self, data: bytes) -> None:
         """Hand all of ``data`` to the operating system."""
+
+    def unsent(self) -> int:
+        """Return how many bytes of what was written have still to leave, 0 where nobody knows."""
 
     def close(self) -> None:
         """Give the line back."""
@@ -129,6 +135,15 @@ class DescriptorPort:
                     raise OSError('the line takes no data; is Handshake right?') from None
                 poll.poll(math.ceil(left * 1000))
 
+    def unsent(self) -> int:
+        """Return how many bytes the operating system still has."""
+        try:
+            answer = fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, bytes(_INT.size))
+        except OSError:  # a device whose driver does not tell
+            return 0
+        count: int = _INT.unpack(answer)[0]
+        return count
+
     def close(self) -> None:
         """Give the line back."""
         self._close()
@@ -152,6 +167,10 @@ class SerialPort:
     def write(self, data: bytes) -> None:
         """Hand all of ``data`` to pyserial."""
         self._port.write(data)
+
+    def unsent(self) -> int:
+        """Return 0: the far port does not tell."""
+        return 0
 
     def close(self) -> None:
         """Give the line back."""
@@ -343,7 +362,7 @@ class LinkThread(threading.Thread):
 
     def _serve(self, port: Port) -> None:
         machine, clock = self._machine, self._clock
-        machine.send_at_once = port.write
+        machine.send_at_once, machine.unsent = port.write, port.unsent
         # Only there do bytes come at the speed of the line; others may be faster than it is set.
         is_terminal = isinstance(port, DescriptorPort) and os.isatty(port.fileno())
         machine.start(clock())

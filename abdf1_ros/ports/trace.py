@@ -83,6 +83,10 @@ class TracedPort:
         self._port.write(data)
         self._note(Direction.OUT, data)
 
+    def unsent(self) -> int:
+        """Return how many bytes have still to leave."""
+        return self._port.unsent()
+
     def close(self) -> None:
         """Close the port; the trace goes on when it is opened again."""
         self._port.close()

@@ -85,7 +85,7 @@ class Parameters:
     eot_suppression: bool = _parameter(
         False, 'Mode Slave: stay silent instead of answering EOT')
     duplicate_detection: bool = _parameter(
-        True, 'Mode Slave: execute a repeated command only once')
+        True, 'Mode Slave and Peer: execute a repeated command only once')
     poll_timeout: float = _parameter(
         60.0, 'Mode Slave: s without a poll after which own commands fail; 0: never', 0.0,
         3600.0)

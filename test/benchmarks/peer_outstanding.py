@@ -96,6 +96,10 @@ class ThinkingPort:
                     return
                 self._port.write(self._waiting.popleft())
 
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
+
     def close(self) -> None:
         """Close the port."""
         with self._news:

@@ -115,10 +115,23 @@ def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_s
 def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
     bench = Bench(*[Step(FRAME, 1.0)] * 3, timing=LineTiming(char_time=0.01), duplex=Duplex.FULL)
     bench.machine.start(0.0)
+    bench.machine.data_to_send()
     bench.machine.receive_data(MESSAGE, 0.05)  # the other end speaks whenever it likes
     assert bench.machine.deadline == pytest.approx(0.2 + 1.0)
+    bench.machine.data_to_send()
     bench.machine.receive_data(ACK, 0.06)
     assert bench.machine.deadline == pytest.approx(0.06 + 0.1 + 1.0)
+
+
+def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
+    bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0), timing=LineTiming(char_time=0.01),
+                  duplex=Duplex.FULL)
+    bench.machine.unsent = lambda: 3  # the line is no faster than it is set
+    bench.machine.start(0.0)
+    bench.machine.data_to_send()
+    bench.machine.receive_data(ACK, 0.02)
+    assert bench.machine.is_sending
+    assert bench.machine.deadline == pytest.approx(0.1 + 1.0)
 
 
 def test_symbol_ends_a_step() -> None:

@@ -42,10 +42,12 @@ UNKNOWN = b'\x10\x0F'
 
 def bench(checksum: Checksum = Checksum.CRC, *, nak_retries: int = 3, enq_retries: int = 3,
           timeout: float = TIMEOUT, max_outstanding: int = 1, timing: LineTiming | None = None,
+          duplicate_detection: bool = True,
           serve: Callable[[Packet], Packet] = Packet.reply) -> PeerBench:
     """Return a peer on a scripted line."""
     settings = PeerSettings(
-        checksum, nak_retries, enq_retries, timeout, CMD_TIMEOUT, max_outstanding)
+        checksum, nak_retries, enq_retries, timeout, CMD_TIMEOUT, max_outstanding,
+        duplicate_detection)
     return PeerBench(settings, timing, serve)
 
 
@@ -265,10 +267,10 @@ def test_late_responses_after_an_enquiry_do_not_acknowledge_the_next_message() -
     assert peer.hear_packet(REPLY) == ACK
     peer.begin(later(COMMAND, 1))
     assert peer.said() == b''
-    assert peer.wait(0.9) == []
+    assert peer.wait(0.09) == []
     assert peer.hear(ACK, NAK) == b''  # the first response, late
-    assert peer.wait(0.2) == [(0.1, peer.frame(later(COMMAND, 1)))]
-    assert peer.wait(1.0) == [(0.9, ENQ)]
+    assert peer.wait(0.2) == [(0.01, peer.frame(later(COMMAND, 1)))]
+    assert peer.wait(1.0) == [(0.81, ENQ)]
     assert peer.counts()['acks_received'] == 2
 
 
@@ -290,10 +292,10 @@ def test_late_responses_after_a_failure_do_not_acknowledge_the_next_message() ->
     peer.begin(COMMAND)
     other = peer.begin(replace(COMMAND, dst=2))
     peer.said()
-    assert peer.wait(1.5) == []
+    assert peer.wait(1.05) == []
     assert peer.hear(ACK) == b''
-    assert peer.wait(1.0) == [(0.5, peer.frame(replace(COMMAND, dst=2)))]
-    assert peer.wait(1.6) == []
+    assert peer.wait(0.1) == [(0.05, peer.frame(replace(COMMAND, dst=2)))]
+    assert peer.wait(1.1) == []
     assert isinstance(other.result, StationInactive)
 
 
@@ -301,11 +303,72 @@ def test_reply_that_comes_after_the_failure_of_its_transfer_still_counts() -> No
     peer = bench(enq_retries=0)
     errand = peer.begin(COMMAND)
     peer.said()
-    assert peer.wait(1.5) == []
+    assert peer.wait(1.05) == []
     assert peer.hear_packet(REPLY) == ACK
     assert errand.result == REPLY
     assert peer.wait(60) == []
     assert peer.changes == []
+
+
+def test_replies_and_commands_do_not_wait_a_whole_timeout_after_an_enquiry() -> None:
+    """The other end waits for our reply; the line is slow only once."""
+    peer = bench(timeout=10.0)
+    peer.begin(COMMAND)
+    peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.wait(10.0) == [(10.0, ENQ)]
+    assert peer.hear_packet(THEIRS) == ACK
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    assert peer.wait(1.0) == [(0.1, peer.frame(OUR_REPLY))]
+    assert peer.hear(ACK) == peer.frame(later(COMMAND, 1))
+
+
+def test_nothing_is_sent_at_the_start_that_a_response_to_a_process_before_us_would_suit() -> None:
+    peer = bench()
+    peer.machine.start(peer.now)
+    peer.begin(COMMAND)
+    assert peer.wait(0.09) == []
+    assert peer.hear(ACK) == b''
+    assert peer.wait(0.2) == [(0.01, peer.frame(COMMAND))]
+    assert peer.wait(1.0) == [(0.81, ENQ)]
+
+
+@pytest.mark.parametrize('response', [ACK, NAK])
+def test_response_while_our_message_is_leaving_is_none_to_it(response: bytes) -> None:
+    """M 4-5: WAIT follows SEND; what has still to leave is for the port to say."""
+    peer = bench(timing=LineTiming(char_time=0.01))
+    unsent = 1
+    peer.machine.unsent = lambda: unsent
+    errand = peer.begin(COMMAND)
+    size = len(peer.said())
+    assert peer.wait(0.2) == []
+    assert peer.hear(response) == b''
+    assert peer.wait(0.01 * size - 0.2) == []
+    unsent = 0
+    assert peer.wait(1.1) == [(1.0, ENQ)]  # of the time after the last byte nothing is lost
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    assert errand.result == REPLY
+
+
+def test_early_ack_counts_on_a_link_faster_than_baud() -> None:
+    peer = bench(timing=LineTiming(char_time=0.01))
+    first = peer.begin(COMMAND)
+    peer.begin(later(COMMAND, 1))
+    assert peer.said() == peer.frame(COMMAND)
+    peer.wait(0.001)
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK + peer.frame(later(COMMAND, 1))
+    assert first.result == REPLY
+
+
+def test_ack_before_a_byte_of_our_message_is_handed_over_is_none_to_it() -> None:
+    peer = bench()
+    peer.begin(COMMAND)
+    peer.machine.receive_data(ACK, peer.now)  # read before the message is taken for the port
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.wait(1.1) == [(1.0, ENQ)]
 
 
 @pytest.mark.parametrize('checksum', Checksum)
@@ -617,14 +680,68 @@ def test_message_too_long(byte: int, more: int) -> None:
 def test_duplicate_is_acknowledged_and_not_executed() -> None:
     peer = bench()
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
-    assert peer.hear(ACK) == b''
     assert peer.hear_packet(replace(THEIRS, dst=9, data=b'other')) == ACK
+    assert peer.hear(ACK) == b''
     assert peer.wait(60) == []
     assert peer.served == [THEIRS]
     assert peer.numbers() == [(2524, 1)]
     assert peer.counts() == {
         'messages_received': 2, 'commands_received': 1, 'duplicate_messages': 1, 'acks_sent': 2,
         'messages_sent': 1, 'replies_sent': 1, 'acks_received': 1}
+
+
+@pytest.mark.parametrize('asked_by', [ENQ, b'\xFF' + ENQ])
+def test_duplicate_after_its_reply_is_known_when_the_sender_has_asked_again(
+        asked_by: bytes) -> None:
+    """Our ACK was lost, the reply was not: only the sender's receiver knows that we have it."""
+    peer = bench()
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+    assert peer.hear(ACK) == b''
+    assert peer.hear(asked_by) in (ACK, NAK)
+    assert peer.hear_packet(THEIRS) == ACK
+    assert peer.served == [THEIRS]
+
+
+@pytest.mark.parametrize('pause', [0.0, 0.2, 3.0])
+def test_program_that_always_sends_tns_0_is_answered_each_time(pause: float) -> None:
+    peer = bench()
+    command = replace(THEIRS, tns=0)
+    for _ in range(10):
+        assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+        assert peer.hear(ACK) == b''
+        peer.wait(pause)
+    assert peer.served == [command] * 10
+
+
+def test_processor_that_counts_from_0_after_its_power_up_is_answered() -> None:
+    """It went off before it could acknowledge our reply to its first and only command."""
+    peer = bench()
+    command = replace(THEIRS, tns=0)
+    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+    assert [said for _, said in peer.wait(4.0)] == [ENQ] * 3
+    assert peer.wait(1.0) == []
+    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+
+
+@pytest.mark.parametrize(('timeout', 'enq_retries', 'seconds'), [
+    (0.1, 3, 4.0),  # as products come: 1 s and 3 ENQs
+    (1.0, 3, 4.0), (3.2, 10, 35.2)])
+def test_repetition_comes_within_the_time_of_the_retries(timeout: float, enq_retries: int,
+                                                         seconds: float) -> None:
+    for pause, served in ((seconds - 0.01, 1), (seconds + 0.01, 2)):
+        peer = bench(timeout=timeout, enq_retries=enq_retries)
+        peer.hear_packet(THEIRS)
+        peer.wait(pause)
+        peer.hear_packet(THEIRS)
+        assert len(peer.served) == served
+
+
+def test_duplicates_are_executed_when_nobody_looks_for_them() -> None:
+    peer = bench(duplicate_detection=False)
+    assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
+    assert peer.hear_packet(THEIRS) == ACK
+    assert peer.served == [THEIRS, THEIRS]
+    assert 'duplicate_messages' not in peer.counts()
 
 
 @pytest.mark.parametrize('other', [
@@ -666,7 +783,7 @@ def test_duplicate_of_a_damaged_message_is_executed() -> None:
 def test_duplicates_are_forgotten_with_the_port() -> None:
     peer = bench()
     peer.hear_packet(THEIRS)
-    peer.machine.start(peer.now)
+    peer.start()
     assert peer.hear(ENQ) == NAK
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
     assert len(peer.served) == 2
@@ -1045,6 +1162,29 @@ def test_outstanding_replies_while_another_transfer_fails() -> None:
     peer.wait(4.0)
     assert isinstance(second.result, StationInactive)
     assert peer.changes == [(2, False)]
+
+
+def test_overdue_command_ends_while_another_one_waits_for_its_ack() -> None:
+    peer = bench(max_outstanding=2, timeout=60.0)
+    first, second = peer.begin(COMMAND), peer.begin(later(COMMAND, 1))
+    peer.said()
+    assert peer.hear(ACK) == peer.frame(later(COMMAND, 1))
+    peer.wait(10.0)
+    assert isinstance(first.result, CommandTimeout)
+    assert first.seconds <= CMD_TIMEOUT + 0.25
+    assert second.result is None
+    assert peer.counts().get('enq_retries') is None
+
+
+def test_reply_is_not_taken_after_its_time_although_nobody_has_looked() -> None:
+    peer = bench()
+    errand = peer.begin(COMMAND)
+    peer.said()
+    peer.hear(ACK)
+    peer.now += CMD_TIMEOUT + 3.0  # the process stood still
+    assert peer.hear_packet(REPLY) == ACK
+    assert isinstance(errand.result, CommandTimeout)
+    assert peer.counts()['stale_messages'] == 1
 
 
 def lose(peer: PeerBench) -> None:

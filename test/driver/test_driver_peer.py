@@ -363,7 +363,8 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
     words = serve_row('N7:50')
     bench = Bench([make_mapping(), words])
     machine = bench.driver.machine
-    machine.start(0.0)
+    machine.start(-0.1)
+    machine.handle_timeout(0.0)
     assert machine.data_to_send()
     machine.receive_data(ACK, 0.1)  # and its reply takes its time
     bench.driver.write([words], [7], 0.2)

@@ -242,6 +242,10 @@ class Paused:
     def write(self, data: bytes) -> None:
         """Drop it."""
 
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
+
     def close(self) -> None:
         """Do nothing."""
 
@@ -306,6 +310,10 @@ class Diary:
     def write(self, data: bytes) -> None:
         """Note the bytes."""
         self.notes.append(data.decode('ascii'))
+
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
 
     def close(self) -> None:
         """Note the end."""
@@ -383,6 +391,10 @@ class _NoLine:
 
     def write(self, data: bytes) -> None:
         """Drop it."""
+
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
 
     def close(self) -> None:
         """Do nothing."""
@@ -555,6 +567,20 @@ def test_write_waits_for_a_line_that_is_slow(
     port.write(bytes(1_000_000))
     reader.join(PATIENCE)
     assert len(received) == 1_000_000
+
+
+def test_port_tells_that_bytes_have_still_to_leave(
+        sockets: tuple[DescriptorPort, socket.socket]) -> None:
+    port, other = sockets
+    assert port.unsent() == 0
+    port.write(bytes(300))
+    assert port.unsent() >= 300
+    other.recv(300)
+    assert port.unsent() == 0
+
+
+def test_port_that_cannot_tell_what_has_still_to_leave_says_none(wake: tuple[int, int]) -> None:
+    assert DescriptorPort(wake[1], lambda: None).unsent() == 0
 
 
 def test_full_pty_is_a_lost_port(

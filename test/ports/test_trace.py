@@ -39,6 +39,10 @@ class Loop:
     def write(self, data: bytes) -> None:
         self.data += data
 
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
+
     def close(self) -> None:
         self.closed = True
 

@@ -134,9 +134,14 @@ class PeerBench(PeerNode):
 
     def __init__(self, settings: PeerSettings, timing: LineTiming | None = None,
                  serve: Callable[[Packet], Packet] = Packet.reply) -> None:
-        self.now = 100.0
+        self.now = 99.9
         super().__init__(settings, lambda: self.now, timing=timing, serve=serve)
+        self.start()
+
+    def start(self) -> None:
+        """Start the machine, and let the pause be over in which late responses may come."""
         self.machine.start(self.now)
+        assert self.wait(0.1) == []
 
     def frame(self, packet: Packet) -> bytes:
         """Return a message as it stands on this line."""

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 import heapq
 import math
 from random import Random
@@ -33,6 +34,7 @@ from typing import Protocol
 from abdf1_ros.df1.machine import Machine
 
 BITS_PER_CHARACTER = 10
+_A_BIT = 0.1  # of a character
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +102,16 @@ class VirtualLine:
 
     def start(self) -> None:
         """Start every machine."""
-        for machine in self._machines:
+        for sender, machine in enumerate(self._machines):
+            machine.unsent = partial(self._unsent, sender)
             machine.start(self.now)
         for sender in range(len(self._machines)):
             self._take(sender)
+
+    def _unsent(self, sender: int) -> int:
+        """Return how many bytes of a sender have still to leave."""
+        left = max(0.0, self._free[sender] - self.now)
+        return math.ceil(left / self.char_time - _A_BIT) if left else 0
 
     def wake(self, machine: Machine) -> None:
         """Wake a machine that rests."""
