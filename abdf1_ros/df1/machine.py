@@ -39,7 +39,7 @@ from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Duplex, FrameDecoder, Symbol
+from abdf1_ros.df1.frames import Code, Control, Duplex, FrameDecoder, MAX_LINK_DATA, Symbol
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 from abdf1_ros.errors import CommandExpired
 
@@ -64,9 +64,11 @@ class Step(NamedTuple):
 # What an operating system or a device server may hold bytes of a frame back (s).
 _HELD_BACK = 0.1
 
-# A message that has begun may take so many times as long as its bytes take at the set speed, and
-# two pauses besides. Without a limit a station that dribbles would keep the line from all others.
+# A message that has begun may take so many times as long as its bytes take at the set speed, but
+# no longer than the longest one, and two pauses besides. Without a limit a station that dribbles,
+# or never ends, would keep the line from all others.
 _SLOWEST = 4
+_LONGEST = 2 * MAX_LINK_DATA
 
 # Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
 _LAST_CHARACTERS = 16
@@ -157,7 +159,7 @@ class Machine:
         self._kept_deadline: float | None = None
         self._resting = False
         self._line_free = -math.inf
-        self._last_heard = -math.inf
+        self.last_heard = -math.inf
         self._echoes = False
         self._echo_due = 0
         self._due = -math.inf  # the deadline, before a message was heard out
@@ -241,9 +243,9 @@ class Machine:
         if self._forget_on_send and (self._out or not is_listening):
             return  # it was said before what it would have to answer
         is_idle = self._resting or self.deadline is None
-        if is_idle and is_listening and now - self._last_heard > self._pause_limit:
+        if is_idle and is_listening and now - self.last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
-        self._last_heard = now
+        self.last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
         if self.decoder.in_message:
@@ -257,8 +259,8 @@ class Machine:
         if self.deadline is None or self._resting or not self._message.is_in_time \
                 or not self._listening:
             return
-        needed = (heard - self._message.heard) * self._timing.char_time
-        limit = self._message.begun + 2 * self._pause_limit + _SLOWEST * needed
+        characters = min(_SLOWEST * (heard - self._message.heard), _LONGEST)
+        limit = self._message.begun + 2 * self._pause_limit + characters * self._timing.char_time
         self.deadline = max(self.deadline, min(now + self._pause_limit, limit))
 
     def handle_timeout(self, now: float) -> None:

@@ -22,8 +22,8 @@ answers. A transaction has three phases, each a generator::
               makes it active and the transaction proceeds; silence ends it.
     deliver   the command frame, until DLE ACK. Silence or DLE NAK: again, up to NAK_Retries.
     collect   polls, until the reply. DLE EOT means not ready: poll again, until Cmd_Timeout
-              has passed since the transaction began. Silence or a damaged frame: again, up to
-              ENQ_Retries for each poll.
+              has passed since the transmission that was acknowledged began. Silence, DLE NAK
+              or a damaged frame: again, up to ENQ_Retries for each poll.
 
 A station that passes a retry limit becomes inactive.
 
@@ -112,12 +112,11 @@ class HalfDuplexMaster:
         Raises StationInactive, CommandTimeout, CommandExpired or WrongCommandCode.
         """
         number = command.dst if station is None else station
-        started = self._machine.now
         self.command_sent = False
         if number != BROADCAST and not self._stations[number].active:
             yield from self._line.revive(number)
         self.command_sent = True
-        yield from self._line.deliver(number, command, expires)
+        started = yield from self._line.deliver(number, command, expires)
         if number == BROADCAST:
             return command.reply()
         try:

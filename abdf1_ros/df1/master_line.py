@@ -66,7 +66,13 @@ LIVING_SHARE = 7
 
 # What answers a message and a poll, but for the frames that answer a poll too.
 _MESSAGE_ANSWERS = (Code.ACK, Code.NAK)
-_POLL_ANSWERS = (Code.EOT,)
+_POLL_ANSWERS = (Code.EOT, Code.NAK)
+
+# So many characters, and what the equipment may hold back, make a pause after a message that has
+# broken off.
+_QUIET_CHARACTERS = 10
+
+_ACK, _NAK, _EOT = Control(Code.ACK), Control(Code.NAK), Control(Code.EOT)
 
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
@@ -110,34 +116,44 @@ class MasterLine:
         self.settings = settings
         self.stations = stations
         self.polled: Container[int] = ()  # stations that somebody else polls all the time
+        # Takes a reply that came too late for its poll; tells whether it was waited for.
+        self.take_reply: Callable[[int, Packet], bool] = lambda number, reply: False
         self._report = report
         self._serve = serve
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
         self._forwards: deque[Packet] = deque()
+        self._behind: dict[int, int] = {}  # by station: the one of this line that it is behind
         self._next_revival = 0.0
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf
-                ) -> Generator[Step, Symbol | None, None]:
-        """Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12)."""
+                ) -> Generator[Step, Symbol | None, float]:
+        """
+        Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
+
+        Return when the transmission began that was acknowledged (clock value in s).
+        """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self._count_sent(packet)
         if number == BROADCAST:
             self.counters.messages_sent += 1
+            begun = self.machine.now
             yield Step(frame, BROADCAST_PAUSE)
-            return
+            return begun
+        self._behind[packet.dst] = number
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
+            begun = self.machine.now
             try:
                 answer = yield from self._ask(frame, number, _MESSAGE_ANSWERS, 0.0, expires)
             except CommandExpired as error:
                 self.counters.messages_sent -= 1
                 error.sent = retry > 1
                 raise
-            if isinstance(answer, Control) and answer.code is Code.ACK:
+            if answer == _ACK:
                 self.stations.heard(number, self.machine.now)
-                return
-            cause = self._undelivered(answer, number)
+                return begun
+            cause = self._note_cause(answer, number, Message.NTC_ACK_EXPECTED)
             if retry <= self.settings.nak_retries:
                 self.counters.nak_retries += 1
                 self.note(Message.NTC_NAK_RETRY, retry, cause.number, station=number)
@@ -145,16 +161,16 @@ class MasterLine:
         self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
         self.fail_inactive(number)
 
-    def _undelivered(self, answer: Symbol | None, number: int) -> Message:
-        """Note why a command was not acknowledged; return the cause."""
-        if answer == Control(Code.NAK):
+    def _note_cause(self, answer: Symbol | None, number: int, expected: Message) -> Message:
+        """Note why something has to be sent again, at worst what was ``expected``; return it."""
+        if answer == _NAK:
             self.note(Message.NTC_RCVD_NAK_SYMBOL, station=number)
             self.note(Message.ERR_RCVD_NAK_SYMBOL, station=number)
             return Message.ERR_RCVD_NAK_SYMBOL
         if isinstance(answer, Frame) and answer.fault is not None:
             return self._note_fault(answer, number)
-        self.note(Message.NTC_ACK_EXPECTED, self._last_code, station=number)
-        return Message.NTC_ACK_EXPECTED
+        self.note(expected, self._last_code, station=number)
+        return expected
 
     def revive(self, number: int) -> Talk:
         """
@@ -162,13 +178,20 @@ class MasterLine:
 
         Any proper answer makes it active; StationInactive when there is none.
         """
-        answer = yield from self.poll(number)
+        answer = yield from self.probe(number)
         if not is_good(answer):
             self.fail_inactive(number)
         if isinstance(answer, Frame):
             packet = yield from self.receive(number, answer)
             if packet is not None:
                 self.take_unwanted(number, packet)
+
+    def probe(self, number: int) -> Generator[Step, Symbol | None, Symbol | None]:
+        """Poll an inactive station; of what is heard nothing is lost, but silence is no news."""
+        answer = yield from self.poll(number)
+        if not is_good(answer) and (answer is not None or self._last_code):
+            self._note_cause(answer, number, Message.NTC_EOT_STX_EXPECTED)
+        return answer
 
     def poll_with_retries(self, number: int, pause: float, reply_size: int = 0
                           ) -> Generator[Step, Symbol | None, Control | Frame]:
@@ -182,7 +205,7 @@ class MasterLine:
             if is_good(answer):
                 return answer
             pause = 0.0
-            cause = self._unanswered(answer, number)
+            cause = self._note_cause(answer, number, Message.NTC_EOT_STX_EXPECTED)
             if retry <= self.settings.enq_retries:
                 self.counters.enq_retries += 1
                 self.note(Message.NTC_ENQ_RETRY, retry, cause.number, station=number)
@@ -190,16 +213,9 @@ class MasterLine:
         self.note(Message.NTC_ENQ_LIMIT_EXCEEDED, self.settings.enq_retries, station=number)
         self.fail_inactive(number)
 
-    def _unanswered(self, answer: Symbol | None, number: int) -> Message:
-        """Note why a poll has to be repeated; return the cause."""
-        if isinstance(answer, Frame):
-            return self._note_fault(answer, number)
-        self.note(Message.NTC_EOT_STX_EXPECTED, self._last_code, station=number)
-        return Message.NTC_EOT_STX_EXPECTED
-
     def poll(self, number: int, pause: float = 0.0,
              reply_size: int = 0) -> Generator[Step, Symbol | None, Symbol | None]:
-        """Poll once; return EOT, a frame good or bad, or None for silence."""
+        """Poll once; return EOT, NAK, a frame good or bad, or None for silence."""
         self.machine.reply_size = reply_size
         self.counters.polls_sent += 1
         answer = yield from self._ask(frames.poll_frame(number), number, _POLL_ANSWERS, pause)
@@ -211,7 +227,7 @@ class MasterLine:
              delay: float = 0.0, expires: float = math.inf
              ) -> Generator[Step, Symbol | None, Symbol | None]:
         """
-        Send ``frame``; return a ``wanted`` control symbol, any slave's frame, or None.
+        Send ``frame``; return a ``wanted`` control symbol, a frame of this station, or None.
 
         Other symbols are counted and passed over while the time runs: noise, an answer that
         comes late, or our own frame coming back from a two-wire adapter. Such an echo is
@@ -232,13 +248,58 @@ class MasterLine:
                     self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
             elif isinstance(symbol, Frame) and symbol.station is None:
                 self._last_code = Code.STX
-                return symbol
+                if symbol.fault is Fault.NO_ETX:
+                    return (yield from self._hear_rest(symbol, number))
+                if symbol.fault is not None or not self._take_late(number, symbol):
+                    return symbol
             elif self._is_echo(symbol, frame):
                 self.machine.expect_echo()
         if self.machine.decoder.in_message:
             return Frame(b'', fault=Fault.NO_ETX)
         self._last_code = self._last_code or self.machine.decoder.last_byte
         return None
+
+    def _hear_rest(self, broken: Frame,
+                   number: int) -> Generator[Step, Symbol | None, Frame]:
+        """
+        Listen until the line is quiet; return the good frame that follows, or else ``broken``.
+
+        A bit error that looks like a symbol breaks a message off for us, and not for its sender,
+        who would not hear what is said now. Nothing else of what follows means anything.
+        """
+        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * self.machine.char_time
+        end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.char_time
+        while (left := min(self.machine.last_heard + quiet, end) - self.machine.now) > 0:
+            symbol = yield Step(b'', left)
+            if isinstance(symbol, Unknown) and not symbol.is_misplaced:
+                self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
+            elif isinstance(symbol, Frame) and symbol.station is None and symbol.fault is None:
+                self._note_fault(broken, number)
+                return symbol
+        return broken
+
+    def _take_late(self, number: int, frame: Frame) -> bool:
+        """
+        Take a message of another station than the one asked; return whether it was one.
+
+        It answers an earlier poll, whose time was up. It gets no ACK, which would be taken by
+        the station asked now for that of its own message; so it comes again, and then is known.
+        """
+        packet = Packet.decode(frame.data)
+        if packet.src not in self.stations or self._speaks_for(number, packet.src):
+            return False
+        station = self.stations[packet.src]
+        self.counters.messages_received += 1
+        self.stations.heard(packet.src, self.machine.now)
+        if packet.is_reply and packet.dst == self.settings.station and station.accepts(packet):
+            self._count_received(packet)
+            if not self.take_reply(packet.src, packet):
+                self.take_unwanted(packet.src, packet)
+        return True
+
+    def _speaks_for(self, number: int, src: int) -> bool:
+        """Tell whether a message of ``src`` may come from station ``number`` of this line."""
+        return src == number or self._behind.get(src) == number
 
     def _is_echo(self, symbol: Frame | Poll, frame: bytes) -> bool:
         """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
@@ -250,10 +311,25 @@ class MasterLine:
 
     def receive(self, number: int,
                 frame: Frame) -> Generator[Step, Symbol | None, Packet | None]:
-        """Acknowledge a good message; return it, or None when it is a repetition."""
+        """
+        Acknowledge a good message; return it, or None when it is a repetition.
+
+        A message says who sends it. One that does not is damaged in a way that no check shows
+        (a CRC begins with 0, so it does not see a leading 00 come or go), and gets no ACK, unless
+        the station insists on it.
+        """
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
         station = self.stations[number]
+        if not self._speaks_for(number, packet.src) or packet.dst == number:
+            if frame.data != station.last_refused:
+                station.last_refused = frame.data
+                self.counters.invalid_messages += 1
+                self._report(wrong_message(packet, number))
+                return None
+            self.counters.acks_sent += 1
+            yield Step(frames.ACK, 0)
+            return None
         is_to_keep = not packet.is_reply and self.settings.accept_slave_messages
         if is_to_keep and self.is_full and not station.repeats(packet):
             return None  # not acknowledged: the slave keeps it; replies make room and go on
@@ -263,12 +339,15 @@ class MasterLine:
             self.counters.duplicate_messages += 1
             self.note(Message.NTC_DUPLICATE_MSG_RCVD, number, station=number)
             return None
+        self._count_received(packet)
+        return packet
+
+    def _count_received(self, packet: Packet) -> None:
         if packet.is_reply:
             self.counters.replies_received += 1
             self.counters.error_messages_received += packet.sts != 0
         else:
             self.counters.commands_received += 1
-        return packet
 
     def check_reply(self, number: int, reply: Packet, command: Packet) -> None:
         """Account for the reply to ``command``; WrongCommandCode when it is another's."""
@@ -284,7 +363,7 @@ class MasterLine:
         if self._is_to_forward(packet) and has_room:
             self._forwards.append(packet)
             return
-        is_ours = packet.dst == self.settings.station and packet.src == number
+        is_ours = packet.dst == self.settings.station
         if is_ours and not packet.is_reply and self.settings.accept_slave_messages \
                 and self._serve is not None and has_room:
             self._forwards.append(self._serve(packet))
@@ -373,4 +452,4 @@ class MasterLine:
 
 def is_good(answer: Symbol | None) -> TypeGuard[Control | Frame]:
     """Tell whether a poll was answered properly: with EOT or a good message."""
-    return isinstance(answer, Control) or (isinstance(answer, Frame) and answer.fault is None)
+    return answer == _EOT or (isinstance(answer, Frame) and answer.fault is None)

@@ -38,6 +38,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import math
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.machine import Machine, Procedure, Step
@@ -132,13 +133,13 @@ class _PollList:
 @dataclass(slots=True)
 class _Outstanding:
     """
-    A delivered command; ``deadline`` (clock value in s) is when its reply is overdue.
+    A command; ``deadline`` (clock value in s) is when its reply is overdue, once it is delivered.
 
     ``passed_over`` counts other messages that came in its place.
     """
 
     task: Task
-    deadline: float
+    deadline: float = math.inf
     passed_over: int = 0
 
     def is_over(self, now: float, is_message: bool) -> bool:
@@ -167,8 +168,10 @@ class StandardPollingMaster:
         self._normal = _PollList(polling.normal)
         self._outstanding: dict[int, _Outstanding] = {}
         self._listed = frozenset((*polling.priority, *polling.normal))
+        self._polled = self._listed - {settings.station}
         self._line.polled = self._listed
-        stations.add(self._listed - {settings.station})
+        self._line.take_reply = self._take_reply
+        stations.add(self._polled)
         # Stations that were passed a command and have not replied, and until when (clock value in
         # s) they may. There is no second one for them, or several senders would soon fill a sink
         # that a poll empties by one message, and our own commands would find no room in it.
@@ -243,7 +246,7 @@ class StandardPollingMaster:
         self._last_probed = polled
         yield from self._between_polls(source)
         begun = self._machine.now
-        answer = yield from self._line.poll(number)
+        answer = yield from self._line.probe(number)
         if is_good(answer):
             yield from self._answered(number, answer)
         spent = self._machine.now - begun
@@ -287,17 +290,28 @@ class StandardPollingMaster:
             packet = yield from self._line.receive(number, answer)
         if packet is not None and packet.is_reply and packet.dst != self._settings.station:
             self._given.pop(number, None)
-        entry = self._outstanding.get(number)
-        if packet is not None and entry is not None and packet.answers(entry.task.command):
-            del self._outstanding[number]
-            self._complete(number, packet, entry.task)
+        if packet is not None and self._take_reply(number, packet):
             return
         if packet is not None:
             self._line.take_unwanted(number, packet)
+        entry = self._outstanding.get(number)
         if entry is not None and entry.is_over(self._machine.now, isinstance(answer, Frame)):
-            self._line.counters.command_timeouts += 1
-            self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
-            self._end(number, CommandTimeout())
+            self._overdue(number)
+
+    def _take_reply(self, number: int, packet: Packet) -> bool:
+        """Complete the command that a message of a station answers; tell whether it is one."""
+        entry = self._outstanding.get(number)
+        if entry is None or not packet.answers(entry.task.command):
+            return False
+        del self._outstanding[number]
+        self._complete(number, packet, entry.task)
+        return True
+
+    def _overdue(self, number: int) -> None:
+        """End the command whose reply has not come in time (S0, counter 2545)."""
+        self._line.counters.command_timeouts += 1
+        self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
+        self._end(number, CommandTimeout())
 
     def _complete(self, number: int, reply: Packet, task: Task) -> None:
         try:
@@ -325,9 +339,11 @@ class StandardPollingMaster:
             packet = yield from self._line.forward(self._given)
             if packet is not None and not packet.is_reply and packet.dst in self._listed:
                 self._given[packet.dst] = self._machine.now + self._settings.cmd_timeout
-        for number in list(self._outstanding):
+        for number, entry in list(self._outstanding.items()):
             if not self._stations[number].active:  # it did not take what was passed on
                 self._end(number, StationInactive(number))
+            elif number not in self._polled and self._machine.now >= entry.deadline:
+                self._overdue(number)
         for _ in range(COMMANDS_BETWEEN_POLLS):
             task = source.next_task(self._machine.now, self._outstanding)
             if task is None:
@@ -345,12 +361,13 @@ class StandardPollingMaster:
             task.fail(StationInactive(number))  # it is polled in its turn
             return
         task.sent = True
-        self._outstanding[number] = _Outstanding(
-            task, self._machine.now + self._settings.cmd_timeout)
+        entry = self._outstanding[number] = _Outstanding(task)
         try:
-            yield from self._line.deliver(number, task.command, task.expires)
+            begun = yield from self._line.deliver(number, task.command, task.expires)
         except StationInactive as error:
             self._end(number, error)
         except CommandExpired as error:
             task.sent = error.sent
             self._end(number, error)
+        else:
+            entry.deadline = begun + self._settings.cmd_timeout

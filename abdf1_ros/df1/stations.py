@@ -34,7 +34,8 @@ class Station:
 
     ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
     first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
-    nodes that we pass on may have the same TNS. ``overdue`` counts the commands in a row that
+    nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
+    message whose addresses cannot be so. ``overdue`` counts the commands in a row that
     were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
     """
 
@@ -42,6 +43,7 @@ class Station:
     active: bool = True
     last_heard: float | None = None
     last_key: tuple[int, int, int, int] | None = None
+    last_refused: bytes | None = None
     last_tns: int | None = None
     replies: int = 0
     failures: int = 0

@@ -363,6 +363,19 @@ def test_message_may_not_crawl_for_ever(pause: float) -> None:
     assert now - 1.0 < 0.6 / (1 - 0.04 / pause) + 2 * pause
 
 
+def test_message_that_never_ends_is_given_up_after_the_time_of_the_longest() -> None:
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench.machine.start(0.0)
+    now = 1.0
+    bench.machine.receive_data(STX, now)
+    while not bench.got:
+        now += 0.01
+        bench.machine.handle_timeout(now)
+        bench.machine.receive_data(bytes(1), now)
+    assert bench.got == [None]
+    assert now == pytest.approx(1.0 + 2 * 261 * 0.01 + 0.6, abs=0.02)
+
+
 def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(b'', KEEP), timing=LineTiming(char_time=0.01))
     bench.machine.start(0.0)

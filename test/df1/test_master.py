@@ -27,7 +27,7 @@ from abdf1_ros.df1.master_line import MasterSettings, MIN_RESPONSE_TIME, MOST_QU
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
 import pytest
-from support.script import Answer, Expect, MasterScript, Silence
+from support.script import Answer, Expect, MasterScript, Murmur, Silence
 
 SLAVE, MASTER = 17, 5
 COMMAND = Packet(SLAVE, MASTER, 0x0F, 0, 0x0102, bytes.fromhex('A2 02 07 89 00 00'))
@@ -43,6 +43,7 @@ ACKED, NAKED = Expect(ACK), Expect(NAK)
 ACKED_AND_SENT = Expect(ACK + SENT.data)
 SAYS_ACK, SAYS_EOT, SAYS_NAK = Answer(ACK, 0.1), Answer(EOT, 0.1), Answer(NAK, 0.1)
 TIMEOUT = Silence(0.5)
+QUIET = Silence(MIN_RESPONSE_TIME)
 
 DELIVERED = {'commands_sent': 1, 'messages_sent': 1, 'acks_received': 1}
 
@@ -288,13 +289,23 @@ def _never_acknowledged(command: Packet) -> list[Expect | Silence]:
     return [TIMEOUT, sent, TIMEOUT, sent, TIMEOUT]
 
 
-@pytest.mark.parametrize('answer', [
-    Answer(damaged(REPLY), 0.1), Answer(message_frame(b'abc', Checksum.CRC), 0.1)])
-def test_bad_answer_leaves_an_inactive_station_inactive(answer: Answer) -> None:
+@pytest.mark.parametrize(('answer', 'numbers', 'counter'), [
+    (damaged(REPLY), [2506], 'crc_errors'),
+    (message_frame(b'abc', Checksum.CRC), [2513], 'invalid_messages'),
+    (NAK, [2517, 2511], 'naks_received')])
+def test_bad_answer_leaves_an_inactive_station_inactive_and_is_told(
+        answer: bytes, numbers: list[int], counter: str) -> None:
     script = inactive_script()
-    assert isinstance(script.run(COMMAND, POLLED, answer), StationInactive)
-    assert (script.changes, script.counts()) == ([], {'polls_sent': 1})
+    assert isinstance(script.run(COMMAND, POLLED, Answer(answer, 0.1)), StationInactive)
+    assert (script.changes, script.counts()) == ([], {'polls_sent': 1, counter: 1})
+    assert [number for number, *_ in script.numbers()] == [*numbers, 2509]
     assert not script.master.command_sent
+
+
+def test_noise_instead_of_an_answer_to_a_probe_is_told() -> None:
+    script = inactive_script()
+    script.run(COMMAND, POLLED, Answer(b'\x55', 0.1), Silence(0.4))
+    assert script.numbers() == [(2516, 0x55), (2509, SLAVE)]
 
 
 def test_ack_is_no_answer_to_a_probe() -> None:
@@ -363,18 +374,28 @@ def test_late_replies_in_a_row_are_counted_until_one_comes_in_time() -> None:
     assert station.overdue == 0
 
 
-def test_command_timeout_counts_from_the_beginning_of_the_transaction() -> None:
-    script = MasterScript(replace(SETTINGS, cmd_timeout=1.0))
+def test_command_timeout_counts_from_the_transmission_that_was_acknowledged() -> None:
+    """S0: the time of a cycle of command, ACK, poll and reply; what repetitions cost is not in."""
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5))
     error = script.run(COMMAND, SENT, TIMEOUT, SENT, Answer(ACK, 0.375), POLLED,
-                       Answer(EOT, 0.125), NAKED)
+                       Answer(EOT, 0.12), POLLED_AGAIN, Answer(EOT), NAKED)
     assert isinstance(error, CommandTimeout)
-    assert script.now == 101.0
+    assert script.now == pytest.approx(101.0)
+
+
+def test_lost_command_with_the_defaults_of_the_specification() -> None:
+    settings = MasterSettings(station=MASTER)
+    assert settings.timeout == settings.cmd_timeout
+    script = MasterScript(settings)
+    assert script.run(COMMAND, SENT, Silence(settings.timeout), SENT, SAYS_ACK, POLLED, SAYS_EOT,
+                      POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
+    assert 'command_timeouts' not in script.counts()
 
 
 def test_command_timeout_is_not_early() -> None:
-    script = MasterScript(replace(SETTINGS, cmd_timeout=1.0))
-    assert script.run(COMMAND, SENT, TIMEOUT, SENT, Answer(ACK, 0.375), POLLED,
-                      Answer(EOT, 0.12), POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
+    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5))
+    assert script.run(COMMAND, SENT, Answer(ACK, 0.375), POLLED, Answer(EOT, 0.12),
+                      POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
 
 
 def test_command_timeout_by_stale_messages() -> None:
@@ -438,11 +459,12 @@ def test_naks_only_end_as_inactive() -> None:
         (2519, 2), (2509, SLAVE)]
 
 
-def test_nak_is_no_answer_to_a_poll() -> None:
+def test_nak_instead_of_an_answer_to_a_poll_is_told_and_the_poll_repeated() -> None:
     script = MasterScript(SETTINGS)
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_NAK, SAYS_REPLY, ACKED) == REPLY
-    assert script.counts()['naks_received'] == 1
-    assert 'enq_retries' not in script.counts()
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_NAK, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2517,), (2511,), (2522, 1, 2511), (2523, SLAVE)]
+    assert script.counts()['naks_received'] == script.counts()['enq_retries'] == 1
 
 
 def test_eot_is_no_answer_to_a_command() -> None:
@@ -496,10 +518,9 @@ def test_command_from_a_slave_is_acknowledged_and_passed_over() -> None:
         'acks_sent': 2}
 
 
-@pytest.mark.parametrize('change', [{'dst': 6}, {'src': 18}])
-def test_reply_with_wrong_addresses_is_invalid(change: dict[str, Any]) -> None:
+def test_reply_to_another_station_is_invalid() -> None:
     script = MasterScript(replace(SETTINGS, accept_slave_messages=False))
-    wrong = replace(REPLY, **change)
+    wrong = replace(REPLY, dst=6)
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), ACKED, POLLED_AGAIN,
                       Answer(frame(replace(REPLY, tns=0x0101))), ACKED, POLLED_AGAIN,
                       says(REPLY), ACKED) == REPLY
@@ -507,6 +528,43 @@ def test_reply_with_wrong_addresses_is_invalid(change: dict[str, Any]) -> None:
         (2510, wrong.src, wrong.dst, wrong.tns), (2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
     assert script.counts()['invalid_messages'] == 1
     assert script.counts()['stale_messages'] == 1
+
+
+@pytest.mark.parametrize('change', [{'src': 18}, {'src': MASTER}, {'dst': SLAVE}])
+def test_message_that_cannot_be_the_stations_gets_no_ack_and_comes_again(
+        change: dict[str, Any]) -> None:
+    script = MasterScript(SETTINGS)
+    wrong = replace(REPLY, **change)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), POLLED_AGAIN, SAYS_REPLY,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2510, wrong.src, wrong.dst, wrong.tns), (2523, SLAVE)]
+    assert script.counts() == DELIVERED | {
+        'messages_received': 2, 'replies_received': 1, 'invalid_messages': 1, 'polls_sent': 2,
+        'acks_sent': 1}
+
+
+def test_message_that_cannot_be_the_stations_is_acknowledged_when_it_insists() -> None:
+    script = MasterScript(SETTINGS)
+    wrong = replace(REPLY, src=18)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), POLLED_AGAIN, says(wrong),
+                      ACKED, POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
+    assert script.counts()['invalid_messages'] == 1
+
+
+@pytest.mark.parametrize('checksum', Checksum)
+def test_reply_that_lost_its_leading_00_is_not_taken_for_a_command(checksum: Checksum) -> None:
+    """The CRC of M 3-6 begins with 0: neither check sees it; what is left begins with SLAVE 4F."""
+    command = replace(COMMAND, src=0)
+    script = MasterScript(replace(SETTINGS, station=0, checksum=checksum))
+    whole = command.reply(b'\x34\x12')
+    shorter = message_frame(whole.encode()[1:], checksum)
+    poll = [POLLED, Answer(shorter, 0.1)]
+    assert script.run(
+        command, Expect(master_frame(SLAVE, command.encode(), checksum)), SAYS_ACK, *poll,
+        POLLED_AGAIN, Answer(message_frame(whole.encode(), checksum), 0.1), ACKED) == whole
+    assert script.counts()['invalid_messages'] == 1
+    assert 'commands_received' not in script.counts()
+    assert [station.number for station in script.stations] == [SLAVE]
 
 
 def test_reply_with_an_error_status_is_a_reply() -> None:
@@ -531,7 +589,8 @@ def test_message_too_short() -> None:
 def test_message_too_long() -> None:
     script = MasterScript(SETTINGS)
     long = Answer(message_frame(bytes(262), Checksum.CRC))
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY,
+                      ACKED) == REPLY
     assert script.numbers() == [(2512, 261), (2522, 1, 2512), (2523, SLAVE)]
     assert script.counts()['invalid_messages'] == 1
 
@@ -550,9 +609,40 @@ def test_message_without_etx_ends_by_a_pause() -> None:
 def test_message_without_etx_ends_by_another_symbol() -> None:
     script = MasterScript(SETTINGS)
     broken = Answer(frame(REPLY)[:-4] + EOT)
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, broken, POLLED, SAYS_REPLY,
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, broken, QUIET, POLLED, SAYS_REPLY,
                       ACKED) == REPLY
     assert script.numbers() == [(2518,), (2522, 1, 2518), (2523, SLAVE)]
+
+
+def test_nothing_is_said_over_a_slave_that_goes_on_after_what_looks_like_a_symbol() -> None:
+    """A bit of a 00 turns over: DLE 00 inside of a message is no symbol (S0, message 2514)."""
+    script = MasterScript(SETTINGS, LineTiming(char_time=0.001))
+    reply = COMMAND.reply(bytes(40))
+    whole = frame(reply)
+    broken = whole.replace(bytes(8), b'\0\0\x10\0\0\0\0\0', 1)
+    assert script.run(
+        COMMAND, SENT, SAYS_ACK, POLLED, Answer(broken[:30], 0.1), Murmur(broken[30:40], 0.02),
+        Murmur(broken[40:], 0.02), Silence(MIN_RESPONSE_TIME + 0.01), POLLED, Answer(whole, 0.1),
+        ACKED) == reply
+    assert script.numbers() == [(2514, 0), (2518,), (2522, 1, 2518), (2523, SLAVE)]
+    assert script.counts()['invalid_messages'] == 1
+
+
+def test_good_message_after_a_false_start_is_taken() -> None:
+    script = MasterScript(SETTINGS)
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, Answer(STX + b'\x55' + frame(REPLY), 0.1),
+                      ACKED) == REPLY
+    assert script.numbers() == [(2518,), (2523, SLAVE)]
+    assert 'enq_retries' not in script.counts()
+
+
+def test_station_that_never_falls_quiet_is_not_listened_to_for_ever() -> None:
+    script = MasterScript(SETTINGS, LineTiming(char_time=0.001))
+    babble = [Murmur(b'\x55' * 10, 0.01)] * 29
+    longest = 0.02 + (10 + 261) * 0.001
+    assert script.run(
+        COMMAND, SENT, Answer(ACK, 0.1), POLLED, Answer(STX + EOT, 0.1), *babble,
+        Silence(longest - 0.29), POLLED, SAYS_REPLY, ACKED) == REPLY
 
 
 def test_bad_message_instead_of_an_ack_names_its_own_cause() -> None:

@@ -20,9 +20,12 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import message_frame
 from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MOST_QUEUED
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
 from hypothesis import given, strategies
 import pytest
@@ -480,6 +483,92 @@ def test_line_without_a_speed_is_polled_no_faster_than_the_set_one() -> None:
     rig.start()
     rig.run(1.0)
     assert 0.8 < rig.master.counts()['polls_sent'] * 6 * 10 / 19200 <= 1.01
+
+
+def replies_of(polling: PollingSettings | None, delay: float) -> int:
+    """Return how many commands to three stations are done in 15 s on a line with this delay."""
+    settings = replace(SETTINGS, nak_retries=3, enq_retries=3, cmd_timeout=1.0)
+    rig = MasterBench(7, 8, 9, settings=settings, polling=polling)
+    setattr(rig.line, '_propagation', delay / 2)
+    rig.start()
+    waiting = [rig.ask(number) for number in (7, 8, 9)]
+    done = []
+    while rig.clock() < 15.0:
+        rig.line.run(lambda waiting=waiting: any(map(ended, waiting)), 5.0)
+        done += filter(ended, waiting)
+        waiting = [rig.ask(errand.command.dst) if ended(errand) else errand
+                   for errand in waiting]
+    assert all(errand.result == errand.command.reply() for errand in done)
+    assert rig.master.changes == []
+    assert not {'stale_messages', 'invalid_messages'} & rig.master.counts().keys()
+    return len(done)
+
+
+@pytest.mark.parametrize('delay', [0.098, 0.105, 0.12, 0.14, 0.16])
+def test_constant_delay_beyond_timeout_costs_no_more_than_with_message_polling(
+        delay: float) -> None:
+    assert replies_of(PollingSettings((7, 8, 9)), delay) >= 0.95 * replies_of(None, delay)
+
+
+@pytest.mark.parametrize('is_waited_for', [True, False])
+def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
+        is_waited_for: bool) -> None:
+    rig = bench(PollingSettings((1, 2)), dead=(2,))
+    rig[1].delay = 9.0
+    errand = rig.ask(1)
+    rig.start()
+    rig.line.run(lambda: 'P2' in rig.master.said, 1.0)
+    begun = rig.clock()
+    late = errand.command.reply() if is_waited_for else Packet(5, 1, 0x4F, 0, 0x77)
+    rig.master.machine.receive_data(message_frame(late.encode(), Checksum.CRC), begun + 0.05)
+    assert rig.master.stations[1].last_heard == begun + 0.05
+    assert rig.master.stations[2].last_heard is None
+    assert rig.master.machine.data_to_send() == b''  # its ACK would be taken for station 2's
+    assert ended(errand) is is_waited_for
+    counts = rig.master.counts()
+    assert counts['messages_received'] == counts['replies_received'] == 1
+    assert counts.get('stale_messages', 0) == (not is_waited_for)
+    assert 'invalid_messages' not in counts
+    if not is_waited_for:
+        assert (2510, 1, 5, 0x77) in rig.master.numbers()
+
+
+def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None:
+    rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, enq_retries=3))
+    setattr(rig.line, '_propagation', 0.06)
+    errands = [rig.ask(1), rig.ask(2)]
+    rig.start()
+    rig.run(3.0)
+    assert [errand.result for errand in errands] == [
+        errand.command.reply() for errand in errands]
+    assert rig[1].slave.counters.acks_received + rig[2].slave.counters.acks_received == 2
+    assert [len(rig[number].served) for number in (1, 2)] == [1, 1]
+
+
+@pytest.mark.parametrize('number', [3, 5])
+def test_command_to_a_station_that_is_never_polled_ends_by_the_clock(number: int) -> None:
+    rig = bench(PollingSettings((1, 2, 5)))
+    rig.slaves[number] = type(rig[1])(number, rig.clock)  # another with our address, or unlisted
+    rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+    errand = rig.ask(number)
+    rig.start()
+    rig.line.run(lambda: ended(errand), 2.0)
+    assert isinstance(errand.result, CommandTimeout)
+    assert SETTINGS.cmd_timeout <= errand.seconds < SETTINGS.cmd_timeout + 0.1
+    assert rig.master.numbers() == [(2508,)]
+
+
+def test_fault_heard_while_probing_is_counted_and_told() -> None:
+    rig = bench(PollingSettings((1, 2)), dead=(1,))
+    rig.start(1)
+    reply = bytearray(message_frame(Packet(5, 1, 0x4F, 0, 7).encode(), Checksum.CRC))
+    reply[-1] ^= 1
+    while rig.master.machine.log[-1][1] != 'P1':
+        rig.run(0.01)
+    rig.master.machine.receive_data(bytes(reply), rig.clock())
+    assert rig.master.counts()['crc_errors'] == 1
+    assert [number for number, *_ in rig.master.numbers()] == [2506]
+    assert not rig.master.stations[1].active
 
 
 def test_start_is_a_clean_one() -> None:

@@ -46,6 +46,11 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
+class Murmur(Answer):
+    """Bytes that keep a listening master from speaking, whatever its patience with each wait."""
+
+
+@dataclass(frozen=True, slots=True)
 class Silence:
     """Nothing comes in for exactly ``seconds``; then the master's patience ends."""
 
@@ -110,6 +115,9 @@ class MasterScript:
         elif isinstance(step, Answer):
             assert self.machine.data_to_send() == b'', 'the master says more than the script'
             self.now += step.after
+            if isinstance(step, Murmur):
+                self.machine.handle_timeout(self.now)
+                assert self.machine.data_to_send() == b'', 'the master does not listen on'
             assert self.machine.deadline is None or self.now < self.machine.deadline
             self._received += len(step.data)
             self.machine.receive_data(step.data, self.now)
