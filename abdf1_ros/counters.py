@@ -21,7 +21,7 @@ event feeds which counter is our reading of the names and stands with each of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, Field, field, fields
 
 
 def _counter(number: int, mnemonic: str, description: str) -> int:
@@ -83,7 +83,15 @@ class Counters:
         2551, 'CNT_COM_READ_ERRORS', 'failures to read from the port')
     chars_sent: int = _counter(2560, 'CRD_CHAR_SENT', 'characters transmitted')
     chars_received: int = _counter(2561, 'CRD_CHAR_RECV', 'characters received')
+    # The specification has no numbers for these: a PLC's diagnostic counters show them (M 9-6).
+    enqs_received: int = 0
+    refused_for_memory: int = 0
 
     def by_mnemonic(self) -> dict[str, int]:
         """Return every counter by its mnemonic, in the order of the numbers."""
-        return {entry.metadata['mnemonic']: getattr(self, entry.name) for entry in fields(self)}
+        return {entry.metadata['mnemonic']: getattr(self, entry.name) for entry in numbered()}
+
+
+def numbered() -> list[Field[int]]:
+    """Return the counters of the specification, in the order of their numbers."""
+    return [entry for entry in fields(Counters) if entry.metadata]

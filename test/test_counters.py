@@ -16,9 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
-from abdf1_ros.counters import Counters
+from abdf1_ros.counters import Counters, numbered
 import pytest
 from support.vectors import load_json
 
@@ -27,12 +25,12 @@ SPECIFIED = [(number, name) for number, name in load_json('driver_tables.json')[
 
 def test_exactly_the_specified_counters_exist_in_their_order() -> None:
     assert SPECIFIED == [
-        (entry.metadata['number'], entry.metadata['mnemonic']) for entry in fields(Counters)]
+        (entry.metadata['number'], entry.metadata['mnemonic']) for entry in numbered()]
     assert len(SPECIFIED) == 29
 
 
 def test_every_counter_has_a_description() -> None:
-    descriptions = {entry.metadata['description'] for entry in fields(Counters)}
+    descriptions = {entry.metadata['description'] for entry in numbered()}
     assert '' not in descriptions
     assert len(descriptions) == len(SPECIFIED)
 
@@ -43,7 +41,7 @@ def test_counters_start_at_zero() -> None:
 
 def test_by_mnemonic_shows_each_counter_under_its_own_name() -> None:
     counters = Counters()
-    for entry in fields(Counters):
+    for entry in numbered():
         setattr(counters, entry.name, entry.metadata['number'])
     assert list(counters.by_mnemonic().items()) == [(name, number) for number, name in SPECIFIED]
 

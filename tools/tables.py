@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields
 import re
 
-from abdf1_ros.counters import Counters
+from abdf1_ros.counters import numbered
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -185,7 +185,7 @@ def counters() -> str:
     return table(('number', 'counter', 'counts', 'what it tells'), (
         (str(entry.metadata['number']), entry.metadata['mnemonic'],
          entry.metadata['description'], _linked(COUNTERS[entry.name]))
-        for entry in fields(Counters)))
+        for entry in numbered()))
 
 
 def outcomes() -> str:

@@ -327,6 +327,7 @@ class FullDuplexPeer:
             return self._message(symbol)
         if symbol == Control(Code.ENQ):
             self._expect_repetition()
+            self._counters.enqs_received += 1
             # What was heard since the last response was no message, or it would have had one.
             is_clean = self._machine.decoder.noise == self._noise
             return self._respond(self._last_response if is_clean else frames.NAK)
@@ -359,6 +360,7 @@ class FullDuplexPeer:
             self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
             return self._respond(frames.ACK)
         if not packet.is_reply and len(self._replies) >= MAX_WAITING_REPLIES:
+            self._counters.refused_for_memory += 1
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
         self._accepted = _Accepted(
             packet.duplicate_key, self._machine.now + self._settings.retry_time)

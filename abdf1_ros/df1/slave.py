@@ -174,6 +174,7 @@ class HalfDuplexSlave:
             return self._ack(frame)
         wants_reply = frame.station != BROADCAST and not packet.is_reply
         if wants_reply and len(self._queue) >= self._settings.queue_size:
+            self.counters.refused_for_memory += 1
             return b''  # sink full: neither acknowledged nor remembered
         self._last_key = packet.duplicate_key
         self._execute(packet, wants_reply)

@@ -62,7 +62,7 @@ def read_packet(block: Block, number: int,
     Raises LinkError, RemoteError, or FormatError for a reply that cannot be used.
     """
     request = block.requests[number]
-    reply = check_status((yield command))
+    reply = check_status((yield command), block.mappings[0].plc_type)
     return block.dialect.read_data(request.start, request.words, reply)
 
 
@@ -94,7 +94,7 @@ def carry_out(write: Write) -> Generator[Request, Packet, Ending]:
 def _send(write: Write, packet: int) -> Generator[Request, Packet, str]:
     """Send one packet; return what has to be said of the way it was done, if anything."""
     try:
-        check_status((yield write.commands[packet]))
+        check_status((yield write.commands[packet]), write.mapping.plc_type)
     except RemoteError as error:
         if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
             raise

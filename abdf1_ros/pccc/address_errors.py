@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What can be wrong with the text of an address."""
+"""What can be wrong with an address: its text, or its bytes in a command."""
 
 from __future__ import annotations
 
@@ -25,3 +25,11 @@ class AddressSyntaxError(FormatError):
 
 class AddressRangeError(FormatError):
     """The address is well formed, but outside what the family can have."""
+
+
+class AddressRefusal(FormatError):
+    """The address in a command leads nowhere; ``ext_sts`` is what a PLC answers (M 8-4)."""
+
+    def __init__(self, ext_sts: int, text: str) -> None:
+        super().__init__(text)
+        self.ext_sts = ext_sts

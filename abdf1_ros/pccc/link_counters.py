@@ -149,7 +149,8 @@ class ServedCounters:
             _UNDELIVERED: counters.nak_limit_exceeded + counters.enq_limit_exceeded,
             _ENQ_SENT: counters.enq_retries, _RETRIES: counters.nak_retries,
             'ENQ sent, or messages sent again': counters.enq_retries + counters.nak_retries,
-            _NAK_RECEIVED: counters.naks_received, _POLLS: counters.polls_received,
+            _NAK_RECEIVED: counters.naks_received, _ENQ_RECEIVED: counters.enqs_received,
+            _NO_MEMORY: counters.refused_for_memory, _POLLS: counters.polls_received,
             _BAD: (counters.bcc_errors + counters.crc_errors + counters.invalid_messages),
             'NAK sent': counters.naks_sent, _DUPLICATES: counters.duplicate_messages}
 

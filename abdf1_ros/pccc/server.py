@@ -26,9 +26,10 @@ from collections.abc import Callable
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
+from abdf1_ros.pccc.address_errors import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.emulated import EmulatedProcessor
-from abdf1_ros.pccc.family import Commands, Family, Refusal
+from abdf1_ros.pccc.family import Commands, extended, Family, Refusal
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
@@ -74,6 +75,8 @@ class Server:
             raise Refusal(*self._family.no_such_file) from None
         except OutOfRange:
             raise Refusal(*self._family.out_of_range) from None
+        except AddressRefusal as error:
+            raise extended(error.ext_sts) from None
         except FormatError:
             raise Refusal(status.STS_ILLEGAL_COMMAND) from None
 

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""STS and EXT STS of a reply, in words (M 8-2..8-4)."""
+"""STS and EXT STS of a reply, in words: M 8-2..8-4, and M 8-5..8-10 where a family differs."""
 
 from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.file_types import PlcType
 
 EXTENDED = 0xF0
 
@@ -25,16 +26,22 @@ STS_ILLEGAL_COMMAND = 0x10
 STS_ADDRESS = 0x50
 
 EXT_ILLEGAL_FIELD = 0x01
+EXT_TOO_FEW_LEVELS = 0x02
 EXT_TOO_MANY_LEVELS = 0x03
+EXT_NO_SUCH_SYMBOL = 0x04
+EXT_BAD_SYMBOL = 0x05
 EXT_BAD_ADDRESS = 0x06
 EXT_WRONG_SIZE = 0x07
+EXT_PAST_THE_END = 0x09
 EXT_TOO_LARGE = 0x0A
 EXT_DELETED_AREA = 0x13
 EXT_TYPE_MISMATCH = 0x17
+EXT_PROTECTED = 0x1E
 
 _ADDRESS_FAULTS = (
-    EXT_ILLEGAL_FIELD, EXT_TOO_MANY_LEVELS, EXT_BAD_ADDRESS, EXT_WRONG_SIZE, EXT_TOO_LARGE,
-    EXT_DELETED_AREA, EXT_TYPE_MISMATCH)
+    EXT_ILLEGAL_FIELD, EXT_TOO_FEW_LEVELS, EXT_TOO_MANY_LEVELS, EXT_NO_SUCH_SYMBOL,
+    EXT_BAD_SYMBOL, EXT_BAD_ADDRESS, EXT_WRONG_SIZE, EXT_PAST_THE_END, EXT_TOO_LARGE,
+    EXT_DELETED_AREA, EXT_TYPE_MISMATCH, EXT_PROTECTED)
 
 # Behind these stands the address of the node that owns the file or program (M 8-5).
 _WITH_OWNER = (0x1A, 0x1B)
@@ -79,7 +86,7 @@ _EXTENDED = {
     0x0A: 'transaction size plus word address too large',
     0x0B: 'no access: privilege missing',
     0x0C: 'condition cannot be produced, resource not available',
-    0x0D: 'condition exists already, resource in use',
+    0x0D: 'condition exists already, resource is already available',
     0x0E: 'command cannot be executed',
     0x0F: 'histogram overflow',
     0x10: 'no access',
@@ -102,19 +109,55 @@ _EXTENDED = {
 }
 
 
-def status_text(sts: int, ext_sts: int | None = None) -> str:
-    """Return codes and meaning, e.g. "STS 50: address not there, or memory protected"."""
+# What a family means by a code, where that is more or something else (M 8-5..8-10).
+_OF_FAMILY: dict[PlcType | None, dict[int, str]] = {
+    PlcType.PLC2: {
+        0x20: 'the PLC has found errors when it verified a command',
+        0x30: 'somebody has to look after the PLC: switch, cable or fault',
+        0x40: 'error between module and PLC',
+        0x50: 'address outside the data table or the window, or no compatibility file',
+        0x60: 'function disabled by a switch of the module',
+        0x80: 'protected commands are inhibited'},
+    PlcType.PLC3: {
+        0x30: 'a shutdown was requested',
+        0x40: 'backplane error',
+        0x50: 'file or word not there, or file above 65535 words',
+        0x60: 'keyswitch does not allow this'},
+}
+_EXTENDED_OF_FAMILY: dict[PlcType | None, dict[int, str]] = {
+    # SLC and MicroLogix report as on DH-485.
+    PlcType.SLC: {
+        0x07: 'memory module is too small',
+        0x0B: 'access denied',
+        0x0C: 'resource not available',
+        0x12: 'bad parameter',
+        0x14: 'failed while it was carried out'},
+    PlcType.PLC3: {
+        0x06: 'file or word not there, or address does not lead to a word',
+        0x07: 'words of the transaction are not there',
+        0x09: 'past the end of the file',
+        0x0A: 'total and word address are above 65535 together'},
+}
+
+
+def status_text(sts: int, ext_sts: int | None = None, family: PlcType | None = None) -> str:
+    """
+    Return codes and meaning, e.g. "STS 50: address not there, or memory protected".
+
+    ``family`` is that of the station that has answered, None where it is unknown.
+    """
     if sts & EXTENDED == EXTENDED and ext_sts is not None:
-        meaning = _EXTENDED.get(ext_sts, 'unknown code')
-        return f'STS {sts:02X} EXT STS {ext_sts:02X}: {meaning}'
-    parts = [_REMOTE.get(sts & 0xF0), _LOCAL.get(sts & 0x0F)]
+        known = _EXTENDED | _EXTENDED_OF_FAMILY.get(family, {})
+        return f'STS {sts:02X} EXT STS {ext_sts:02X}: {known.get(ext_sts, "unknown code")}'
+    remote = _REMOTE | _OF_FAMILY.get(family, {})
+    parts = [remote.get(sts & 0xF0), _LOCAL.get(sts & 0x0F)]
     meaning = '; '.join(part for part in parts if part) or 'unknown code'
     return f'STS {sts:02X}: {meaning}'
 
 
-def check_status(reply: Packet) -> bytes:
+def check_status(reply: Packet, family: PlcType | None = None) -> bytes:
     """
-    Return the data of a reply that reports success.
+    Return the data of a reply that reports success, of a station of ``family``.
 
     Raises RemoteError for any other; a reply that breaks off before its EXT STS counts too.
     """
@@ -122,7 +165,7 @@ def check_status(reply: Packet) -> bytes:
         return reply.data
     extended = reply.sts & EXTENDED == EXTENDED and len(reply.data) > 0
     ext_sts = reply.data[0] if extended else None
-    text = status_text(reply.sts, ext_sts)
+    text = status_text(reply.sts, ext_sts, family)
     if ext_sts in _WITH_OWNER and len(reply.data) > 1:
         text += f' ({reply.data[1]})'
     raise RemoteError(reply.sts, ext_sts, text)

@@ -626,7 +626,7 @@ def test_wrong_check(checksum: Checksum, counter: str, event: int) -> None:
     damaged = frame[:-1] + bytes((frame[-1] ^ 0x20,))
     assert peer.hear(damaged) == NAK
     assert peer.hear(ENQ) == NAK
-    assert peer.counts() == {'naks_sent': 2, counter: 1}
+    assert peer.counts() == {'naks_sent': 2, counter: 1, 'enqs_received': 1}
     if checksum is Checksum.CRC:
         values = frame[-1] ^ 0x20, frame[-2], frame[-1], frame[-2]
     else:
@@ -808,6 +808,7 @@ def test_sink_full() -> None:
     assert peer.served == packets
     assert peer.counts()['commands_received'] == MAX_WAITING_REPLIES + 1
     assert peer.counts()['duplicate_messages'] == 1
+    assert peer.counts()['refused_for_memory'] == peer.counts()['enqs_received'] == 2
 
 
 def test_reply_is_taken_with_the_sink_full() -> None:

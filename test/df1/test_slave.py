@@ -242,6 +242,7 @@ def test_sink_full_command_is_neither_acknowledged_nor_executed_nor_remembered()
     assert bench.hear(POLL, HEARD_ACK, commands[2]) == [reply_frame(COMMAND), b'', ACK]
     assert bench.served[2] == later(2)
     assert bench.slave.counters.duplicate_messages == 0
+    assert bench.slave.counters.refused_for_memory == 1
 
 
 def test_duplicate_is_acknowledged_by_a_full_sink_too() -> None:

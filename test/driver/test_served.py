@@ -216,12 +216,17 @@ def test_words_of_a_plc2_and_a_plc3(plc: str, text: str, next_text: str, beyond:
     assert bench.heard() == [(mapping.name, [1, 2, 0x1010, 4])]
     assert bench.write_bits(text, 0x8001, 0x8000) == (0, b'')
     assert bench.published == [(mapping, b'\0\x80\2\0\x10\x10\4\0')]
-    assert bench.refused_read(beyond) == bench.write(next_text, 1, 2, 3) == (0x50, b'')
+    missing, past_end = {'PLC2': ((0x50, b''), (0x50, b'')),
+                         'PLC3': ((0xF0, b'\x06'), (0xF0, b'\x07'))}[plc]
+    assert bench.refused_read(beyond) == missing
+    assert bench.write(next_text, 1, 2, 3) == past_end
 
 
-@pytest.mark.parametrize('plc', ['PLC2', 'PLC3'])
-def test_without_rows_a_plc2_or_plc3_has_no_words(plc: str) -> None:
-    assert Bench(plc).refused_read('020' if plc == 'PLC2' else 'N7:0') == (0x50, b'')
+@pytest.mark.parametrize(('plc', 'text', 'codes'), [
+    ('PLC2', '020', (0x50, b'')), ('PLC3', 'N7:0', (0xF0, b'\x06'))])
+def test_without_rows_a_plc2_or_plc3_has_no_words(plc: str, text: str,
+                                                  codes: tuple[int, bytes]) -> None:
+    assert Bench(plc).refused_read(text) == codes
 
 
 def test_bits_of_a_plc2() -> None:

@@ -123,12 +123,17 @@ def test_own_counters_under_the_names_of_the_layout() -> None:
     counters = Counters(
         messages_sent=1, messages_received=2, nak_limit_exceeded=3, enq_limit_exceeded=4,
         enq_retries=5, nak_retries=6, naks_received=7, polls_received=8, bcc_errors=9,
-        crc_errors=10, invalid_messages=11, naks_sent=12, duplicate_messages=13)
+        crc_errors=10, invalid_messages=11, naks_sent=12, duplicate_messages=13,
+        enqs_received=14, refused_for_memory=15)
     shown = {layout: decode_counters(ServedCounters(counters, layout).encode(), layout)
              for layout in Layout}
     assert shown[Layout.SLC_SLAVE]['messages sent again'] == '6'
     assert shown[Layout.SLC_SLAVE]['polls received'] == '8'
     assert shown[Layout.SLC_FULL_DUPLEX]['ENQ sent'] == '5'
+    assert shown[Layout.SLC_FULL_DUPLEX]['ENQ received'] == '14'
+    assert shown[Layout.SLC_FULL_DUPLEX]['messages refused for lack of memory'] == '15'
+    assert shown[Layout.SLC_SLAVE]['messages refused for lack of memory'] == '15'
+    assert shown[Layout.PLC5]['ENQ received'] == '14'
     assert shown[Layout.PLC5]['ENQ sent, or messages sent again'] == '11'
     assert shown[Layout.PLC5]['NAK sent'] == '12'
     for counts in shown.values():

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import check_status, is_address_fault, status_text
 import pytest
 from support.vectors import pair
@@ -79,7 +80,8 @@ def test_failures_of_the_vectors(name: str, codes: tuple[int, int | None]) -> No
 
 
 @pytest.mark.parametrize(('sts', 'data'), [
-    (0x10, b''), (0x50, b''), *((0xF0, bytes((code,))) for code in (1, 3, 6, 7, 10, 0x13, 0x17))])
+    (0x10, b''), (0x50, b''), *((0xF0, bytes((code,))) for code in (
+        1, 2, 3, 4, 5, 6, 7, 9, 10, 0x13, 0x17, 0x1E))])
 def test_refusal_of_the_address(sts: int, data: bytes) -> None:
     assert is_address_fault(failure(sts, data))
 
@@ -88,3 +90,21 @@ def test_refusal_of_the_address(sts: int, data: bytes) -> None:
     (0x05, b''), (0x60, b''), (0x70, b''), (0xF0, b''), (0xF0, b'\x0B'), (0xF0, b'\x1F')])
 def test_refusal_for_another_reason(sts: int, data: bytes) -> None:
     assert not is_address_fault(failure(sts, data))
+
+
+@pytest.mark.parametrize(('family', 'sts', 'ext_sts', 'meaning'), [
+    (PlcType.PLC2, 0x80, None, 'protected commands are inhibited'),
+    (PlcType.PLC2, 0x70, None, 'processor is in program mode'),
+    (PlcType.PLC3, 0x30, None, 'a shutdown was requested'),
+    (PlcType.PLC3, 0xF0, 0x09, 'past the end of the file'),
+    (PlcType.SLC, 0xF0, 0x0B, 'access denied'),
+    (PlcType.SLC, 0xF0, 0x0E, 'command cannot be executed'),
+    (PlcType.PLC5, 0xF0, 0x0D, 'condition exists already, resource is already available'),
+    (None, 0xF0, 0x0B, 'no access: privilege missing')])
+def test_meanings_of_a_family(family: PlcType | None, sts: int, ext_sts: int | None,
+                              meaning: str) -> None:
+    """M 8-4, and M 8-5..8-10 for those that differ."""
+    assert status_text(sts, ext_sts, family).endswith(f': {meaning}')
+    data = b'' if ext_sts is None else bytes((ext_sts,))
+    with pytest.raises(RemoteError, match=f': {meaning}$'):
+        check_status(Packet(5, 1, 0x4F, sts, 1, data), family)

@@ -23,13 +23,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import status
+from abdf1_ros.pccc.address_errors import AddressRefusal
 from abdf1_ros.pccc.fields import number, Reader
 
 DATA_TABLE = 3
 CONTEXT = 1
 _DEFAULTS = (DATA_TABLE, CONTEXT, 0, 0, 0, 0)
 _ALWAYS_THERE = (2, 3, 5)  # section, file, and word, because it is the last
+_LEAST_LEVELS = 4  # three or fewer are too few for a word (M 8-8..8-10)
+_LONGEST_SYMBOL = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +54,34 @@ class ExtendedAddress:
 
     @classmethod
     def read(cls, reader: Reader) -> ExtendedAddress:
-        """Take an address off ``reader``; FormatError for symbols and other memory."""
+        """
+        Take an address off ``reader``.
+
+        Raises AddressRefusal for symbols and other memory, FormatError when bytes run out.
+        """
         flag = reader.byte()
         if flag == 0:
-            raise FormatError('a symbol is no address that can be looked up here')
+            raise _no_symbol(reader)
         if flag >> len(_DEFAULTS):
-            raise FormatError(f'address flag {flag:02X} has more levels than a PLC-3')
+            raise AddressRefusal(status.EXT_TOO_MANY_LEVELS,
+                                 f'address flag {flag:02X} has more levels than a PLC-3')
+        if flag.bit_length() < _LEAST_LEVELS:
+            raise AddressRefusal(status.EXT_TOO_FEW_LEVELS,
+                                 f'address flag {flag:02X} does not reach a file')
         area, context, *levels = (
             reader.number() if flag >> n & 1 else default
             for n, default in enumerate(_DEFAULTS))
         if (area, context) != (DATA_TABLE, CONTEXT):
-            raise FormatError(f'E{area}.{context} is not the data table of context {CONTEXT}')
+            raise AddressRefusal(status.EXT_BAD_ADDRESS, (
+                f'E{area}.{context} is not the data table of context {CONTEXT}'))
         return cls(*levels)
+
+
+def _no_symbol(reader: Reader) -> AddressRefusal:
+    """Return why the symbol that follows leads nowhere: its length, or there are none here."""
+    length = 0
+    while reader.byte():
+        length += 1
+    if not 0 < length <= _LONGEST_SYMBOL:
+        return AddressRefusal(status.EXT_BAD_SYMBOL, f'a symbol of {length} characters')
+    return AddressRefusal(status.EXT_NO_SUCH_SYMBOL, 'symbols cannot be looked up here')

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address_errors import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.family import Codes
 from abdf1_ros.pccc.fields import Reader
@@ -27,7 +27,9 @@ from abdf1_ros.pccc.plc2.server import BasicService, Window
 from abdf1_ros.pccc.plc3 import address as plc3_address
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from abdf1_ros.pccc.word_range import commands as word_range
-from abdf1_ros.pccc.word_range.server import WordRangeService
+from abdf1_ros.pccc.word_range.server import RangeCodes, WordRangeService
+
+_LAST_SECTION = 15  # of the data table; above that an address cannot be converted (M 8-8)
 
 
 class Plc3Commands:
@@ -37,25 +39,32 @@ class Plc3Commands:
     A PLC-2 command works on the input file whose number is the station it comes from.
     """
 
-    no_such_file: Codes = status.STS_ADDRESS, None
-    out_of_range: Codes = status.STS_ADDRESS, None
+    no_such_file: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
+    out_of_range: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
 
     def __init__(self, table: DataTable) -> None:
-        words = WordRangeService(table, ExtendedAddress.read, _place,
-                                 bad_size=(status.STS_ILLEGAL_COMMAND, None),
-                                 too_long=self.out_of_range)
-        files = WordRangeService(table, _read_file_address, _place,
-                                 bad_size=(status.STS_ILLEGAL_COMMAND, None),
-                                 too_long=self.out_of_range)
+        words = WordRangeService(table, ExtendedAddress.read, _place, _CODES)
+        files = WordRangeService(table, _read_file_address, _place, _CODES)
         self.commands = words.commands() | {
             (word_range.CMD, word_range.FILE_READ): files.read}
         self.basic_commands = BasicService(table, _compatibility_file).everything()
 
 
+# M 8-8, 8-9: sizes that do not fit each other have an STS of their own.
+_CODES = RangeCodes(
+    bad_size=(status.STS_ILLEGAL_COMMAND, None),
+    missing=(status.EXTENDED, status.EXT_BAD_ADDRESS),
+    read_past_end=(status.EXTENDED, status.EXT_PAST_THE_END),
+    write_past_end=(status.EXTENDED, status.EXT_WRONG_SIZE))
+
+
 def _place(address: ExtendedAddress) -> Address:
     kind = plc3_address.BY_SECTION.get(address.section)
     if kind is None:
-        raise FormatError(f'section {address.section} is not known')
+        number = address.section
+        raise AddressRefusal(
+            status.EXT_ILLEGAL_FIELD if number > _LAST_SECTION else status.EXT_BAD_ADDRESS,
+            f'section {number} is not known')
     if kind.is_structure:
         return Address(PlcType.PLC3, kind, address.file, address.structure, address.word)
     return Address(PlcType.PLC3, kind, address.file, address.word)
@@ -65,7 +74,8 @@ def _read_file_address(reader: Reader) -> ExtendedAddress:
     """Take an address off ``reader`` that has to be a file, not a word in it."""
     address = ExtendedAddress.read(reader)
     if address.structure or address.word:
-        raise FormatError('a file read begins at the first word of a file')
+        raise AddressRefusal(status.EXT_BAD_ADDRESS,
+                             'a file read begins at the first word of a file')
     return address
 
 

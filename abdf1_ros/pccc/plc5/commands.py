@@ -19,7 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address_errors import AddressRangeError, AddressRefusal, AddressSyntaxError
 from abdf1_ros.pccc.fields import number, Reader, word
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.typed_data import FLOAT, INTEGER, TypedData
@@ -38,8 +40,8 @@ MAX_INTEGERS = 110  # 118 would fit, but without room for descriptors that are p
 MAX_ELEMENT_ADDRESS = 7
 
 _AREA, _FILE, _ELEMENT, _SUB_ELEMENT = 1, 2, 4, 8
-_ASCII_PREFIX = b'\x00$'
 _MAX_SETS = 243
+_DEFAULT_FILE = 1  # of an address without a file level (M 13-10..13-15)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,31 +98,41 @@ class SystemAddress:
 
     @classmethod
     def read(cls, reader: Reader) -> SystemAddress:
-        """Take an address off ``reader``, logical binary or logical ASCII (M 13-10..13-15)."""
+        """
+        Take an address off ``reader``, logical binary or logical ASCII (M 13-10..13-15).
+
+        Raises AddressRefusal for one that leads nowhere, FormatError when bytes run out.
+        """
         mask = reader.byte()
         if mask == 0:
             return cls._read_ascii(reader)
         if mask & ~(_AREA | _FILE | _ELEMENT | _SUB_ELEMENT):
-            raise FormatError(f'address mask {mask:02X} has more levels than a PLC-5')
+            raise AddressRefusal(status.EXT_TOO_MANY_LEVELS,
+                                 f'address mask {mask:02X} has more levels than a PLC-5')
         area = reader.number() if mask & _AREA else 0
         if area:
-            raise FormatError(f'memory area {area} is not the data table')
-        if not mask & _FILE:  # M 13-10..13-15 take it for 1, other drivers for 0
-            raise FormatError(f'address mask {mask:02X} names no file')
-        file = reader.number()
+            raise AddressRefusal(status.EXT_BAD_ADDRESS,
+                                 f'memory area {area} is not the data table')
+        file = reader.number() if mask & _FILE else _DEFAULT_FILE
         element = reader.number() if mask & _ELEMENT else 0
         return cls(file, element, reader.number() if mask & _SUB_ELEMENT else None)
 
     @classmethod
     def _read_ascii(cls, reader: Reader) -> SystemAddress:
         text = bytearray()
-        if reader.byte() != _ASCII_PREFIX[1]:
-            raise FormatError('a symbolic address has to begin with "$"')
         while (byte := reader.byte()) != 0:
             text.append(byte)
-        address = Address.parse(text.decode('ascii', 'replace'), PlcType.PLC5)
+        if text[:1] != b'$':
+            raise AddressRefusal(status.EXT_NO_SUCH_SYMBOL,
+                                 'a symbol; an address in ASCII begins with "$"')
+        try:
+            address = Address.parse(text[1:].decode('ascii', 'replace'), PlcType.PLC5)
+        except AddressSyntaxError as error:
+            raise AddressRefusal(status.EXT_BAD_SYMBOL, str(error)) from None
+        except AddressRangeError as error:
+            raise AddressRefusal(status.EXT_BAD_ADDRESS, str(error)) from None
         if address.bit is not None:
-            raise FormatError('a system address names no bit')
+            raise AddressRefusal(status.EXT_BAD_SYMBOL, 'a system address names no bit')
         return cls(address.file, address.element, address.word or None)
 
 

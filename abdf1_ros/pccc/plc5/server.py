@@ -24,7 +24,11 @@ from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
 from abdf1_ros.pccc.plc5 import commands as plc5
-from abdf1_ros.pccc.word_range.server import WordRangeService
+from abdf1_ros.pccc.word_range.server import RangeCodes, WordRangeService
+
+_TOO_LARGE: Codes = status.EXTENDED, status.EXT_TOO_LARGE
+_RANGE_CODES = RangeCodes((status.EXTENDED, status.EXT_ILLEGAL_FIELD), _TOO_LARGE, _TOO_LARGE,
+                          _TOO_LARGE)
 
 
 class Plc5Commands:
@@ -41,9 +45,7 @@ class Plc5Commands:
             (plc5.CMD, plc5.TYPED_WRITE): self._typed_write,
             (plc5.CMD, plc5.READ_MODIFY_WRITE): self._read_modify_write,
         } | WordRangeService(
-            table, plc5.SystemAddress.read, self._address,
-            bad_size=(status.EXTENDED, status.EXT_ILLEGAL_FIELD),
-            too_long=(status.EXTENDED, status.EXT_TOO_LARGE)).commands()
+            table, plc5.SystemAddress.read, self._address, _RANGE_CODES).commands()
 
     def _typed_read(self, reader: Reader) -> bytes:
         request = plc5.TypedRead.read(reader)

@@ -37,20 +37,32 @@ _Place = TypeVar('_Place', bound=WireAddress)
 
 
 @dataclass(frozen=True, slots=True)
+class RangeCodes:
+    """
+    What a family answers to word range commands that cannot be executed.
+
+    ``bad_size`` is for sizes, offsets and totals that do not fit each other, ``missing`` for a
+    first word that is not there, the others for a transaction that ends after its file.
+    """
+
+    bad_size: Codes
+    missing: Codes
+    read_past_end: Codes
+    write_past_end: Codes
+
+
+@dataclass(frozen=True, slots=True)
 class WordRangeService(Generic[_Place]):
     """
     Execute word range commands on ``table``.
 
-    ``read_address`` takes an address off a command, ``find`` says where it is. ``bad_size`` is
-    the answer to sizes, offsets and totals that do not fit each other, ``too_long`` the one to
-    a transaction that ends behind the file.
+    ``read_address`` takes an address off a command, ``find`` says where it is.
     """
 
     table: DataTable
     read_address: Callable[[Reader], _Place]
     find: Callable[[_Place], Address]
-    bad_size: Codes
-    too_long: Codes
+    codes: RangeCodes
 
     def commands(self) -> Commands:
         """Return the functions by CMD and FNC."""
@@ -64,17 +76,17 @@ class WordRangeService(Generic[_Place]):
         """Execute a word range read, or a file read, which looks the same."""
         request = WordRangeRead.read(reader, self.read_address)
         if request.size > word_range.MAX_READ:
-            raise Refusal(*self.bad_size)
+            raise Refusal(*self.codes.bad_size)
         words = self._words(self.find(request.address), request.offset, request.size,
-                            request.total)
+                            request.total, self.codes.read_past_end)
         return b''.join(self.table.read(word, 1) for word in words)
 
     def _write(self, reader: Reader) -> bytes:
         request = WordRangeWrite.read(reader, self.read_address)
         if len(request.address.encode()) + len(request.data) > word_range.MAX_WRITE:
-            raise Refusal(*self.bad_size)
+            raise Refusal(*self.codes.bad_size)
         words = self._words(self.find(request.address), request.offset, len(request.data),
-                            request.total)
+                            request.total, self.codes.write_past_end)
         for number, word in enumerate(words):
             self.table.write(word, request.data[2 * number:2 * number + 2])
         return b''
@@ -85,13 +97,15 @@ class WordRangeService(Generic[_Place]):
         self.table.write_bits(place, request.set | request.reset, request.set)
         return b''
 
-    def _words(self, start: Address, offset: int, size: int, total: int) -> Iterator[Address]:
+    def _words(self, start: Address, offset: int, size: int, total: int,
+               past_end: Codes) -> Iterator[Address]:
         """Return the words of one packet, after a look at all of the transaction."""
         if size == 0 or size % 2 or offset + size // 2 > total:
-            raise Refusal(*self.bad_size)
-        try:
-            self.table.find(start, total)
-        except OutOfRange:
-            raise Refusal(*self.too_long) from None
+            raise Refusal(*self.codes.bad_size)
+        for words, refusal in ((1, self.codes.missing), (total, past_end)):
+            try:
+                self.table.find(start, words)
+            except OutOfRange:
+                raise Refusal(*refusal) from None
         first = start.offset + offset
         return (word_on_line(start.at_offset(first + n)) for n in range(size // 2))

@@ -47,7 +47,8 @@ def test_file_read_of_the_vectors() -> None:
 
 
 def test_file_read_begins_at_the_first_word() -> None:
-    assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (0x10, '')
+    assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (
+        0xF0, '06')
 
 
 def test_files_are_numbered_in_each_section() -> None:
@@ -71,17 +72,28 @@ def test_bit_write_sets_and_resets() -> None:
     assert words_at(memory, 'B10:0', 3) == '00 00 F0 80 00 00'
 
 
-@pytest.mark.parametrize(('data', 'sts'), [
-    ('01 00 00 01 00 2C 08 0B 00 02', 0x50), ('01 00 00 05 00 2C 08 0A 00 02', 0x50),
-    ('01 00 00 01 00 2C 08 0A 04 02', 0x50), ('01 00 00 01 00 2C 08 0A 00 00', 0x10),
-    ('01 00 00 01 00 2C 08 0A 00 01', 0x10), ('01 00 00 01 00 2C 08 0A 00 04', 0x10),
-    ('01 01 00 01 00 2C 08 0A 00 02', 0x10), ('01 00 00 00 00 2C 08 0A 00 02', 0x10),
-    ('01 00 00 01 00 2C 06 0A 00 02', 0x10), ('01 00 00 01 00 00 41 42 00 02', 0x10),
-    ('01 00 00 01 00 2D 02 08 0A 00 02', 0x10), ('00 00 00 01 00 2C 08 0A 00', 0x10),
-    ('00 00 00 02 00 2C 08 0A 03 01 00 02 00', 0x50), ('02 2C 08 0A 00 01 00 01 00', 0x10),
-    ('02 2C 08 0A 04 01 00 00 00', 0x50), ('68 00 00 01 00 07 00 07 00 01 00', 0x10),
-    ('26 2C 08 0A 00 FF FF 01 00', 0x10), ('03 00 00 01 00 0C 08 0A 01 00', 0x10)])
-def test_refusals(data: str, sts: int) -> None:
+@pytest.mark.parametrize(('data', 'ext_sts'), [
+    ('01 00 00 01 00 2C 10 0A 00 02', '01'), ('01 00 00 01 00 04 08 02', '02'),
+    ('01 00 00 01 00 6C 08 0A 00 00 02', '03'), ('01 00 00 01 00 00 41 42 00 02', '04'),
+    ('01 00 00 01 00 00 00 02', '05'), ('01 00 00 01 00 00 414243444546474849 00 02', '05'),
+    ('01 00 00 01 00 2C 08 0B 00 02', '06'), ('01 00 00 01 00 2C 08 0A 04 02', '06'),
+    ('01 00 00 01 00 2C 06 0A 00 02', '06'), ('01 00 00 01 00 2D 02 08 0A 00 02', '06'),
+    ('02 2C 08 0A 04 01 00 00 00', '06'), ('00 00 00 02 00 2C 08 0A 03 01 00 02 00', '07'),
+    ('00 00 00 01 00 2C 08 0A 04 01 00', '06'), ('01 00 00 05 00 2C 08 0A 00 02', '09')])
+def test_addresses_that_lead_nowhere(data: str, ext_sts: str) -> None:
+    """The codes of M 8-8 (writes), 8-9 (reads) and 8-10 (bit write)."""
     memory = table(PLC3, B10_0=counting(4))
-    assert ask(memory, data) == (sts, '')
+    assert ask(memory, data) == (0xF0, ext_sts)
+    assert words_at(memory, 'B10:0', 4) == '00 00 01 00 02 00 03 00'
+
+
+@pytest.mark.parametrize('data', [
+    '01 00 00 01 00 2C 08 0A 00 00', '01 00 00 01 00 2C 08 0A 00 01',
+    '01 00 00 01 00 2C 08 0A 00 04', '01 01 00 01 00 2C 08 0A 00 02',
+    '01 00 00 00 00 2C 08 0A 00 02', '00 00 00 01 00 2C 08 0A 00',
+    '02 2C 08 0A 00 01 00 01 00', '68 00 00 01 00 07 00 07 00 01 00',
+    '26 2C 08 0A 00 FF FF 01 00', '03 00 00 01 00 0C 08 0A 01 00'])
+def test_what_is_malformed_or_unknown(data: str) -> None:
+    memory = table(PLC3, B10_0=counting(4))
+    assert ask(memory, data) == (0x10, '')
     assert words_at(memory, 'B10:0', 4) == '00 00 01 00 02 00 03 00'

@@ -86,10 +86,12 @@ def test_what_is_no_address(encoded: str) -> None:
         SystemAddress.read(parameters(encoded))
 
 
-@pytest.mark.parametrize('encoded', ['04 1E 00', '05 00 1E 00', '0D 00 02 01 00', '01 00 00'])
-def test_address_without_a_file_is_refused(encoded: str) -> None:
-    with pytest.raises(FormatError, match='^address mask 0. names no file$'):
-        SystemAddress.read(parameters(encoded))
+@pytest.mark.parametrize(('encoded', 'address'), [
+    ('04 1E', SystemAddress(1, 30)), ('05 00 1E', SystemAddress(1, 30)),
+    ('0D 00 02 01', SystemAddress(1, 2, 1)), ('01 00', SystemAddress(1, 0))])
+def test_file_that_is_left_out_is_file_1(encoded: str, address: SystemAddress) -> None:
+    """M 13-10..13-15; other drivers take it for 0."""
+    assert SystemAddress.read(parameters(encoded)) == address
 
 
 @pytest.mark.parametrize(('letters', 'descriptor', 'words', 'size'), [
