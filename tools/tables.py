@@ -21,14 +21,17 @@ from dataclasses import fields
 import re
 
 from abdf1_ros.counters import numbered
+from abdf1_ros.df1.frames import Code
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.describe import command_codes
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.status import status_text
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.network import FIELDS, NetField
 from abdf1_ros.settings.values import types_of
@@ -192,6 +195,44 @@ def outcomes() -> str:
     """Return how a write may end."""
     return table(('the message begins with', 'meaning'), (
         (_code(outcome.value), text) for outcome, text in OUTCOMES.items()))
+
+
+_SYMBOL_USES = {
+    Code.SOH: "a master's message begins", Code.STX: 'data begin', Code.ETX: 'data end',
+    Code.EOT: 'nothing to send (slave)',
+    Code.ENQ: 'poll (half duplex); say your last response again (full duplex)',
+    Code.ACK: 'message taken', Code.NAK: 'message refused (full duplex); reset (half duplex)'}
+
+
+def symbols() -> str:
+    """Return the control symbols of the line."""
+    return table(('symbol', 'bytes', 'says'), (
+        (f'DLE {code.name}', _code(f'10 {code:02X}'), text)
+        for code, text in _SYMBOL_USES.items()))
+
+
+def file_codes() -> str:
+    """Return the file types of SLC commands."""
+    types = (kind for kind in file_types_of(PlcType.SLC))
+    return table(('file', 'type'), (
+        (kind.value, _code(f'{layout.code:02X}')) for kind in types
+        if (layout := layout_of(kind, PlcType.SLC)).code))
+
+
+def statuses() -> str:
+    """Return the meaning of every STS and EXT STS."""
+    plain = [(_code(f'{sts:02X}'), text) for sts in (*range(1, 16), *range(16, 256, 16))
+             if 'unknown' not in (text := status_text(sts).partition(': ')[2])]
+    extended = [(_code(f'F0 {ext:02X}'), text) for ext in range(1, 256)
+                if 'unknown code' not in (text := status_text(0xF0, ext).partition(': ')[2])]
+    return table(('STS', 'meaning'), [*plain, *extended])
+
+
+def commands() -> str:
+    """Return every command that we know by name."""
+    return table(('CMD', 'FNC', 'name'), (
+        (_code(f'{cmd:02X}'), '' if function is None else _code(f'{function:02X}'), name)
+        for (cmd, function), name in command_codes().items()))
 
 
 def rooms() -> str:

@@ -66,6 +66,12 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
     return hexadecimal(data)
 
 
+def command_codes() -> dict[tuple[int, int | None], str]:
+    """Return the name of every command that we know, by CMD and FNC (None: it has none)."""
+    named = {code: entry.name for code, entry in _COMMANDS.items()}
+    return dict(sorted((named | _NAMES).items(), key=lambda item: (item[0][0], item[0][1] or 0)))
+
+
 def command_name(packet: Packet) -> str:
     """Return CMD and, where there is one, FNC, e.g. "0F/68"."""
     cmd, function = _code(packet)
