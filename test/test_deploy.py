@@ -97,8 +97,9 @@ def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(tmp_path: Pa
     node.chmod(0o755)
     (install / 'setup.bash').write_text(f'cd {SOURCE}\n')
     etc.mkdir()
+    files = ', '.join(f'{name}_file: {SOURCE}/config/{name}.csv' for name in ('net', 'map'))
     (etc / 'press.yaml').write_text(
-        '/**: {ros__parameters: {port: /dev/ttyS99, stale_after: 9.0}}\n')
+        f'/**: {{ros__parameters: {{{files}, port: /dev/ttyS99, stale_after: 9.0}}}}\n')
     service = unit()['Service']
     (command,) = service['ExecStart']
     settings = dict(entry.split('=', 1) for entry in service['Environment'])

@@ -17,7 +17,9 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 import gc
+import sys
 from types import ModuleType
 from typing import Any
 
@@ -27,21 +29,33 @@ from abdf1_ros.df1.frames import MAX_WAITING
 def container_lengths(root: object) -> dict[str, int]:
     """Return the length of the longest container of each kind that ``root`` keeps alive."""
     found: dict[str, int] = {}
-    seen = {id(root)}
-    waiting: deque[Any] = deque([root])
-    while waiting:
-        thing = waiting.popleft()
+    for thing in _kept([root]):
         if isinstance(thing, bytearray):
             assert len(thing) <= MAX_WAITING
         elif isinstance(thing, list | dict | set | deque):
             name = type(thing).__name__
             found[name] = max(found.get(name, 0), len(thing))
-        for inner in gc.get_referents(thing):
-            is_ours = not isinstance(inner, type | ModuleType) and not _is_namespace(inner)
-            if is_ours and id(inner) not in seen:
-                seen.add(id(inner))
-                waiting.append(inner)
     return found
+
+
+def kept_bytes(root: object) -> int:
+    """Return the bytes that ``root`` keeps alive, with all that is in modules of the package."""
+    ours = [thing for name, module in sys.modules.items() if name.startswith('abdf1_ros')
+            for thing in vars(module).values()]
+    return sum(map(sys.getsizeof, _kept([root, *ours])))
+
+
+def _kept(roots: list[Any]) -> Iterator[Any]:
+    """Yield the ``roots`` and all that they refer to, but no types, modules and their globals."""
+    seen: set[int] = set()
+    waiting = deque(roots)
+    while waiting:
+        thing = waiting.popleft()
+        is_ours = not isinstance(thing, type | ModuleType) and not _is_namespace(thing)
+        if is_ours and id(thing) not in seen:
+            seen.add(id(thing))
+            yield thing
+            waiting.extend(gc.get_referents(thing))
 
 
 def _is_namespace(thing: object) -> bool:

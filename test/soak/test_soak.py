@@ -17,12 +17,10 @@
 from __future__ import annotations
 
 from collections import deque
-import gc
-import tracemalloc
 
 import pytest
 from soak.faulty_line import FaultyLine, FLOOD, MODES
-from soak.memory import container_lengths
+from soak.memory import container_lengths, kept_bytes
 
 # Bytes that tables with a bound (causes in the log, stations that messages name) still take.
 MOST_GROWTH = 150_000
@@ -33,15 +31,10 @@ def test_faults_cannot_grow_memory(mode: str) -> None:
     rig = FaultyLine(mode)
     rig.trouble()  # fills caches, and what is learned at first
     rig.settle()
-    tracemalloc.start()
-    try:
-        rig.trouble()
-        rig.settle()
-        gc.collect()
-        grown, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert grown < MOST_GROWTH
+    before = kept_bytes(rig)
+    rig.trouble()
+    rig.settle()
+    assert kept_bytes(rig) - before < MOST_GROWTH
     rig.check_bounds()
     assert [rig.faults[kind] for kind in rig.kinds] == [2] * len(rig.kinds)
     reads = rig.ear.reads
@@ -55,5 +48,10 @@ def test_long_containers_are_found() -> None:
         def __init__(self) -> None:
             self.inner = {'a': deque(range(7)), 'b': [{1: set(range(9))}]}
 
-    lengths = container_lengths(Keeper())
+    keeper = Keeper()
+    lengths = container_lengths(keeper)
     assert (lengths['deque'], lengths['set'], lengths['list']) == (7, 9, 1)
+    before = kept_bytes(keeper)
+    keeper.inner['a'].extend(range(1000, 2000))
+    keeper.inner['c'] = bytes(50_000)
+    assert 80_000 < kept_bytes(keeper) - before < 100_000
