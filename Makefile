@@ -6,6 +6,7 @@ FUZZ_SECONDS ?= 60
 SOAK_HOURS ?= 24
 LONG_RUN_MINUTES ?= 60
 PYTEST_ARGS ?=
+TEST_WORKERS ?= 4
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -32,6 +33,7 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
+	@echo 'TEST_WORKERS (4: processes of test, more than processors, as many tests wait),'
 	@echo 'FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run).'
 
 .PHONY: setup
@@ -66,7 +68,7 @@ demo-peer: $(INSTALLED) ## The same on a full-duplex line
 
 .PHONY: test
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
-	$(PY) -m pytest $(PYTEST_ARGS)
+	$(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 .PHONY: lint
 lint: $(INSTALLED) ## Check style and types
