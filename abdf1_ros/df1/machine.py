@@ -39,7 +39,8 @@ from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Duplex, FrameDecoder, MAX_LINK_DATA, Symbol
+from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameDecoder, MAX_LINK_DATA, Symbol
+from abdf1_ros.df1.line_rate import LineRate
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 from abdf1_ros.errors import CommandExpired
 
@@ -132,8 +133,9 @@ class Machine:
 
     ``reply_size`` is the bytes behind the header of the reply that is waited for, if it tells no
     error; 0 where that is not known. ``unsent`` asks the port how many bytes have still to leave,
-    as far as it can tell. ``late`` is the sum of the seconds by which it was called after a
-    deadline of its procedure: so long this process, or its host, has not run.
+    as far as it can tell. ``rate`` is what the line has shown of its speed. ``late`` is the sum
+    of the seconds by which it was called after a deadline of its procedure: so long this process,
+    or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -150,6 +152,7 @@ class Machine:
         self.late = 0.0
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
+        self.rate = LineRate(self._timing.char_time)
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
@@ -209,6 +212,7 @@ class Machine:
         self.stop()
         self.now = now
         self._line_free = now
+        self.rate.forget()
         self._procedure = self._make_procedure(self)
         self._resume(None)
 
@@ -318,9 +322,18 @@ class Machine:
             symbol = self.decoder.next_symbol()
             if symbol is None:
                 return
-            if self._line_free > self.now and self._answers(symbol):
-                self._line_free = self.now  # the line is faster than it is set
+            if self._answers(symbol):
+                self.rate.answered(self._heard_with_sent, self.now)
+                self._line_free = min(self._line_free, self.now)
+            if isinstance(symbol, Frame) and self._message.number == self.decoder.begun:
+                self.rate.message(self.counters.chars_received - self._message.heard,
+                                  self.now - self._message.begun)
             self._resume(symbol)
+
+    @property
+    def _heard_with_sent(self) -> int:
+        """Return the characters heard that could not pass while others were sent."""
+        return self.counters.chars_received if self._is_half_duplex else 0
 
     def _answers(self, symbol: Symbol) -> bool:
         """Tell whether what comes now proves that what we have sent has left."""
@@ -366,6 +379,8 @@ class Machine:
                 self.decoder.reset()
         self._set_deadline(step.timeout, free)
         if step.timeout != 0:
+            if step.frame:
+                self.rate.sent(len(step.frame), self._heard_with_sent, self.now)
             return False
         if self.send_at_once is not None and self._out:
             self.send_at_once(self.data_to_send())

@@ -175,6 +175,7 @@ class Diagnostics:
         values = {
             'port': f'{"open" if state and state.is_open else "closed"}',
             'settings': f'{network.baud} baud, {network.error_code}',
+            'speed seen': speed_seen(self._driver),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
             'scan time': _milliseconds(self._driver.scan_time),
@@ -387,6 +388,19 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
     if not intervals:
         return f'{wanted}, not yet read twice'
     return f'{wanted}, reads every {_milliseconds(fmean(intervals))}'
+
+
+def _rounded(rate: float) -> int:
+    """Return two digits of a rate; the rest of it means nothing."""
+    return int(float(f'{rate:.1e}'))
+
+
+def speed_seen(driver: Driver) -> str:
+    """Return what the line has shown of its speed."""
+    seen = driver.machine.rate.seen
+    if seen is None:
+        return 'nothing speaks against the set one'
+    return f'{"at least" if seen > 1 else "about"} {_rounded(driver.network.baud * seen)} baud'
 
 
 def _poll_scans(driver: Driver) -> dict[str, str]:

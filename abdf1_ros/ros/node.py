@@ -45,7 +45,7 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch
+from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch, speed_seen
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import (
     encoder,
@@ -176,6 +176,7 @@ class BridgeNode(Node):
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._port = configuration.port
         self._port_text = ''
+        self._told_speed: float | None = None
         parameters = configuration.parameters
         self._opener = PortOpener(
             configuration.network, configuration.port,
@@ -334,10 +335,23 @@ class BridgeNode(Node):
         self._link_counters.check(now)
         if self._namesakes.look(now):
             self._namesake_came_or_went(self._namesakes.has_found)
+        self._tell_speed(self.driver.machine.rate.seen)
         levels = self._diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self._publish_diagnostics(now)
+
+    def _tell_speed(self, seen: float | None) -> None:
+        """Log once that the line is faster, or slower, than it is set."""
+        if seen is None or self._told_speed is not None and (seen > 1) is (self._told_speed > 1):
+            return
+        self._told_speed = seen
+        text = f'{self._port}: Baud is {self.driver.network.baud}, ' \
+               f'but the line shows {speed_seen(self.driver)}'
+        if seen > 1:
+            self._lines.info('the speed', text)
+        else:
+            self._lines.warning('the speed', f'{text}: time-outs begin before frames have left')
 
     def _namesake_came_or_went(self, is_there: bool) -> None:
         self._diagnostics.has_namesake = is_there

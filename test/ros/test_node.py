@@ -462,6 +462,18 @@ def test_namesake_is_told_and_forgotten(
     assert 'no other node is called /abdf1 any more' in told
 
 
+def test_line_that_is_faster_than_baud_says_so_once(
+        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(SPEED)  # on a pseudo-terminal, which has no speed
+    observer.until(lambda: any(
+        value.value.startswith('at least') for message in bench.diagnostics
+        for status in message.status for value in status.values
+        if value.key == 'speed seen'), 'the speed')
+    bench.node._tell_speed(3.0)  # another figure, and no news
+    told = ''.join(capfd.readouterr())
+    assert told.count(', but the line shows at least ') == 1
+
+
 def test_odd_settings_are_told_in_the_log_but_not_without_end(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     make_bench(*(f'N7:{number},Read,N7:{number},1,PLC5,1,' for number in range(23)))

@@ -1,0 +1,97 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How fast a line really is, from what is sent and heard on it.
+
+Two things can be known without the line's help. An exchange cannot be over before its characters
+have passed: where most of them are, the line is faster than it is set. And the bytes of a long
+message follow each other as fast as its sender and the line can do: where the fastest of several
+messages is slower than the set speed, so is the line. Both need many samples, as an operating
+system and an adapter hold bytes back, and as an answer may be a late one.
+"""
+
+from __future__ import annotations
+
+# Samples of each kind before something is said, and afterwards before it is said anew.
+EXCHANGES = 32
+MESSAGES = 16
+
+# A message is long that has so many characters after its first bytes.
+LONG_MESSAGE = 32
+
+# Less than this is not to be told from the accuracy of clocks and of waking up.
+_FASTER = 1.25
+_SLOWER = 0.75
+
+
+class LineRate:
+    """
+    The rate of a line on which a character should take ``char_time`` seconds.
+
+    ``seen`` is the rate in multiples of the set one, None while nothing speaks against that.
+    Above 1 it is a lower limit; below 1 it is what the bytes of messages come at.
+    """
+
+    def __init__(self, char_time: float) -> None:
+        self.seen: float | None = None
+        self._char_time = char_time
+        self._asked: float | None = None
+        self._sent = 0
+        self._heard = 0
+        self._exchanges = 0
+        self._fast: list[float] = []
+        self._messages: list[float] = []
+
+    def sent(self, characters: int, heard: int, now: float) -> None:
+        """Take note of characters that are to be answered; ``heard`` counts those from there."""
+        if self._asked is None:
+            self._asked, self._sent, self._heard = now, 0, heard
+        self._sent += characters
+
+    def answered(self, heard: int, now: float) -> None:
+        """Take note of an answer, the last of whose characters is here."""
+        if self._asked is None:
+            return
+        seconds, self._asked = now - self._asked, None
+        self._exchanges += 1
+        needed = (self._sent + heard - self._heard) * self._char_time
+        if needed > _FASTER * seconds:
+            self._fast.append(needed / max(seconds, 1e-6))
+        if self._exchanges < EXCHANGES:
+            return
+        if 2 * len(self._fast) > EXCHANGES:
+            self.seen = sorted(self._fast)[len(self._fast) // 2]
+        elif self.seen is not None and self.seen > 1:
+            self.seen = None
+        self._exchanges, self._fast = 0, []
+
+    def message(self, characters: int, seconds: float) -> None:
+        """Take note of a message: ``characters`` came in the ``seconds`` after its first bytes."""
+        if characters < LONG_MESSAGE:
+            return
+        self._messages.append(characters * self._char_time / max(seconds, 1e-6))
+        if len(self._messages) < MESSAGES:
+            return
+        best = max(self._messages)
+        if best < _SLOWER:
+            self.seen = best
+        elif self.seen is not None and self.seen < 1:
+            self.seen = None
+        self._messages = []
+
+    def forget(self) -> None:
+        """Begin anew: it may be another line."""
+        self.seen, self._asked = None, None
+        self._exchanges, self._fast, self._messages = 0, [], []
