@@ -74,8 +74,10 @@ class _Model:
     has_fixed_files: bool = False
 
 
-# M 7-17, 7-18. Floats and strings came with the 5/03, longs with the MicroLogix (1747-RM001G).
-_OLD = _Model(82, 82, frozenset((FileType.FLOAT, FileType.STRING, FileType.LONG)))
+# M 7-17, 7-18. Floats, strings, A and D files came with the 5/03, longs with the MicroLogix
+# (1747-RM001G).
+_OLD = _Model(82, 82, frozenset((
+    FileType.FLOAT, FileType.STRING, FileType.ASCII, FileType.BCD, FileType.LONG)))
 _NEW = _Model(slc.MAX_READ, slc.MAX_WRITE, frozenset((FileType.LONG,)))
 # AG-UM008C 3-38; it has one file each of types O, I, S, B, T, C, R and N.
 _ML1000 = _Model(82, 82, frozenset((FileType.FLOAT,)), has_fixed_files=True)

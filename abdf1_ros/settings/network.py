@@ -54,7 +54,8 @@ class NetField:
     A number lies from ``low`` to ``high`` or is one of ``choices``; a text is one of
     ``choices`` in any letter case, or anything where there are none. A bad value is reported
     with ``message``, whose places after the value are filled from ``message_args``.
-    ``other_words`` are what others call a choice, in small letters alone, and what it is here.
+    ``other_words`` are what others call a choice, in small letters alone, and what it is here;
+    ``also`` are ways to write one that are accepted.
     """
 
     column: str
@@ -66,6 +67,7 @@ class NetField:
     message: Message | None = None
     message_args: tuple[Any, ...] = ()
     other_words: MappingType[str, str] = field(default_factory=dict)
+    also: MappingType[str, str] = field(default_factory=dict)
 
     @property
     def parameter(self) -> str:
@@ -100,6 +102,7 @@ class NetField:
     def _choice(self, text: str) -> str | None:
         if not self.choices:
             return text
+        text = self.also.get(text, text)
         return next((str(choice) for choice in self.choices
                      if str(choice).lower() == text.lower()), None)
 
@@ -107,9 +110,10 @@ class NetField:
 def _net(column: str, default: int | str, description: str, *, low: int | None = None,
          high: int | None = None, choices: tuple[int | str, ...] = (),
          message: Message | None = None, message_args: tuple[Any, ...] = (),
-         other_words: MappingType[str, str] = MappingProxyType({})) -> Any:
+         other_words: MappingType[str, str] = MappingProxyType({}),
+         also: MappingType[str, str] = MappingProxyType({})) -> Any:
     entry = NetField(column, default, description, low, high, choices, message, message_args,
-                     other_words)
+                     other_words, also)
     return field(default=default, metadata={'net': entry})
 
 
@@ -144,7 +148,8 @@ class Network:
     data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
     parity: str = _net(
-        'Parity', 'None', 'parity bit per character', choices=('None', 'Even', 'Odd'))
+        'Parity', 'None', 'parity bit per character', choices=('None', 'Even', 'Odd'),
+        also={'-': 'None'})  # as S0 prints the default
     timeout: int = _net(
         'Timeout', 1000, 'ms to wait for each answer of a station', low=0, high=360000)
     tx_delay: int = _net(

@@ -31,12 +31,12 @@ def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
     """Return the stations of a list in its order, each once, and what is wrong with it."""
     stations: list[int] = []
     faults: list[str] = []
-    for part in filter(None, text.replace(' ', '').split(',')):
-        first, _, last = part.partition('-')
-        low, high = whole_number(first), whole_number(last or first)
+    for part in filter(None, map(str.strip, text.split(','))):
+        first, dash, last = map(str.strip, part.partition('-'))
+        low, high = whole_number(first), whole_number(last if dash else first)
         if low is None or high is None or not 0 <= low <= high <= MAX_STATION:
             faults.append(f'"{part}" should be a station from 0 to {MAX_STATION}, '
-                          'or a range such as 3-5')
+                          'or a range such as 3-5; put commas between them')
         else:
             stations += range(low, high + 1)
     return tuple(dict.fromkeys(stations)), faults

@@ -44,7 +44,7 @@ def test_packets(names: str, read: int, write: int) -> None:
 
 
 @pytest.mark.parametrize(('names', 'letters'), [
-    ('5/01 5/02', {'F', 'ST', 'L'}), ('5/03 5/04 5/05', {'L'}),
+    ('5/01 5/02', {'F', 'ST', 'A', 'D', 'L'}), ('5/03 5/04 5/05', {'L'}),
     ('ML1100 ML1200 ML1400 ML1500', set())])
 def test_files_that_are_missing(names: str, letters: set[str]) -> None:
     for name in names.split():

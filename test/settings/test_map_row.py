@@ -463,6 +463,8 @@ def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
      'type SLC that we read or write; leave the cell empty'),
     ({'Processor': '5/05', 'Address': 'L10:0'}, '(Address): Item: 1, 5/05 has no file L10'),
     ({'Processor': '5/02', 'Address': 'F8:0'}, '(Address): Item: 1, 5/02 has no file F8'),
+    ({'Processor': '5/01', 'Address': 'A10:0'}, '(Address): Item: 1, 5/01 has no file A10'),
+    ({'Processor': '5/02', 'Address': 'D11:0'}, '(Address): Item: 1, 5/02 has no file D11'),
     ({'Processor': 'ML1000', 'Address': 'N10:0'}, '(Address): Item: 1, ML1000 has no file N10')])
 def test_processor_that_does_not_fit(cells: dict[str, str], text: str) -> None:
     found, = faults(slc(**cells))

@@ -95,6 +95,10 @@ def test_empty_cell_and_missing_column_take_the_default(path: Path, column: str)
     assert load(path, other, value) == expected
 
 
+def test_dash_that_the_specification_prints_is_no_parity(path: Path) -> None:
+    assert load(path, 'Parity', '-').parity == 'None'
+
+
 @pytest.mark.parametrize('column, field, text', [
     (column, field, text) for column, field, _, good, _ in NUMBERS for text in good])
 def test_number_in_its_range(path: Path, column: str, field: str, text: str) -> None:
