@@ -53,8 +53,10 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file
+from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Line, PtyLine, TcpLine
-from abdf1_ros.ports.port import open_port, Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import load_plcs
 
@@ -236,7 +238,7 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
     elif options.pty is not None:
         line = PtyLine(options.pty)
     else:
-        return _PortLine(open_port(network))
+        return _PortLine(open_port(PortSettings.of(network)))
     print(f'conform: at {line.name}', file=sys.stderr, flush=True)
     while True:
         try:

@@ -53,8 +53,10 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
+from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
-from abdf1_ros.ports.port import LinkThread, Port, PortState
+from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
@@ -227,7 +229,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     line.add_argument('--pty', metavar='NAME', type=_name,
                       help='a pseudo-terminal of this name (default: one with the name that is '
                            'printed)')
-    line.add_argument('--port', type=_name, help='a serial port or a URL of pyserial')
+    line.add_argument('--port', type=_name, help='a serial port, socket://host:port or rfc2217://host:port')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
     parser.add_argument('--full-duplex', metavar='STATION',
                         help='this PLC alone, on a full-duplex line')
@@ -263,17 +265,17 @@ def _make_line(options: argparse.Namespace) -> Line:
         if options.tcp is not None:
             return TcpLine(*_host_and_port(options.tcp))
         if options.port is not None:
-            return SerialLine(options.port, _network(options))
+            return SerialLine(_port_settings(options))
     except OSError as error:
         raise OSError(reason_of(options.port or f'--tcp "{options.tcp}"', error)) from None
     return PtyLine(options.pty)
 
 
-def _network(options: argparse.Namespace) -> Network:
+def _port_settings(options: argparse.Namespace) -> PortSettings:
     """Return how the port is set; ConfigurationError for a URL that no port can have."""
-    network = Network(baud=options.baud)
-    return make_network({'com_port': (options.port, '--port')}, network) \
-        if '://' in options.port else network
+    if '://' in options.port:
+        make_network({'com_port': (options.port, '--port')})
+    return PortSettings(options.port, options.baud)
 
 
 def _host_and_port(text: str) -> tuple[str, int]:

@@ -48,6 +48,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.settings.network import BAUD_RATES, Network
@@ -209,7 +210,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='captures or hex dumps, decoded one after the other')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
     parser.add_argument('--port', metavar='NAME',
-                        help='listen on a serial port, a URL of pyserial, pty, or pty:NAME')
+                        help='listen on a serial port, a socket:// or rfc2217:// URL, pty, '
+                             'or pty:NAME')
     parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'),
                         help='listen between two ports; ">" is from A to B')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
@@ -306,7 +308,7 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
     if baud is not None:
         settings['baud'] = str(baud)
     try:
-        tap = Tap(names, Network(baud=baud or _DEFAULT_BAUD, parity=options.parity))
+        tap = Tap(names, PortSettings('', baud or _DEFAULT_BAUD, parity=options.parity))
         _end_with(tap.stop)
         with tap:
             trace = Trace(options.save, settings, _say) if options.save else None

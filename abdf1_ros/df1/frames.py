@@ -167,6 +167,14 @@ Result = Symbol | Need | None
 """What a step comes to: a symbol, the need of more bytes, or nothing but the next step."""
 
 
+class Damaged(bytes):
+    """
+    Characters that the UART has found damaged, by parity or stop bit.
+
+    Nothing they belong to is good: M 4-7 has a message thrown away for them as for a bad check.
+    """
+
+
 class FrameDecoder:
     """
     Turn bytes into symbols.
@@ -188,6 +196,7 @@ class FrameDecoder:
         self.noise = 0
         self.in_message = False
         self.begun = 0
+        self._is_damaged = False  # a character of the message that is coming in
 
     @property
     def link_data(self) -> bytearray:
@@ -204,12 +213,27 @@ class FrameDecoder:
 
     def feed(self, data: bytes) -> None:
         """Take bytes from the line, in any chunks; with ``MAX_WAITING`` unread, drop them."""
-        if data:
+        if isinstance(data, Damaged):
+            self._take_damaged(data)
+        elif data:
             self._buffer += data
             self.last_byte = data[-1]
             if len(self._buffer) > MAX_WAITING:
                 self.noise += len(self._buffer) - MAX_WAITING
                 del self._buffer[MAX_WAITING:]
+
+    def _take_damaged(self, data: Damaged) -> None:
+        self.last_byte = data[-1]
+        if self.in_message:
+            self._is_damaged = True
+            if self._step == self._check:
+                self._buffer += data  # it counts, as one of the check
+                return
+        else:
+            self._step = self._idle
+        # With what has come of a pair: what follows is not its other half.
+        self.noise += len(self._buffer) + len(data)
+        self._buffer.clear()
 
     def next_symbol(self) -> Symbol | None:
         """Return the next whole symbol, or None when more bytes are needed."""
@@ -248,7 +272,7 @@ class FrameDecoder:
 
     def _begin_data(self, station: int | None) -> None:
         self._step = self._link_data
-        self.in_message = True
+        self.in_message, self._is_damaged = True, False
         self.begun += 1
         self._station = station
         self._data.clear()
@@ -333,7 +357,7 @@ class FrameDecoder:
         if len(self._data) > MAX_LINK_DATA:
             return self._frame(Fault.TOO_LONG)
         expected = self._checksum.of_message(self._data, self._station)
-        if received != expected:
+        if received != expected or self._is_damaged:
             return self._frame(Fault.BAD_CHECK, received, expected)
         fault = Fault.TOO_SHORT if len(self._data) < HEADER_SIZE else None
         return self._frame(fault, received, expected)

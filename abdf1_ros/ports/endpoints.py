@@ -23,8 +23,9 @@ import socket
 import tty
 from typing import Protocol
 
-from abdf1_ros.ports.port import DescriptorPort, open_port, Port
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.descriptor import DescriptorPort, Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 
 WAITING = 'waiting for a client'
 
@@ -152,18 +153,18 @@ class TcpLine:
 
 
 class SerialLine:
-    """A serial port, or anything that pyserial opens."""
+    """A serial port, or one of a device server."""
 
-    def __init__(self, name: str, network: Network) -> None:
-        self.name = name
-        self._network = network
+    def __init__(self, settings: PortSettings) -> None:
+        self.name = settings.name
+        self._settings = settings
         # At once: a port that is lost is waited for, one that was never there is a mistake.
-        self._first: Port | None = open_port(network, name)
+        self._first: Port | None = open_port(settings)
 
     def open(self) -> Port:  # noqa: A003
         """Return the port; from the second time on it is opened anew."""
         port, self._first = self._first, None
-        return port or open_port(self._network, self.name)
+        return port or open_port(self._settings)
 
     def close(self) -> None:
         """Close the port if nobody has taken it."""

@@ -12,13 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Ports, and the thread that runs a machine on one.
-
-A port that has a file descriptor is read with poll(2) and read(2), which costs a half to a
-tenth of pyserial's own read; a port without one (rfc2217) is read through pyserial. What
-adapters can do, and what it is worth, is in docs/adapters.md.
-"""
+"""The thread that runs a machine on a port."""
 
 from __future__ import annotations
 
@@ -26,241 +20,23 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-import errno
-import fcntl
-import math
 import os
 import select
-import socket
-import struct
-import termios
 import threading
 import time
-from typing import Any, Protocol
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.errors import PortLost
-from abdf1_ros.settings.network import Network
-import serial
-import serial.rfc2217
-import serial.rs485
-
-_READ_SIZE = 4096
-_INT = struct.Struct('i')
-_WRITE_TIMEOUT = 2.0
-
-# A port without a descriptor cannot be waited for together with the wake descriptor; so long (s)
-# it is waited for alone. It is set once, in open_port: at every change of it pyserial negotiates
-# all settings of an rfc2217 port anew, which takes 0.1 s.
-_GLANCE = 0.01
+from abdf1_ros.ports.descriptor import DescriptorPort, Port
 
 # Between attempts to open a port (s). They cost next to nothing, and whoever has plugged a
 # cable in again is waiting.
 _RETRY_PERIOD = 0.5
 
-# After so long (s) without an answer from the far host a TCP connection is lost. The system's
-# own limit is a quarter of an hour, in which it asks less and less often.
-_SILENCE_LIMIT = 5
-
 _MAX_FAULTS = 3
 _FAULT_WINDOW = 60.0
 
-# In words of ours, where those of the operating system tell too little.
-_BUSY = 'another program has it open'
-_REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is no serial port'}
-
-_PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
-
-
-class Port(Protocol):
-    """An open line. Every method raises OSError when the line is gone."""
-
-    def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes up to ``timeout`` s, or until the descriptor ``wake`` is readable."""
-
-    def write(self, data: bytes) -> None:
-        """Hand all of ``data`` to the operating system."""
-
-    def unsent(self) -> int:
-        """Return how many bytes of what was written have still to leave, 0 where nobody knows."""
-
-    def close(self) -> None:
-        """Give the line back."""
-
-
-class DescriptorPort:
-    """A port with a file descriptor, which is set to non-blocking; ``close`` closes it."""
-
-    def __init__(self, descriptor: int, close: Callable[[], None]) -> None:
-        self._descriptor = descriptor
-        self._close = close
-        self._poll = select.poll()
-        self._poll.register(descriptor, select.POLLIN)
-        os.set_blocking(descriptor, False)
-
-    def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
-        self._poll.register(wake, select.POLLIN)  # changes nothing from the second time on
-        milliseconds = None if timeout is None else math.ceil(timeout * 1000)
-        for descriptor, _ in self._poll.poll(milliseconds):
-            if descriptor == self._descriptor:
-                return self._take()
-        return b''
-
-    def _take(self) -> bytes:
-        """Read what has come."""
-        try:
-            data = os.read(self._descriptor, _READ_SIZE)
-        except BlockingIOError:
-            return b''
-        if not data:
-            raise OSError('the other end has closed the connection')
-        return data
-
-    def fileno(self) -> int:
-        """Return the descriptor."""
-        return self._descriptor
-
-    def write(self, data: bytes) -> None:
-        """Hand all of ``data`` to the operating system."""
-        give_up = time.monotonic() + _WRITE_TIMEOUT
-        while data:
-            try:
-                data = data[os.write(self._descriptor, data):]
-            except BlockingIOError:
-                poll = select.poll()
-                poll.register(self._descriptor, select.POLLOUT)
-                left = give_up - time.monotonic()
-                if left <= 0:
-                    raise OSError('the line takes no data; is Handshake right?') from None
-                poll.poll(math.ceil(left * 1000))
-
-    def unsent(self) -> int:
-        """Return how many bytes the operating system still has."""
-        try:
-            answer = fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, bytes(_INT.size))
-        except OSError:  # a device whose driver does not tell
-            return 0
-        count: int = _INT.unpack(answer)[0]
-        return count
-
-    def close(self) -> None:
-        """Give the line back."""
-        self._close()
-
-
-class SerialPort:
-    """A pyserial port without a file descriptor."""
-
-    def __init__(self, port: serial.Serial | serial.rfc2217.Serial) -> None:
-        self._port = port
-
-    def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
-        end = math.inf if timeout is None else time.monotonic() + timeout
-        while True:
-            is_over = time.monotonic() >= end
-            data = self._port.read(max(not is_over, self._port.in_waiting))
-            if data or is_over or select.select([wake], [], [], 0)[0]:
-                return bytes(data)
-
-    def write(self, data: bytes) -> None:
-        """Hand all of ``data`` to pyserial."""
-        self._port.write(data)
-
-    def unsent(self) -> int:
-        """Return 0: the far port does not tell."""
-        return 0
-
-    def close(self) -> None:
-        """Give the line back."""
-        self._port.close()
-
-
-class _Rfc2217Port(serial.rfc2217.Serial):
-    """A port on a device server."""
-
-    def _telnet_read_loop(self) -> None:
-        """End without a traceback when the server hangs up during the negotiation."""
-        with suppress(OSError):  # whoever opens or reads the port finds the thread dead
-            super()._telnet_read_loop()  # type: ignore[misc]  # the stubs do not have it
-
-
-@dataclass(frozen=True, slots=True)
-class PortOptions:
-    """
-    What is asked of an adapter, if it can do it.
-
-    ``low_latency`` hands on bytes as they come, where USB adapters gather them for up to
-    16 ms; ``rs485`` switches the transmitter of an RS-485 port on and off with RTS.
-    """
-
-    low_latency: bool = True
-    rs485: bool = False
-
-
-USUAL_OPTIONS = PortOptions()
-
-
-def open_port(network: Network, name: str | None = None, options: PortOptions = USUAL_OPTIONS,
-              tell: Callable[[str], None] = lambda text: None) -> Port:
-    """
-    Open the port of a net CSV exclusively; ``name`` is used instead of its Com_Port.
-
-    ``tell`` is called with what of ``options`` the port cannot do, which is no error. Raises
-    OSError, also where pyserial has another exception for it.
-    """
-    try:
-        url = name or network.port
-        open_url = _Rfc2217Port if url.lower().startswith('rfc2217:') else serial.serial_for_url
-        port = open_url(
-            url, baudrate=network.baud, bytesize=network.data_bits,
-            parity=_PARITIES[network.parity], stopbits=network.stop_bits,
-            rtscts=network.handshake == 'Yes', timeout=_GLANCE, exclusive=True)
-    except (OSError, ValueError, termios.error) as error:  # the last: not every device has parity
-        raise OSError(*_plain(error)) from error
-    if isinstance(port, serial.Serial):
-        _set_options(port, options, tell)
-    connection = getattr(port, '_socket', None)
-    if isinstance(connection, socket.socket):
-        _set_connection(connection)
-    try:
-        return DescriptorPort(port.fileno(), port.close)
-    except (OSError, AttributeError):
-        return SerialPort(port)
-
-
-def _plain(error: Exception) -> tuple[Any, ...]:
-    """Return what the operating system has said, without the words that pyserial puts around."""
-    said = error.__context__ if isinstance(error, serial.SerialException) else error
-    args = said.args if isinstance(said, OSError | termios.error) else error.args
-    return (args[0], _REASONS.get(args[0], args[1])) if len(args) > 1 else args
-
-
-def _set_options(port: serial.Serial, options: PortOptions, tell: Callable[[str], None]) -> None:
-    """Ask the driver of a device for what goes beyond speed and character."""
-    if options.low_latency:
-        try:
-            port.set_low_latency_mode(True)
-        except (AttributeError, ValueError, OSError) as error:
-            tell(f'the port has no low-latency mode: {error}')
-    if options.rs485:
-        try:
-            port.rs485_mode = serial.rs485.RS485Settings()
-        except (ValueError, OSError) as error:
-            port.rs485_mode = None
-            tell(f'the port has no RS-485 mode: {error}')
-
-
-def _set_connection(connection: socket.socket) -> None:
-    """Send every frame at once, and find out soon that the far host is gone."""
-    # Without the first an ACK waits for the one before it. The last is for what we send, the
-    # others for a line on which we only listen.
-    for option, value in (
-            (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
-            (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
-        connection.setsockopt(socket.IPPROTO_TCP, option, value)
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+_WAKES = 4096  # read at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +45,50 @@ class PortState:
 
     is_open: bool
     text: str
+
+
+class _Attempt(threading.Thread):
+    """
+    Open a port, in a thread that nobody has to wait for: names may take minutes to be resolved.
+
+    ``wake`` is called at the end, unless ``abandon`` was.
+    """
+
+    def __init__(self, open_port: Callable[[], Port], wake: Callable[[], None]) -> None:
+        super().__init__(name='df1 opening', daemon=True)
+        self.port: Port | None = None
+        self.error: Exception | None = None
+        self._open_port = open_port
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._is_abandoned = False
+
+    @property
+    def is_over(self) -> bool:
+        """Tell whether there is a port or an error."""
+        return self.port is not None or self.error is not None
+
+    def run(self) -> None:
+        """Open the port."""
+        port = error = None
+        try:
+            port = self._open_port()
+        except Exception as caught:  # raised again in the thread that waits
+            error = caught
+        with self._lock:
+            if not self._is_abandoned:
+                self.port, self.error = port, error
+                self._wake()
+                return
+        if port is not None:
+            port.close()
+
+    def abandon(self) -> None:
+        """Close the port, now or as soon as it is open."""
+        with self._lock:
+            self._is_abandoned = True
+        if self.port is not None:
+            self.port.close()
 
 
 class LinkThread(threading.Thread):
@@ -300,6 +120,7 @@ class LinkThread(threading.Thread):
         self._clock = clock
         self._stopping = False
         self._is_closed = False
+        self._closing = threading.Lock()
         self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
         self._wake_reader, self._wake_writer = os.pipe()
         os.set_blocking(self._wake_reader, False)
@@ -307,9 +128,10 @@ class LinkThread(threading.Thread):
 
     def wake(self) -> None:
         """Tell the machine, from any thread, that there may be something new to do."""
-        if not self._is_closed:
-            with suppress(BlockingIOError):  # it is being woken already
-                os.write(self._wake_writer, b'w')
+        with self._closing:
+            if not self._is_closed:
+                with suppress(BlockingIOError):  # it is being woken already
+                    os.write(self._wake_writer, b'w')
 
     def stop(self) -> None:
         """End the thread, finishing what it does with an error, and wait for its end."""
@@ -317,10 +139,11 @@ class LinkThread(threading.Thread):
         self.wake()
         if self.is_alive():
             self.join()
-        if not self._is_closed:
-            self._is_closed = True
-            os.close(self._wake_reader)
-            os.close(self._wake_writer)
+        with self._closing:  # or a wake of another thread would go to another file
+            if not self._is_closed:
+                self._is_closed = True
+                os.close(self._wake_reader)
+                os.close(self._wake_writer)
 
     def run(self) -> None:
         """Keep the port open and the machine running."""
@@ -334,16 +157,34 @@ class LinkThread(threading.Thread):
     def _keep_open(self) -> None:
         while not self._stopping and not self.has_failed:
             try:
-                port = self._open_port()
+                port = self._opened_port()
             except OSError as error:
                 self._set_state(False, f'cannot open the port: {_reason(error)}')
             else:
+                if port is None:
+                    return
                 self._set_state(True, 'open')
                 self._run_on(port)
             if not self._stopping and not self.has_failed:
                 self._pause(self._retry_period)
         if self.state.is_open:
             self.state = PortState(False, 'closed')
+
+    def _opened_port(self) -> Port | None:
+        """Return the port, None when asked to stop meanwhile; raises OSError."""
+        attempt = _Attempt(self._open_port, self.wake)
+        attempt.start()
+        while not attempt.is_over and not self._stopping:
+            select.select([self._wake_reader], [], [])
+            self._take_wake()
+        if self._stopping:
+            attempt.abandon()
+            return None
+        attempt.join()  # it has nothing left to do but to wake us
+        self._take_wake()
+        if attempt.error is not None:
+            raise attempt.error
+        return attempt.port
 
     def _run_on(self, port: Port) -> None:
         end = 'the driver is stopping'
@@ -393,7 +234,7 @@ class LinkThread(threading.Thread):
 
     def _take_wake(self) -> bool:
         try:
-            return bool(os.read(self._wake_reader, _READ_SIZE))
+            return bool(os.read(self._wake_reader, _WAKES))
         except BlockingIOError:
             return False
 

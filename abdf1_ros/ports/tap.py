@@ -18,14 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 import os
 from queue import Empty, SimpleQueue
 import threading
 import time
 
+from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine
-from abdf1_ros.ports.port import Port
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
 _PTY = 'pty'
@@ -70,13 +71,14 @@ class Tap:
     """
     One port to listen on, or two to stand between; open while the ``with`` block runs.
 
-    A name is what ``open_port`` takes, or "pty" or "pty:NAME" for a new pseudo-terminal;
-    ``names`` is what others call the ports. Raises OSError when one cannot be opened.
+    A name is that of a port with these ``settings``, or "pty" or "pty:NAME" for a new
+    pseudo-terminal; ``names`` is what others call the ports. Raises OSError when one cannot be
+    opened.
     """
 
-    def __init__(self, names: Sequence[str], network: Network) -> None:
+    def __init__(self, names: Sequence[str], settings: PortSettings) -> None:
         self.names: list[str] = []
-        self._network = network
+        self._settings = settings
         self._heard: _Heard = SimpleQueue()
         with ExitStack() as stack:
             ports = [self._open(name, stack) for name in names]
@@ -143,7 +145,7 @@ class Tap:
         if is_pty(name):
             return PtyLine(name.partition(':')[2] or None)
         try:
-            return SerialLine(name, self._network)
+            return SerialLine(replace(self._settings, name=name))
         except OSError as error:
             raise OSError(f'{name}: {error.strerror or error}') from error
 

@@ -22,8 +22,10 @@ import math
 from pathlib import Path
 import time
 
-from abdf1_ros.ports.port import open_port, Port, PortOptions, USUAL_OPTIONS
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.serial_device import SerialDevice
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
 
 
@@ -97,28 +99,29 @@ class TracedPort:
 
 class PortOpener:
     """
-    Open the port ``name`` of a net CSV, as often as it takes.
+    Open a port, as often as it takes.
 
-    ``options`` and ``tell`` are those of ``open_port``. After ``trace`` all that passes it goes
-    into a capture. What goes wrong with that is told to ``on_error`` and has no effect on the
-    port.
+    ``tell`` is that of ``open_port``. After ``trace`` all that passes the port goes into a
+    capture. What goes wrong with that is told to ``on_error`` and has no effect on the port.
     """
 
-    def __init__(self, network: Network, name: str, options: PortOptions = USUAL_OPTIONS,
+    def __init__(self, settings: PortSettings,
                  tell: Callable[[str], None] = lambda text: None) -> None:
-        self._network = network
-        self._name = name
-        self._options = options
+        self._settings = settings
         self._tell = tell
+        self._port: Port | None = None
         self._trace: Trace | None = None
         self._begun = 0.0
 
-    def trace(self, path: str, limit: float, on_error: Callable[[str], None]) -> None:
-        """Begin a capture of at most ``limit`` bytes."""
-        settings = {
-            'begun': begun_now(), 'port': self._name, 'baud': str(self._network.baud),
-            'check': self._network.checksum.value,
-            'duplex': self._network.duplex.name.lower()}
+    def errors(self) -> dict[str, int]:
+        """Return what the UART has counted since the port was opened; from any thread."""
+        return self._port.errors() if isinstance(self._port, SerialDevice) else {}
+
+    def trace(self, path: str, limit: float, head: dict[str, str],
+              on_error: Callable[[str], None]) -> None:
+        """Begin a capture of at most ``limit`` bytes; ``head`` is what it says of the line."""
+        settings = {'begun': begun_now(), 'port': self._settings.name,
+                    'baud': str(self._settings.baud), **head}
         self._begun = time.monotonic()
         try:
             self._trace = Trace(path, settings, on_error, limit)
@@ -127,7 +130,7 @@ class PortOpener:
 
     def open(self) -> Port:  # noqa: A003
         """Open the port; raises OSError."""
-        port = open_port(self._network, self._name, self._options, self._tell)
+        self._port = port = open_port(self._settings, self._tell)
         return port if self._trace is None else TracedPort(port, self._trace, self._begun)
 
     def close(self) -> None:

@@ -88,6 +88,7 @@ class Diagnostics:
         self._driver = driver
         self._port = port
         self._link: LinkThread | None = None
+        self._port_errors: Callable[[], dict[str, int]] = dict
         self._last_error: _Moment | None = None
         self._last_events: dict[int | None, _Moment] = {}
         self._writes = WriteLog()
@@ -102,9 +103,10 @@ class Diagnostics:
         ]
         self._node_name = node_name
 
-    def attach(self, link: LinkThread) -> None:
-        """Name the thread whose port is reported on."""
+    def attach(self, link: LinkThread, port_errors: Callable[[], dict[str, int]]) -> None:
+        """Name the thread whose port is reported on, and what tells the errors of its UART."""
         self._link = link
+        self._port_errors = port_errors
 
     def happened(self, event: Event, now: float) -> None:
         """Remember the last numbered error, and the last thing unusual at each station."""
@@ -183,6 +185,7 @@ class Diagnostics:
             'expected scan time': _milliseconds(self._driver.expected_scan_time),
             **_periods(self._driver.points.values()),
             **_poll_scans(self._driver),
+            **{name: str(count) for name, count in self._port_errors().items()},
             'last error': _with_age(self._last_error, now),
         }
         return values

@@ -43,7 +43,8 @@ from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.plan.report import setting_remarks
-from abdf1_ros.ports.port import LinkThread, PortOptions, PortState
+from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch, speed_seen
 from abdf1_ros.ros.log import EventLog, LineLog
@@ -177,21 +178,21 @@ class BridgeNode(Node):
         self._port = configuration.port
         self._port_text = ''
         self._told_speed: float | None = None
-        parameters = configuration.parameters
+        parameters, network = configuration.parameters, configuration.network
         self._opener = PortOpener(
-            configuration.network, configuration.port,
-            PortOptions(parameters.low_latency, parameters.rs485),
+            PortSettings.of(network, configuration.port, low_latency=parameters.low_latency,
+                            rs485=parameters.rs485),
             lambda text: self.get_logger().debug(f'{printable(self._port)}: {text}'))
-        if configuration.parameters.trace_file:
+        if parameters.trace_file:
             self._opener.trace(
-                configuration.parameters.trace_file,
-                configuration.parameters.trace_limit * 1e6,
+                parameters.trace_file, parameters.trace_limit * 1e6,
+                {'check': network.checksum.value, 'duplex': network.duplex.name.lower()},
                 lambda text: self._lines.error('trace_file', f'trace_file: {text}'))
         self.link = LinkThread(
             self.driver.machine, self._opener.open, on_state=self._port_changed,
             on_fault=self._fault, while_sending=self._publish_later_values)
         self._create_writes(configuration.parameters.write_timeout)
-        self._diagnostics.attach(self.link)
+        self._diagnostics.attach(self.link, self._opener.errors)
         self._link_counters = LinkCounterService(self.driver, self.link)
         self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
                             callback_group=MutuallyExclusiveCallbackGroup())

@@ -49,7 +49,8 @@ class Parameters:
 
     net_file: str = _parameter('', 'path of the net CSV, needed')
     map_file: str = _parameter('', 'path of the map CSV, needed')
-    port: str = _parameter('', 'device path or pyserial URL to use instead of Com_Port')
+    port: str = _parameter(
+        '', 'device path, socket:// or rfc2217:// URL to use instead of Com_Port')
     low_latency: bool = _parameter(
         True, 'ask the driver of the port to hand on bytes at once, where it can')
     rs485: bool = _parameter(

@@ -42,8 +42,6 @@ POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 _DEVICE_SERVERS = ('socket', 'rfc2217')
-# What pyserial opens besides; there is no PLC behind its loop://.
-_SCHEMES = (*_DEVICE_SERVERS, 'alt', 'cp2110', 'hwgrep', 'spy')
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +141,7 @@ class Network:
         'Cmd_Timeout', 1000, 'ms until a reply is no longer polled for', low=500, high=5000,
         message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
     com_port: str = _net(
-        'Com_Port', '1', 'n for /dev/ttyS(n-1), a device path, or a pyserial URL')
+        'Com_Port', '1', 'n for /dev/ttyS(n-1), a device path, socket://host:port, or rfc2217://host:port')
     baud: int = _net('Baud', 9600, 'bits per second', choices=BAUD_RATES)
     data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
@@ -241,14 +239,15 @@ def _check_port(name: str, value: int | str, where: Place | str) -> None:
     if name == 'com_port' and not (_is_url(text) or text.startswith('/') or (
             text.isdigit() and (whole_number(text) or 0) >= 1)):
         raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
-                             'path such as /dev/ttyUSB0, or a URL such as socket://host:port')
+                             'path such as /dev/ttyUSB0, socket://host:port, or '
+                             'rfc2217://host:port')
 
 
 def _is_url(text: str) -> bool:
-    """Tell whether ``text`` is a URL of pyserial, with host and port where it needs them."""
+    """Tell whether ``text`` is the URL of a device server: host and port, and nothing behind."""
     try:
         url = urlsplit(text)
-        return '://' in text and url.scheme in _SCHEMES and (
-            url.scheme not in _DEVICE_SERVERS or bool(url.hostname and url.port))
+        return '://' in text and url.scheme in _DEVICE_SERVERS and bool(
+            url.hostname and url.port) and not (url.path or url.query or url.fragment)
     except ValueError:  # a port above 65535
         return False

@@ -363,7 +363,7 @@ def test_bad_data_file_of_the_process(start: Start, data: Path) -> None:
 
 
 def _awaken(descriptor: int) -> None:
-    """Poll until there is an answer: pyserial throws away what comes before it is ready."""
+    """Poll until there is an answer: the simulator needs a moment to be there."""
     while not select.select([descriptor], [], [], 0.2)[0]:
         os.write(descriptor, frames.poll_frame(1))
     os.write(descriptor, frames.master_frame(1, bytes.fromhex(PLC5_READ), Checksum.CRC))
@@ -375,7 +375,7 @@ def _awaken(descriptor: int) -> None:
     os.write(descriptor, frames.ACK)
 
 
-def test_on_a_port_that_pyserial_opens(start: Start) -> None:
+def test_on_a_port_of_a_device_server(start: Start) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server:
         server.settimeout(PATIENCE)
         name = f'socket://127.0.0.1:{server.getsockname()[1]}'

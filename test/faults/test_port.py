@@ -21,8 +21,8 @@ import os
 from pathlib import Path
 import signal
 
-from abdf1_ros.ports.port import open_port
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process
@@ -61,7 +61,7 @@ def test_device_vanishes_and_returns(
 def test_port_is_busy(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path)
     simulator = files.start_simulator()
-    other = open_port(Network(com_port=str(files.port)))
+    other = open_port(PortSettings(str(files.port)))
     with rigged(observer, files, str(files.port), simulator) as rig:
         rig.node.wait_for('[ERROR]', 'cannot open the port: another program has it open')
         rig.status('link', ERROR, 'cannot open the port: another program has it open')

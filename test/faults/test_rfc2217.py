@@ -108,7 +108,7 @@ def test_frozen_server_takes_no_new_connection(served: Served) -> None:
     rig, server = served
     server.is_frozen = True
     server.reset()
-    rig.status('link', ERROR, 'cannot open the port: Remote does not seem to support RFC2217')
+    rig.status('link', ERROR, 'cannot open the port: the other end does not speak RFC 2217')
     assert rig.write(4.0) == REFUSED
     server.is_frozen = False
     rig.recovers(6.0)

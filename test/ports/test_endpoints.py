@@ -26,7 +26,7 @@ import sys
 
 from abdf1_ros.ports.endpoints import PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.ports.port import Port
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
 
@@ -136,7 +136,7 @@ def test_tcp_port_in_use() -> None:
 def test_serial_port_is_opened_at_once_and_again_when_it_was_lost(
         tmp_path: Path, wake: int) -> None:
     with closing(Pty(tmp_path / 'port')) as pty, \
-            closing(SerialLine(str(pty.name), Network())) as line:
+            closing(SerialLine(PortSettings(str(pty.name)))) as line:
         assert line.name == str(pty.name)
         for _ in range(2):
             with closing(line.open()) as port:
@@ -152,10 +152,10 @@ def test_serial_port_that_nobody_has_taken_is_closed(tmp_path: Path) -> None:
     with closing(Pty(tmp_path / 'port')) as pty:
         lines = []  # kept, so that nobody but close() closes them
         for _ in range(2):
-            lines.append(SerialLine(str(pty.name), Network()))
+            lines.append(SerialLine(PortSettings(str(pty.name))))
             lines[-1].close()
 
 
 def test_serial_port_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(OSError, match='No such file'):
-        SerialLine(str(tmp_path / 'none'), Network())
+        SerialLine(PortSettings(str(tmp_path / 'none')))

@@ -12,15 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ports and the link thread, on pseudo-terminals and sockets."""
+"""The link thread, on pseudo-terminals and sockets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
-import errno
 import itertools
-import os
 from pathlib import Path
 import queue
 import socket
@@ -32,25 +29,16 @@ from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, 
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
-from abdf1_ros.ports.port import (
-    DescriptorPort,
-    LinkThread,
-    open_port,
-    Port,
-    PortOptions,
-    PortState,
-    SerialPort,
-)
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.descriptor import DescriptorPort, Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
 import pytest
 import serial
 from support.device_server import DeviceServer
 from support.ptys import PATIENCE, Pty, wait_until
 
 READY = b'ready'
-
-# pyserial starts its thread in the way of old.
-RFC2217 = pytest.mark.filterwarnings('ignore:set(Daemon|Name).* is deprecated')
 
 
 class Script:
@@ -112,9 +100,9 @@ class Link:
 
     def start(self, machine: Machine, name: Path | str, **options: object) -> LinkThread:
         """Run ``machine`` on the port of that name."""
-        network = Network(com_port=str(name))
+        settings = PortSettings(str(name))
         thread = LinkThread(
-            machine, lambda: open_port(network), on_state=self.states.put,
+            machine, lambda: open_port(settings), on_state=self.states.put,
             retry_period=0.02, **options)  # type: ignore[arg-type]
         self.threads.append(thread)
         thread.start()
@@ -170,7 +158,7 @@ def test_wake_ends_a_rest(pty: Pty, link: Link) -> None:
 def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) -> None:
     script = Script(Step(b'', PATIENCE))
     machine = script.machine
-    thread = LinkThread(machine, lambda: open_port(Network(com_port=str(pty.name))))
+    thread = LinkThread(machine, lambda: open_port(PortSettings(str(pty.name))))
     link.threads.append(thread)
     for _ in range(100_000):  # more than the pipe takes
         thread.wake()
@@ -291,7 +279,7 @@ def test_port_is_given_back_after_stop(pty: Pty, link: Link) -> None:
     thread = link.start(Script(Step(b'', None)).machine, pty.name)
     assert link.state().is_open
     thread.stop()
-    open_port(Network(com_port=str(pty.name))).close()
+    open_port(PortSettings(str(pty.name))).close()
 
 
 class Diary:
@@ -341,7 +329,7 @@ def _script_of_a_reply() -> tuple[Script, bytes]:
 
 def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(pty: Pty) -> None:
     script, frame = _script_of_a_reply()
-    thread = Impatient(script.machine, lambda: open_port(Network(com_port=str(pty.name))), 3)
+    thread = Impatient(script.machine, lambda: open_port(PortSettings(str(pty.name))), 3)
     thread.start()
     assert pty.read(5) == READY
     began = time.monotonic()
@@ -352,6 +340,14 @@ def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(pty: Pty) -
     assert isinstance(script.next(), Frame)
     assert thread.pauses[0] == pytest.approx(0.084)  # 16 of the 100 bytes are waited for
     thread.stop()
+
+
+@pytest.fixture
+def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
+    ours, theirs = socket.socketpair()
+    yield DescriptorPort(ours.fileno(), ours.close), theirs
+    theirs.close()
+    ours.close()
 
 
 def test_bytes_of_a_connection_are_read_as_they_come(
@@ -464,128 +460,9 @@ def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) 
     assert pty.read(5) == READY
 
 
-@pytest.mark.parametrize('name, text', [
-    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is no serial port'),
-    ('socket://127.0.0.1:1', 'Connection refused'), ('/tmp', 'Is a directory'),
-    ('foo://x', "invalid URL, protocol 'foo' not known"),
-    ('hwgrep://nothing', "no ports found matching regexp 'nothing'")])
-def test_port_that_cannot_be_opened(name: str, text: str) -> None:
-    with pytest.raises(OSError) as caught:  # noqa: PT011
-        open_port(Network(com_port=name))
-    assert (caught.value.strerror or str(caught.value)) == text
-
-
-def test_port_that_another_program_has_asked_the_system_to_keep(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*args: object) -> int:
-        raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
-
-    monkeypatch.setattr(os, 'open', refuse)  # the system itself lets root in
-    with pytest.raises(OSError, match='another program has it open'):
-        open_port(Network(com_port='/dev/ttyUSB0'))
-
-
-def test_setting_that_the_device_does_not_have(pty: Pty) -> None:
-    network = Network(com_port=str(pty.name))
-    open_port(network).close()
-    # A pty has no parity; the C library says so when there is nothing else to change.
-    with pytest.raises(OSError, match='Invalid argument'):
-        open_port(replace(network, parity='Even'))
-
-
-def test_name_of_the_port_overrides_the_file(pty: Pty) -> None:
-    port = open_port(Network(com_port='/nowhere'), str(pty.name))
-    port.write(b'abc')
-    assert pty.read(3) == b'abc'
-    port.close()
-
-
-@pytest.fixture
-def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
-    ours, theirs = socket.socketpair()
-    yield DescriptorPort(ours.fileno(), ours.close), theirs
-    theirs.close()
-    ours.close()
-
-
-@pytest.fixture
-def wake() -> Iterator[tuple[int, int]]:
-    pipe = os.pipe()
-    yield pipe
-    for descriptor in pipe:
-        os.close(descriptor)
-
-
-def test_read_returns_what_is_there(
-        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
-    port, other = sockets
-    other.send(b'abc')
-    assert port.read(None, wake[0]) == b'abc'
-    assert port.read(0.0, wake[0]) == b''
-    assert port.read(0.001, wake[0]) == b''
-
-
-def test_read_ends_when_woken(
-        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
-    os.write(wake[1], b'w')
-    assert sockets[0].read(None, wake[0]) == b''
-
-
-def test_read_from_a_closed_line(
-        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
-    port, other = sockets
-    other.close()
-    with pytest.raises(OSError, match='the other end has closed the connection'):
-        port.read(None, wake[0])
-
-
-def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -> None:
-    port, other = sockets
-    other.close()
-    with pytest.raises(BrokenPipeError):
-        port.write(b'abc')
-
-
-def test_write_to_a_line_that_takes_no_more_does_not_hang(
-        sockets: tuple[DescriptorPort, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.port._WRITE_TIMEOUT', 0.05)
-    with pytest.raises(OSError, match='the line takes no data; is Handshake right'):
-        sockets[0].write(bytes(10_000_000))
-
-
-def test_write_waits_for_a_line_that_is_slow(
-        sockets: tuple[DescriptorPort, socket.socket]) -> None:
-    port, other = sockets
-    received = bytearray()
-
-    def read_all() -> None:
-        while len(received) < 1_000_000:
-            received.extend(other.recv(65536))
-
-    reader = threading.Thread(target=read_all)
-    reader.start()
-    port.write(bytes(1_000_000))
-    reader.join(PATIENCE)
-    assert len(received) == 1_000_000
-
-
-def test_port_tells_that_bytes_have_still_to_leave(
-        sockets: tuple[DescriptorPort, socket.socket]) -> None:
-    port, other = sockets
-    assert port.unsent() == 0
-    port.write(bytes(300))
-    assert port.unsent() >= 300
-    other.recv(300)
-    assert port.unsent() == 0
-
-
-def test_port_that_cannot_tell_what_has_still_to_leave_says_none(wake: tuple[int, int]) -> None:
-    assert DescriptorPort(wake[1], lambda: None).unsent() == 0
-
-
 def test_full_pty_is_a_lost_port(
         pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.port._WRITE_TIMEOUT', 0.05)
+    monkeypatch.setattr('abdf1_ros.ports.descriptor._WRITE_TIMEOUT', 0.05)
     script = Script(Step(bytes(1_000_000), None))
     link.start(script.machine, pty.name)
     assert link.state().is_open
@@ -595,62 +472,6 @@ def test_full_pty_is_a_lost_port(
     assert script.end().startswith('PortLost(')
 
 
-def test_port_without_a_descriptor(wake: tuple[int, int]) -> None:
-    port = open_port(Network(com_port='loop://', baud=115200))
-    assert isinstance(port, SerialPort)
-    port.write(b'abc')
-    assert port.read(PATIENCE, wake[0]) == b'abc'
-    assert port.read(0.0, wake[0]) == b''
-    assert port.read(0.02, wake[0]) == b''
-    os.write(wake[1], b'w')
-    assert port.read(None, wake[0]) == b''
-    port.close()
-
-
-def told_by_open(network: Network, options: PortOptions) -> list[str]:
-    """Return what ``open_port`` tells of the options."""
-    told: list[str] = []
-    open_port(network, None, options, told.append).close()
-    return told
-
-
-def test_option_that_a_port_does_not_have_is_told_and_no_error(pty: Pty) -> None:
-    network = Network(com_port=str(pty.name))
-    low_latency, rs485 = told_by_open(network, PortOptions(low_latency=True, rs485=True))
-    assert low_latency.startswith('the port has no low-latency mode: ')
-    assert rs485.startswith('the port has no RS-485 mode: ')
-    assert told_by_open(network, PortOptions(low_latency=False)) == []
-
-
-def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-    monkeypatch.setattr(serial.Serial, 'set_low_latency_mode',
-                        lambda port, mode: asked.append(mode))
-    monkeypatch.setattr(serial.Serial, '_set_rs485_mode',
-                        lambda port, settings: asked.append(settings.rts_level_for_tx))
-    network = Network(com_port=str(pty.name))
-    assert told_by_open(network, PortOptions(low_latency=True, rs485=True)) == []
-    assert asked == [True, True]
-
-
-def is_watched_and_sends_at_once(connection: socket.socket) -> bool:
-    options = (socket.TCP_NODELAY, socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL,
-               socket.TCP_USER_TIMEOUT)
-    values = [connection.getsockopt(socket.IPPROTO_TCP, option) for option in options]
-    return values == [1, 5, 1, 5000] and \
-        connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
-
-
-def test_socket_url_sends_at_once_and_notices_a_lost_host() -> None:
-    with socket.create_server(('127.0.0.1', 0)) as server:
-        port = open_port(Network(com_port=f'socket://127.0.0.1:{server.getsockname()[1]}'))
-        assert isinstance(port, DescriptorPort)
-        with socket.socket(fileno=os.dup(port.fileno())) as connection:
-            assert is_watched_and_sends_at_once(connection)
-        port.close()
-
-
-@RFC2217
 def test_machine_runs_on_an_rfc2217_device_server(link: Link) -> None:
     script = Script(Step(ACK, PATIENCE), Step(None, None))
     with DeviceServer() as server:  # its line gives back what is sent
@@ -659,31 +480,6 @@ def test_machine_runs_on_an_rfc2217_device_server(link: Link) -> None:
         assert script.next() == Control(Code.ACK)
         assert server.baud == 9600
         thread.stop()
-
-
-@RFC2217
-def test_rfc2217_url_sends_at_once_and_notices_a_lost_host(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    opened = []
-    connect = socket.create_connection
-    monkeypatch.setattr(
-        socket, 'create_connection',
-        lambda *args, **named: opened.append(connect(*args, **named)) or opened[0])
-    with DeviceServer() as server:
-        port = open_port(Network(com_port=f'rfc2217://127.0.0.1:{server.port}'))
-        assert isinstance(port, SerialPort)
-        assert is_watched_and_sends_at_once(opened[0])
-        port.close()
-
-
-def test_machine_runs_on_a_port_without_a_descriptor(link: Link) -> None:
-    script = Script(Step(ACK, PATIENCE), Step(None, None), Step(b'', None))
-    thread = link.start(script.machine, 'loop://')
-    assert script.next() == Control(Code.ACK)
-    thread.wake()
-    assert script.next() is None
-    thread.stop()
-    assert script.end() == repr(PortLost('the driver is stopping'))
 
 
 def test_machine_runs_on_a_socket_url(link: Link) -> None:
@@ -713,3 +509,48 @@ def test_state_is_closed_after_the_end(pty: Pty, link: Link) -> None:
     wait_until(lambda: thread.state.is_open)
     thread.stop()
     assert not thread.state.is_open
+
+
+class Stuck:
+    """What opens a port when it is let go."""
+
+    def __init__(self) -> None:
+        self.is_asked = threading.Event()
+        self.go_on = threading.Event()
+        self.closed = threading.Event()
+
+    def open(self) -> Port:
+        """Open a port, after a while."""
+        self.is_asked.set()
+        assert self.go_on.wait(PATIENCE)
+        return self
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Never be called."""
+        raise AssertionError
+
+    def write(self, data: bytes) -> None:
+        """Never be called."""
+        raise AssertionError
+
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
+
+    def close(self) -> None:
+        """Note it."""
+        self.closed.set()
+
+
+def test_stop_does_not_wait_for_a_name_server() -> None:
+    stuck = Stuck()
+    thread = LinkThread(Script().machine, stuck.open)
+    thread.start()
+    assert stuck.is_asked.wait(PATIENCE)
+    thread.wake()
+    began = time.monotonic()
+    thread.stop()
+    assert time.monotonic() - began < PATIENCE / 2
+    assert not stuck.closed.is_set()
+    stuck.go_on.set()  # the port that nobody waits for any more
+    assert stuck.closed.wait(PATIENCE)

@@ -21,8 +21,8 @@ import math
 import os
 from pathlib import Path
 
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
-from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
@@ -37,7 +37,7 @@ def ptys(tmp_path: Path) -> Iterator[tuple[Pty, Pty]]:
 
 
 def tap(*names: object) -> Tap:
-    return Tap([str(name) for name in names], Network())
+    return Tap([str(name) for name in names], PortSettings(''))
 
 
 def hear(listening: Tap, count: int) -> list[Chunk]:

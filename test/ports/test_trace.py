@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
-from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction, read_capture
 import pytest
 from support.ptys import Pty
@@ -84,7 +84,7 @@ def test_trace_that_fails_says_so_once_and_the_port_goes_on(tmp_path: Path) -> N
 
 def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
-    opener = PortOpener(Network(), str(pty.name))
+    opener = PortOpener(PortSettings(str(pty.name)))
     port = opener.open()
     assert not isinstance(port, TracedPort)
     port.close()
@@ -94,8 +94,8 @@ def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
 
 def test_opener_records_across_openings(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
-    opener = PortOpener(Network(baud=19200, mode='Peer'), str(pty.name))
-    opener.trace(str(tmp_path / 'x'), 1e6, pytest.fail)
+    opener = PortOpener(PortSettings(str(pty.name), baud=19200))
+    opener.trace(str(tmp_path / 'x'), 1e6, {'check': 'CRC', 'duplex': 'full'}, pytest.fail)
     for data in (b'\x01', b'\x02'):
         port = opener.open()
         port.write(data)
@@ -114,8 +114,8 @@ def test_opener_records_across_openings(tmp_path: Path) -> None:
 def test_opener_that_cannot_record_opens_all_the_same(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
     errors: list[str] = []
-    opener = PortOpener(Network(), str(pty.name))
-    opener.trace(str(tmp_path), 1e6, errors.append)
+    opener = PortOpener(PortSettings(str(pty.name)))
+    opener.trace(str(tmp_path), 1e6, {}, errors.append)
     assert errors == [f'{tmp_path} is there and is no capture; give another name; '
                       'nothing is recorded']
     port = opener.open()

@@ -75,7 +75,8 @@ class Bench:
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Listener())
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.diagnostics = Diagnostics('line_a', self.driver, PORT, left_out)
-        self.diagnostics.attach(self.link)
+        self.port_errors: dict[str, int] = {}
+        self.diagnostics.attach(self.link, lambda: self.port_errors)
         self.set_port(True, 'open')
 
     def set_port(self, is_open: bool, text: str) -> None:
@@ -207,6 +208,12 @@ def test_last_numbered_error_has_its_age(bench: Bench) -> None:
     assert last_error(NOW + 2.5) == f'{expected} (2.5 s ago)'
     bench.diagnostics.happened(Event(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2), NOW + 3)
     assert last_error(NOW + 100) == f'{expected} (100.0 s ago)'  # a notice is no error
+
+
+def test_link_tells_what_the_uart_has_counted(bench: Bench) -> None:
+    assert 'framing errors' not in details(bench.status('link'))
+    bench.port_errors = {'framing errors': 3}
+    assert details(bench.status('link'))['framing errors'] == '3'
 
 
 def test_rates_are_those_since_the_last_look(bench: Bench) -> None:

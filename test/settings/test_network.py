@@ -159,8 +159,8 @@ def test_choice_that_is_none(
     ('Data_Bits', '9', 'Data_Bits = "9" should be a whole number from 5 to 8'),
     ('Parity', 'Mark', 'Parity = "Mark" should be one of None, Even, Odd'),
     ('Com_Port', 'COM1',
-     'Com_Port = "COM1" should be a number from 1, a device path such as /dev/ttyUSB0, or a '
-     'URL such as socket://host:port'),
+     'Com_Port = "COM1" should be a number from 1, a device path such as /dev/ttyUSB0, '
+     'socket://host:port, or rfc2217://host:port'),
 ])
 def test_exact_text(path: Path, column: str, text: str, expected: str) -> None:
     assert faults(path, column, text) == [f'FILE:2:1 ({column}): {expected}']
@@ -226,8 +226,7 @@ def test_parameter_name_is_the_column_in_lower_case(
     ('/dev/serial/by-id/usb-FTDI_x-if00', '/dev/serial/by-id/usb-FTDI_x-if00'),
     ('socket://10.0.0.7:4001', 'socket://10.0.0.7:4001'),
     ('rfc2217://host:2217', 'rfc2217://host:2217'),
-    ('RFC2217://host:2217', 'RFC2217://host:2217'),
-    ('hwgrep://0403:6001', 'hwgrep://0403:6001'), ('spy:///dev/ttyUSB0', 'spy:///dev/ttyUSB0')])
+    ('RFC2217://host:2217', 'RFC2217://host:2217')])
 def test_com_port(path: Path, text: str, port: str) -> None:
     assert load(path, 'Com_Port', text).port == port
 
@@ -235,7 +234,9 @@ def test_com_port(path: Path, text: str, port: str) -> None:
 @pytest.mark.parametrize('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³',
                                   'socket://', 'socket://host', 'rfc2217://host:99999',
                                   'socket://:4001', 'sokket://host:4001', 'loop://',
-                                  '://host:1'])
+                                  '://host:1', 'hwgrep://0403:6001', 'spy:///dev/ttyUSB0',
+                                  'alt://x:1', 'cp2110://x:1', 'socket://host:1?logging=debug',
+                                  'rfc2217://host:1/x'])
 def test_bad_com_port(path: Path, text: str) -> None:
     fault, = faults(path, 'Com_Port', text)
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')

@@ -31,8 +31,9 @@ import struct
 import threading
 import time
 
-from abdf1_ros.ports.port import DescriptorPort, open_port
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 import serial
 import serial.rfc2217
 
@@ -123,7 +124,7 @@ class LineServer:
         return f'rfc2217://127.0.0.1:{self._port}'
 
     def __enter__(self) -> LineServer:
-        line = open_port(Network(com_port=self._line_name))
+        line = open_port(PortSettings(self._line_name))
         assert isinstance(line, DescriptorPort)
         self._line = line
         self.start()

@@ -25,8 +25,9 @@ from random import Random
 import select
 import threading
 
-from abdf1_ros.ports.port import DescriptorPort, open_port
-from abdf1_ros.settings.network import Network
+from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 from support.ptys import PATIENCE, Pty
 
 _TURN = 0.01  # s; so long the box listens before it looks at what it has been told
@@ -108,7 +109,7 @@ class FaultBox:
 
     def _find_far(self) -> None:
         with suppress(OSError):
-            port = open_port(Network(com_port=self._far_name))
+            port = open_port(PortSettings(self._far_name))
             assert isinstance(port, DescriptorPort)
             self._far = port
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import time
 from typing import Any
 
-from abdf1_ros.ports.port import DescriptorPort
+from abdf1_ros.ports.descriptor import DescriptorPort
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Int16MultiArray
 from support.fault_box import FaultBox

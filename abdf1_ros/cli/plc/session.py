@@ -27,7 +27,10 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.errands import Errands, Order
 from abdf1_ros.errors import PortLost
-from abdf1_ros.ports.port import LinkThread, open_port, Port, PortState
+from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 
 # So often (s) a wait looks whether there still is a port.
@@ -42,11 +45,12 @@ def opened(network: Network) -> Callable[[], Port]:
 
     So a port that is not there is an OSError here, not a state of a thread.
     """
+    settings = PortSettings.of(network)
     try:
-        ports = [open_port(network)]
+        ports = [open_port(settings)]
     except OSError as error:
         raise OSError(reason_of(network.port, error)) from None
-    return lambda: ports.pop() if ports else open_port(network)
+    return lambda: ports.pop() if ports else open_port(settings)
 
 
 class Session:

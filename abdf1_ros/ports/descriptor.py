@@ -1,0 +1,113 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Ports with a file descriptor, whatever is behind it.
+
+They are read with poll(2) and read(2), which costs a half to a tenth of pyserial's own read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import fcntl
+import math
+import os
+import select
+import struct
+import termios
+import time
+from typing import Protocol
+
+_INT = struct.Struct('i')
+
+_READ_SIZE = 4096
+_WRITE_TIMEOUT = 2.0
+
+
+class Port(Protocol):
+    """An open line. Every method raises OSError when the line is gone."""
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until the descriptor ``wake`` is readable."""
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to the operating system."""
+
+    def unsent(self) -> int:
+        """Return how many bytes of what was written have still to leave, 0 where nobody knows."""
+
+    def close(self) -> None:
+        """Give the line back."""
+
+
+class DescriptorPort:
+    """A port with a file descriptor, which is set to non-blocking; ``close`` closes it."""
+
+    def __init__(self, descriptor: int, close: Callable[[], None]) -> None:
+        self._descriptor = descriptor
+        self._close = close
+        self._poll = select.poll()
+        self._poll.register(descriptor, select.POLLIN)
+        os.set_blocking(descriptor, False)
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
+        self._poll.register(wake, select.POLLIN)  # changes nothing from the second time on
+        milliseconds = None if timeout is None else math.ceil(timeout * 1000)
+        for descriptor, _ in self._poll.poll(milliseconds):
+            if descriptor == self._descriptor:
+                return self._take()
+        return b''
+
+    def _take(self) -> bytes:
+        """Read what has come."""
+        try:
+            data = os.read(self._descriptor, _READ_SIZE)
+        except BlockingIOError:
+            return b''
+        if not data:
+            raise OSError('the other end has closed the connection')
+        return data
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        return self._descriptor
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to the operating system."""
+        give_up = time.monotonic() + _WRITE_TIMEOUT
+        while data:
+            try:
+                data = data[os.write(self._descriptor, data):]
+            except BlockingIOError:
+                poll = select.poll()
+                poll.register(self._descriptor, select.POLLOUT)
+                left = give_up - time.monotonic()
+                if left <= 0:
+                    raise OSError('the line takes no data; is Handshake right?') from None
+                poll.poll(math.ceil(left * 1000))
+
+    def unsent(self) -> int:
+        """Return how many bytes the operating system still has."""
+        try:
+            answer = fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, bytes(_INT.size))
+        except OSError:  # a device whose driver does not tell
+            return 0
+        count: int = _INT.unpack(answer)[0]
+        return count
+
+    def close(self) -> None:
+        """Give the line back."""
+        self._close()

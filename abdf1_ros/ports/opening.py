@@ -1,0 +1,39 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The one way to open a port."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.device_server import open_rfc2217, open_socket
+from abdf1_ros.ports.serial_device import open_device
+from abdf1_ros.ports.settings import PortSettings
+
+
+def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text: None) -> Port:
+    """
+    Open a port, a serial device exclusively.
+
+    ``tell`` is called with what the port cannot do of what is asked, which is no error. Raises
+    OSError.
+    """
+    scheme, separator, _ = settings.name.partition('://')
+    if separator and scheme.lower() == 'socket':
+        return open_socket(settings)
+    if separator and scheme.lower() == 'rfc2217':
+        return open_rfc2217(settings)
+    return open_device(settings, tell)

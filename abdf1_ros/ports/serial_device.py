@@ -1,0 +1,191 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Serial devices of this machine.
+
+What adapters can do, and what it is worth, is in docs/adapters.md.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+import errno
+import fcntl
+import struct
+import termios
+import time
+from typing import Any
+
+from abdf1_ros.df1.frames import Damaged
+from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.settings import PortSettings
+import serial
+import serial.rs485
+
+# In words of ours, where those of the operating system tell too little.
+_BUSY = 'another program has it open'
+_REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is no serial port'}
+
+_PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
+
+# Linux, <linux/serial.h>: struct serial_icounter_struct, and where its members are.
+_TIOCGICOUNT = 0x545D
+_ICOUNTER = struct.Struct('20i')
+_FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
+
+# How long (s) a close waits for the last bytes, and how often it looks.
+_LAST_BYTES = 1.0
+_LOOK = 0.005
+
+# What the system puts before a damaged character, and doubles where it is one itself (PARMRK).
+_MARK = 0xFF
+
+
+def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDevice:
+    """
+    Open a device exclusively.
+
+    ``tell`` is called with what the port cannot do, which is no error. Raises OSError.
+    """
+    try:
+        port = serial.Serial(
+            settings.name, baudrate=settings.baud, bytesize=settings.data_bits,
+            parity=_PARITIES[settings.parity], stopbits=settings.stop_bits,
+            rtscts=settings.handshake, exclusive=True)
+    except (OSError, ValueError, termios.error) as error:  # the last: not every device has parity
+        raise OSError(*_plain(error)) from error
+    _set_options(port, settings, tell)
+    has_parity = settings.parity != 'None'
+    if has_parity:
+        mark_damage(port.fileno())
+    return SerialDevice(port.fileno(), port.close, is_marked=has_parity)
+
+
+def _plain(error: Exception) -> tuple[Any, ...]:
+    """Return what the operating system has said, without the words that pyserial puts around."""
+    said = error.__context__ if isinstance(error, serial.SerialException) else error
+    args = said.args if isinstance(said, OSError | termios.error) else error.args
+    return (args[0], _REASONS.get(args[0], args[1])) if len(args) > 1 else args
+
+
+def _set_options(port: serial.Serial, settings: PortSettings,
+                 tell: Callable[[str], None]) -> None:
+    """Ask the driver of a device for what goes beyond speed and character."""
+    if settings.low_latency:
+        try:
+            port.set_low_latency_mode(True)
+        except (AttributeError, ValueError, OSError) as error:
+            tell(f'the port has no low-latency mode: {error}')
+    if settings.rs485:
+        try:
+            port.rs485_mode = serial.rs485.RS485Settings()
+        except (ValueError, OSError) as error:
+            port.rs485_mode = None
+            tell(f'the port has no RS-485 mode: {error}')
+
+
+def mark_damage(descriptor: int) -> None:
+    """
+    Let the system check parity, and mark characters whose parity or stop bit is wrong.
+
+    pyserial asks for parity to be sent, but not for it to be checked.
+    """
+    attributes = termios.tcgetattr(descriptor)
+    attributes[0] |= termios.INPCK | termios.PARMRK
+    attributes[0] &= ~(termios.IGNPAR | termios.ISTRIP | termios.BRKINT)
+    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+
+
+class SerialDevice(DescriptorPort):
+    """
+    A serial port; with ``is_marked`` a damaged character comes alone, as ``Damaged``.
+
+    See ``mark_damage`` for what makes the marks.
+    """
+
+    def __init__(self, descriptor: int, close: Callable[[], None], *,
+                 is_marked: bool = False) -> None:
+        super().__init__(descriptor, close)
+        self._is_marked = is_marked
+        self._held = b''  # a mark of which not all has come
+        self._pieces: deque[bytes] = deque()
+        self._origin = self._counts()
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
+        if self._pieces:
+            return self._pieces.popleft()
+        data = super().read(timeout, wake)
+        if not self._is_marked or (not self._held and _MARK not in data):
+            return data
+        self._divide(self._held + data)
+        return self._pieces.popleft() if self._pieces else b''
+
+    def _divide(self, data: bytes) -> None:
+        """Undo the marks of termios(3), PARMRK: FF 00 c is a damaged c, FF FF is FF."""
+        sound = bytearray()
+        at, size = 0, len(data)
+        while (mark := data.find(_MARK, at)) >= 0:
+            sound += data[at:mark]
+            kind = data[mark + 1:mark + 2]
+            if not kind or (kind == b'\0' and mark + 2 == size):
+                at = mark
+                break
+            if kind == b'\0':
+                self._put(bytes(sound))
+                self._put(Damaged(data[mark + 2:mark + 3]))
+                sound.clear()
+                at = mark + 3
+            else:
+                sound.append(_MARK)
+                at = mark + 2
+        else:
+            sound += data[at:]
+            at = size
+        self._held = data[at:]
+        self._put(bytes(sound))
+
+    def _put(self, piece: bytes) -> None:
+        if piece:
+            self._pieces.append(piece)
+
+    def errors(self) -> dict[str, int]:
+        """Return what the UART has counted since the port was opened; empty: it counts nothing."""
+        return {name: count - self._origin.get(name, 0) for name, count in self._counts().items()}
+
+    def _counts(self) -> dict[str, int]:
+        try:
+            raw = fcntl.ioctl(self._descriptor, _TIOCGICOUNT, bytes(_ICOUNTER.size))
+        except (OSError, ValueError):  # the latter after the end: there is no descriptor
+            return {}
+        counts = _ICOUNTER.unpack(raw)
+        return {'parity errors': counts[_PARITY], 'framing errors': counts[_FRAME],
+                'overruns': counts[_OVERRUN] + counts[_BUFFER_OVERRUN]}
+
+    def close(self) -> None:
+        """Give the line back; what cannot leave within a second, as without CTS, is dropped."""
+        give_up = time.monotonic() + _LAST_BYTES
+        with suppress(OSError, termios.error):  # the device is gone
+            while self.unsent() and time.monotonic() < give_up:
+                time.sleep(_LOOK)
+            if self.unsent():  # the system would wait for that up to 30 s
+                termios.tcflush(self._descriptor, termios.TCOFLUSH)
+                attributes = termios.tcgetattr(self._descriptor)
+                attributes[2] &= ~termios.CRTSCTS  # for drivers that cannot drop what they have
+                termios.tcsetattr(self._descriptor, termios.TCSANOW, attributes)
+        self._descriptor = -1
+        super().close()

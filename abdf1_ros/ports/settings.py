@@ -1,0 +1,48 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a port is asked for: its name and, where it has these, speed and character."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.settings.network import Network
+
+
+@dataclass(frozen=True, slots=True)
+class PortSettings:
+    """
+    How to open the port ``name``: a device path, ``socket://host:port`` or ``rfc2217://...``.
+
+    Columns of the net CSV, as far as they are about the port. ``low_latency`` hands on bytes as
+    they come, where USB adapters gather them for up to 16 ms; ``rs485`` switches the transmitter
+    of an RS-485 port on and off with RTS. A port that can do neither is opened all the same.
+    """
+
+    name: str
+    baud: int = 9600
+    data_bits: int = 8
+    parity: str = 'None'
+    stop_bits: int = 1
+    handshake: bool = False
+    low_latency: bool = True
+    rs485: bool = False
+
+    @classmethod
+    def of(cls, network: Network, name: str = '', *, low_latency: bool = True,
+           rs485: bool = False) -> PortSettings:
+        """Return the settings of a net CSV, with ``name`` in place of its Com_Port."""
+        return cls(name or network.port, network.baud, network.data_bits, network.parity,
+                   network.stop_bits, network.handshake == 'Yes', low_latency, rs485)

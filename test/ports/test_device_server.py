@@ -1,0 +1,188 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ports of device servers: connections, and the client of RFC 2217."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+import socket
+import threading
+import time
+
+from abdf1_ros.ports import device_server
+from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.device_server import Rfc2217Port
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
+import pytest
+from support.device_server import DeviceServer
+from support.ptys import PATIENCE
+
+# As RFC 854 and RFC 2217 have them.
+WILL_COM_PORT = bytes([255, 251, 44])
+DO_COM_PORT = bytes([255, 253, 44])
+DONT_COM_PORT = bytes([255, 254, 44])
+BAUD_115200 = bytes([255, 250, 44, 101, 0, 1, 0xC2, 0, 255, 240])
+REST = b''.join(bytes([255, 250, 44, command, value, 255, 240])
+                for command, value in ((102, 8), (103, 3), (104, 1)))
+EVEN = PortSettings('', 115200, parity='Even')
+
+
+@pytest.fixture
+def wake() -> Iterator[int]:
+    ends = os.pipe()
+    yield ends[0]
+    for end in ends:
+        os.close(end)
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[Rfc2217Port, socket.socket]]:
+    ours, theirs = socket.socketpair()
+    theirs.settimeout(PATIENCE)
+    yield Rfc2217Port(ours), theirs
+    ours.close()
+    theirs.close()
+
+
+def is_watched_and_sends_at_once(port: DescriptorPort) -> bool:
+    options = (socket.TCP_NODELAY, socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL,
+               socket.TCP_USER_TIMEOUT)
+    with socket.socket(fileno=os.dup(port.fileno())) as connection:
+        values = [connection.getsockopt(socket.IPPROTO_TCP, option) for option in options]
+        return values == [1, 5, 1, 5000] and \
+            connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+
+
+def test_socket_url_sends_at_once_and_notices_a_lost_host() -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        port = open_port(PortSettings(f'socket://127.0.0.1:{server.getsockname()[1]}'))
+        assert isinstance(port, DescriptorPort)
+        assert is_watched_and_sends_at_once(port)
+        port.close()
+
+
+def test_rfc2217_url_sends_at_once_and_notices_a_lost_host() -> None:
+    with DeviceServer() as server:
+        port = open_port(PortSettings(f'rfc2217://127.0.0.1:{server.port}', 19200))
+        assert isinstance(port, Rfc2217Port)
+        assert server.baud == 19200
+        assert is_watched_and_sends_at_once(port)
+        port.close()
+
+
+def test_host_that_can_have_no_name() -> None:
+    with pytest.raises(OSError, match='is not the name of a host'):
+        open_port(PortSettings(f'socket://{"x" * 70}.local:4001'))
+
+
+def test_settings_are_sent_and_their_answers_taken(
+        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+    port, server = ends
+    server.sendall(DO_COM_PORT + b'old data' + BAUD_115200 + REST)
+    port.negotiate(EVEN)
+    said = server.recv(4096)
+    assert said.startswith(bytes([255, 251, 0, 255, 251, 3]) + WILL_COM_PORT)
+    for command in (bytes([1, 0, 1, 0xC2, 0]), b'\x02\x08', b'\x03\x03', b'\x04\x01',
+                    b'\x05\x01', b'\x05\x08', b'\x05\x0b', b'\x0c\x03'):
+        assert bytes([255, 250, 44]) + command + bytes([255, 240]) in said
+
+
+def test_setting_that_the_server_does_not_take(
+        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+    port, server = ends
+    server.sendall(DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST)
+    with pytest.raises(OSError, match='does not take Baudrate 115200, its port has 9600'):
+        port.negotiate(EVEN)
+
+
+def test_server_that_refuses(ends: tuple[Rfc2217Port, socket.socket]) -> None:
+    port, server = ends
+    server.sendall(DONT_COM_PORT)
+    with pytest.raises(OSError, match='the device server refuses RFC 2217'):
+        port.negotiate(EVEN)
+
+
+@pytest.mark.parametrize(('answer', 'text'), [
+    (b'login: ', 'the other end does not speak RFC 2217'),
+    (DO_COM_PORT + BAUD_115200, 'does not answer to settings of its port')])
+def test_server_that_does_not_answer(
+        ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch, answer: bytes,
+        text: str) -> None:
+    monkeypatch.setattr(device_server, '_NEGOTIATION_TIMEOUT', 0.05)
+    port, server = ends
+    server.sendall(answer)
+    with pytest.raises(OSError, match=text):
+        port.negotiate(EVEN)
+
+
+def read(port: Rfc2217Port, wake: int, size: int) -> bytes:
+    """Return so many bytes of the line."""
+    data = b''
+    while len(data) < size:
+        data += port.read(PATIENCE, wake)
+    return data
+
+
+@pytest.mark.parametrize('chunk', [1, 2, 3, 1000])
+def test_data_are_what_is_no_command(
+        ends: tuple[Rfc2217Port, socket.socket], wake: int, chunk: int) -> None:
+    port, server = ends
+    stream = b'a\xff\xffb' + bytes([255, 253, 1]) + b'c' + bytes([255, 241]) + \
+        bytes([255, 250, 44, 107, 255, 255, 255, 240]) + b'd\xff\xff'
+    for at in range(0, len(stream), chunk):
+        server.sendall(stream[at:at + chunk])
+    assert read(port, wake, 6) == b'a\xffbcd\xff'
+    assert server.recv(100) == bytes([255, 252, 1])  # WONT ECHO
+
+
+def test_offer_that_is_not_ours_is_refused_once(
+        ends: tuple[Rfc2217Port, socket.socket], wake: int) -> None:
+    port, server = ends
+    server.sendall(bytes([255, 251, 1, 255, 252, 1, 255, 251, 3]) + b'x')
+    assert read(port, wake, 1) == b'x'
+    assert server.recv(100) == bytes([255, 254, 1])  # DONT ECHO; SGA was asked for
+
+
+def test_data_that_look_like_commands_are_doubled(
+        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+    port, server = ends
+    port.write(b'\x10\xff\x02')
+    assert server.recv(100) == b'\x10\xff\xff\x02'
+
+
+def test_suboption_without_an_end_is_given_up(
+        ends: tuple[Rfc2217Port, socket.socket], wake: int) -> None:
+    port, server = ends
+    server.sendall(bytes([255, 250, 44]) + bytes(400))
+    with pytest.raises(OSError, match='sends what is not RFC 2217'):
+        for _ in range(2):
+            port.read(PATIENCE, wake)
+
+
+def test_data_that_nobody_reads_stay_with_the_server(
+        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+    port, server = ends
+    server.settimeout(0.2)
+    sent = 0
+    with pytest.raises(TimeoutError):
+        while sent < 100_000_000:
+            sent += server.send(bytes(65536))
+    before = {thread.name for thread in threading.enumerate()}
+    time.sleep(0)
+    assert not any('2217' in name for name in before)  # nobody reads behind our back
+    assert sent < 10_000_000
+    assert port._left == b''

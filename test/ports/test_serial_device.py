@@ -1,0 +1,271 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Serial devices: how they are opened, damaged characters, counts, and the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import errno
+import fcntl
+import os
+from pathlib import Path
+import struct
+import termios
+from typing import Any
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Damaged, Duplex, FrameDecoder
+from abdf1_ros.ports import serial_device
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.serial_device import mark_damage, SerialDevice
+from abdf1_ros.ports.settings import PortSettings
+import pytest
+import serial
+from support.ptys import PATIENCE, Pty
+
+
+@pytest.fixture
+def pty(tmp_path: Path) -> Iterator[Pty]:
+    line = Pty(tmp_path / 'line')
+    yield line
+    line.close()
+
+
+@pytest.fixture
+def wake() -> Iterator[int]:
+    ends = os.pipe()
+    yield ends[0]
+    for end in ends:
+        os.close(end)
+
+
+@pytest.mark.parametrize('name, text', [
+    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is no serial port'),
+    ('/tmp', 'Is a directory'), ('socket://127.0.0.1:1', 'Connection refused'),
+    ('rfc2217://127.0.0.1:1', 'Connection refused')])
+def test_port_that_cannot_be_opened(name: str, text: str) -> None:
+    with pytest.raises(OSError) as caught:  # noqa: PT011
+        open_port(PortSettings(name))
+    assert (caught.value.strerror or str(caught.value)) == text
+
+
+@pytest.mark.parametrize('name', ['spy://x', 'hwgrep://ttyUSB', 'loop://', 'foo://x'])
+def test_urls_that_pyserial_knows_are_files_that_do_not_exist(name: str, tmp_path: Path,
+                                                              monkeypatch: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        open_port(PortSettings(name))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_port_that_another_program_has_asked_the_system_to_keep(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*args: object) -> int:
+        raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+
+    monkeypatch.setattr(os, 'open', refuse)  # the system itself lets root in
+    with pytest.raises(OSError, match='another program has it open'):
+        open_port(PortSettings('/dev/ttyUSB0'))
+
+
+def test_setting_that_the_device_does_not_have(pty: Pty) -> None:
+    open_port(PortSettings(str(pty.name))).close()
+    # A pty has no parity; the C library says so when there is nothing else to change.
+    with pytest.raises(OSError, match='Invalid argument'):
+        open_port(PortSettings(str(pty.name), parity='Even'))
+
+
+def told_by_open(settings: PortSettings) -> list[str]:
+    """Return what ``open_port`` tells of the options."""
+    told: list[str] = []
+    open_port(settings, told.append).close()
+    return told
+
+
+def test_option_that_a_port_does_not_have_is_told_and_no_error(pty: Pty) -> None:
+    low_latency, rs485 = told_by_open(PortSettings(str(pty.name), rs485=True))
+    assert low_latency.startswith('the port has no low-latency mode: ')
+    assert rs485.startswith('the port has no RS-485 mode: ')
+    assert told_by_open(PortSettings(str(pty.name), low_latency=False)) == []
+
+
+def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(serial.Serial, 'set_low_latency_mode',
+                        lambda port, mode: asked.append(mode))
+    monkeypatch.setattr(serial.Serial, '_set_rs485_mode',
+                        lambda port, settings: asked.append(settings.rts_level_for_tx))
+    assert told_by_open(PortSettings(str(pty.name), rs485=True)) == []
+    assert asked == [True, True]
+
+
+# Damaged characters
+
+
+class Fed(SerialDevice):
+    """A device whose marked bytes the test gives."""
+
+    def __init__(self, *chunks: bytes) -> None:
+        self._ours, self._theirs = os.pipe()
+        super().__init__(self._ours, lambda: None, is_marked=True)
+        self.chunks = list(chunks)
+
+    def all(self) -> list[bytes]:
+        """Return what comes of all chunks."""
+        found = []
+        for chunk in self.chunks:
+            os.write(self._theirs, chunk)
+            while data := self.read(0, self._ours):
+                found.append(data)
+        os.close(self._ours)
+        os.close(self._theirs)
+        return found
+
+
+@pytest.mark.parametrize(('marked', 'expected'), [
+    (b'abc', [b'abc']),
+    (b'a\xff\xffb', [b'a\xffb']),
+    (b'\xff\xff\xff\xff', [b'\xff\xff']),
+    (b'ab\xff\x00cd', [b'ab', b'c', b'd']),
+    (b'\xff\x00\xff', [b'\xff']),
+    (b'\xff\x00\x00', [b'\x00']),  # a break
+    (b'\xff\xff\x00a', [b'\xff\x00a']),
+    (b'\xff\x00a\xff\x00b', [b'a', b'b'])])
+def test_marks_are_undone(marked: bytes, expected: list[bytes]) -> None:
+    whole = Fed(marked).all()
+    assert whole == expected
+    byte_by_byte = Fed(*(marked[at:at + 1] for at in range(len(marked)))).all()
+    assert b''.join(byte_by_byte) == b''.join(expected)
+    damaged = [piece for piece in whole if isinstance(piece, Damaged)]
+    assert [piece for piece in byte_by_byte if isinstance(piece, Damaged)] == damaged
+    assert len(damaged) == marked.replace(b'\xff\xff', b'').count(b'\xff\x00')
+
+
+def test_system_doubles_what_looks_like_a_mark(pty: Pty, wake: int) -> None:
+    theirs = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
+    mark_damage(theirs)
+    port = SerialDevice(theirs, lambda: os.close(theirs), is_marked=True)
+    pty.write(b'\x01\xff\x02')
+    data = b''
+    while len(data) < 3:
+        data += port.read(PATIENCE, wake)
+    assert data == b'\x01\xff\x02'
+    attributes = termios.tcgetattr(theirs)[0]
+    assert attributes & termios.INPCK
+    assert attributes & termios.PARMRK
+    port.close()
+
+
+# The vector of M 4-5's kind of message: DLE STX, seven bytes, DLE ETX, BCC.
+MESSAGE = bytes.fromhex('10 02 01 00 06 00 01 00 00 10 03 F8')
+
+
+@pytest.mark.parametrize('at', range(len(MESSAGE)))
+def test_message_with_a_damaged_character_is_not_a_good_one(at: int) -> None:
+    decoder = FrameDecoder(Checksum.BCC, Duplex.FULL)
+    decoder.feed(MESSAGE)
+    good = decoder.next_symbol()
+    assert good is not None
+    decoder.feed(MESSAGE[:at])
+    symbols = [decoder.next_symbol()]
+    decoder.feed(Damaged(MESSAGE[at:at + 1]))
+    symbols.append(decoder.next_symbol())
+    decoder.feed(MESSAGE[at + 1:])
+    symbols.append(decoder.next_symbol())
+    assert good not in symbols
+    decoder.feed(MESSAGE[:2])  # a message begins anew
+    decoder.next_symbol()
+    decoder.feed(MESSAGE[2:])
+    found = []
+    while (symbol := decoder.next_symbol()) is not None:
+        found.append(symbol)
+    assert good in found
+
+
+@pytest.mark.parametrize('at', [0, 1])
+def test_damaged_control_symbol_is_not_believed(at: int) -> None:
+    decoder = FrameDecoder(Checksum.BCC, Duplex.FULL)
+    for number, byte in enumerate(b'\x10\x06'):
+        piece = bytes([byte])
+        decoder.feed(Damaged(piece) if number == at else piece)
+        assert decoder.next_symbol() is None
+
+
+# Counts of the UART, and the end
+
+
+def test_counts_begin_when_the_port_is_opened(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = [0] * 20
+    counts[6:9] = 5, 6, 7  # struct serial_icounter_struct: frame, overrun, parity
+
+    def ioctl(descriptor: int, request: int, *args: Any) -> Any:
+        return struct.pack('20i', *counts) if request == 0x545D else true(
+            descriptor, request, *args)
+
+    true = fcntl.ioctl
+    monkeypatch.setattr(fcntl, 'ioctl', ioctl)
+    port = open_port(PortSettings(str(pty.name)))
+    assert isinstance(port, SerialDevice)
+    assert port.errors() == {'parity errors': 0, 'framing errors': 0, 'overruns': 0}
+    counts[6:11] = 6, 8, 10, 0, 4  # and buf_overrun
+    assert port.errors() == {'parity errors': 3, 'framing errors': 1, 'overruns': 6}
+    port.close()
+
+
+def test_device_that_counts_nothing(pty: Pty) -> None:
+    port = open_port(PortSettings(str(pty.name)))
+    assert isinstance(port, SerialDevice)
+    assert port.errors() == {}
+    port.close()
+    assert port.errors() == {}
+
+
+@pytest.fixture
+def close_with(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
+    """Return what closes a port while the system has so many bytes to send, look by look."""
+    done: list[str] = []
+
+    def close(*unsent: int) -> list[str]:
+        left = list(unsent)
+
+        def ioctl(descriptor: int, request: int, *args: Any) -> Any:
+            if request != termios.TIOCOUTQ:
+                return true(descriptor, request, *args)
+            return struct.pack('i', left.pop(0) if len(left) > 1 else left[0])
+
+        true = fcntl.ioctl
+        descriptor = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
+        port = SerialDevice(descriptor, lambda: done.append('closed'))
+        monkeypatch.setattr(fcntl, 'ioctl', ioctl)
+        monkeypatch.setattr(serial_device, '_LAST_BYTES', 0.05)
+        monkeypatch.setattr(termios, 'tcflush', lambda descriptor, queue: done.append(
+            'dropped' if queue == termios.TCOFLUSH else 'something else'))
+        monkeypatch.setattr(termios, 'tcsetattr', lambda descriptor, when, attributes: done.append(
+            'handshake' if attributes[2] & termios.CRTSCTS else 'no handshake'))
+        port.close()
+        os.close(descriptor)
+        return done
+    return close
+
+
+def test_close_does_not_wait_for_what_cannot_leave(
+        close_with: Callable[..., list[str]]) -> None:
+    assert close_with(12) == ['dropped', 'no handshake', 'closed']
+
+
+@pytest.mark.parametrize('unsent', [(0,), (12, 5, 2, 0)])
+def test_last_bytes_leave_before_the_close(
+        close_with: Callable[..., list[str]], unsent: tuple[int, ...]) -> None:
+    assert close_with(*unsent) == ['closed']
