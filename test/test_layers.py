@@ -48,8 +48,8 @@ def violations(module: str, source: str) -> list[str]:
             found.append(f'{module} has to do without {top}')
         elif _is_ros(top) and not _may_use_ros(module):
             found.append(f'only the node imports {top}, not {module}')
-        elif top == 'serial' and module != 'ports/serial_device.py':
-            found.append(f'only ports/serial_device.py imports {top}, not {module}')
+        elif top == 'serial' and not module.startswith('ports/'):
+            found.append(f'only ports/ imports {top}, not {module}')
         elif top in _WAITING and not module.startswith(_MAY_WAIT):
             found.append(f'{module} has to do without {top}')
     return found

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+import errno
 import io
 import os
 import signal
@@ -32,6 +33,11 @@ from abdf1_ros.numbers import decimal_number, whole_number
 RED, YELLOW, GREEN = 31, 33, 32
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
+
+_ADVICE = {
+    errno.EACCES: 'serial ports belong to a group: "sudo usermod -aG dialout $USER", then log in '
+                  'again',
+    errno.ENOENT: '"plc ports" lists the ports that there are'}
 
 _PROGRESS_DELAY = 2.0  # what is done sooner needs none
 
@@ -95,9 +101,15 @@ def drop_output() -> None:
 
 
 def reason_of(name: str, error: OSError) -> str:
-    """Return why ``name`` cannot be used; it stands in the text once."""
+    """Return why ``name`` cannot be used, and what to do where we know; it is named once."""
     text = error.strerror or str(error)
-    return text if name in text else f'{name}: {text}'
+    advice = advice_for(error.errno) if name.startswith('/dev/') else ''
+    return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
+
+
+def advice_for(number: int | None) -> str:
+    """Return what helps against an error of the operating system with a serial port."""
+    return _ADVICE.get(number or 0, '')
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:

@@ -56,7 +56,7 @@ class FileType(Enum):
     @property
     def default_file(self) -> int | None:
         """Return the file that is meant without a number (S0), None where there is none."""
-        return _DEFAULT_FILES.get(self)
+        return DEFAULT_FILES.get(self)
 
     @property
     def is_io(self) -> bool:
@@ -74,7 +74,7 @@ class FileType(Enum):
         return self not in (FileType.FLOAT, FileType.LONG, FileType.STRING)
 
 
-_DEFAULT_FILES = {
+DEFAULT_FILES = {
     FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, FileType.BINARY: 3,
     FileType.TIMER: 4, FileType.COUNTER: 5, FileType.CONTROL: 6, FileType.INTEGER: 7,
     FileType.FLOAT: 8}

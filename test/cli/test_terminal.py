@@ -18,7 +18,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+import errno
 import io
+import os
 import signal
 import sys
 
@@ -172,7 +174,15 @@ def test_whole_numbers_of_options() -> None:
 
 
 @pytest.mark.parametrize(('error', 'text'), [
-    (OSError(2, 'No such file'), '/dev/x: No such file'), (OSError('taken'), '/dev/x: taken'),
-    (OSError(2, 'could not open port /dev/x: gone'), 'could not open port /dev/x: gone')])
+    (OSError(2, 'No such file'), '/tmp/x: No such file'), (OSError('taken'), '/tmp/x: taken'),
+    (OSError(2, 'could not open port /tmp/x: gone'), 'could not open port /tmp/x: gone')])
 def test_reason_has_the_name_once(error: OSError, text: str) -> None:
-    assert reason_of('/dev/x', error) == text
+    assert reason_of('/tmp/x', error) == text
+
+
+@pytest.mark.parametrize(('number', 'text'), [
+    (errno.EACCES, 'usermod -aG dialout'), (errno.ENOENT, 'plc ports')])
+def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) -> None:
+    error = OSError(number, os.strerror(number))
+    assert text in reason_of('/dev/ttyUSB0', error)
+    assert text not in reason_of('net.csv', error)

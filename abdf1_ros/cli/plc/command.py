@@ -23,14 +23,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+import errno
+from pathlib import Path
 import sys
 
-from abdf1_ros.cli.plc import data, detect, presence
+from abdf1_ros.cli.plc import data, detect, files, init, presence
 from abdf1_ros.cli.plc.line import MODES, network_of
 from abdf1_ros.cli.plc.options import make_parser
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
+    advice_for,
     colour,
     drop_output,
     GREEN,
@@ -38,9 +41,12 @@ from abdf1_ros.cli.terminal import (
     prepare_output,
     Progress,
     RED,
+    table,
 )
 from abdf1_ros.driver.points import Outcome
-from abdf1_ros.errors import Abdf1Error, ConfigurationError, PortLost
+from abdf1_ros.errors import Abdf1Error, ConfigurationError, FormatError, PortLost, Problem
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
@@ -256,6 +262,17 @@ def _scan(options: argparse.Namespace) -> int:
 
 def _detect(options: argparse.Namespace) -> int:
     network = network_of(options)
+    found = _found(options, network)
+    if found is None:
+        return EXIT_FAILED
+    there = found.presence
+    print(f'{colour(str(found.candidate), GREEN, sys.stdout)}: station {there.station} {there}')
+    print(f'net.csv:\n{init.net_csv(network, found)}')
+    return 0
+
+
+def _found(options: argparse.Namespace, network: Network) -> detect.Found | None:
+    """Return the settings that work, after saying what was heard where none does."""
     progress = Progress()
     bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
         else detect.BAUD_RATES
@@ -268,25 +285,91 @@ def _detect(options: argparse.Namespace) -> int:
         _complain('nothing answers with any of these settings')
         for trace in search.traces or [presence.SILENCE]:
             _complain(trace)
+    return found
+
+
+def _init(options: argparse.Namespace) -> int:
+    target = init.Files(Path(options.into))
+    try:
+        target.check()
+    except Problem as problem:
+        raise ConfigurationError([problem]) from None
+    if not options.port and not options.net:
+        options.port = _only_port()
+    network = network_of(options)
+    found = _found(options, network)
+    if found is None:
         return EXIT_FAILED
-    there = found.presence
-    print(f'{colour(str(found.candidate), GREEN, sys.stdout)}: station {there.station} {there}')
-    print(f'net.csv:\n{_net_csv(network, found)}')
+    print(f'{colour(str(found.candidate), GREEN, sys.stdout)}')
+    there = [found.presence]
+    if found.candidate.mode == MODES['half']:
+        there = [seen for seen in presence.scan(found.network(network), options.stations)
+                 if seen.is_there]
+    for seen in there:
+        print(f'station {seen.station}: {seen}')
+    target.write(network, found, there)
+    print(f'written: {target.net}, {target.map}\n'
+          'how to go on: write the addresses that you need into map.csv, then\n'
+          f'  ros2 run abdf1_ros check {target.net} {target.map}\n'
+          f'  ros2 run abdf1_ros node --ros-args -p net_file:={target.net} '
+          f'-p map_file:={target.map}')
     return 0
 
 
-def _net_csv(network: Network, found: detect.Found) -> str:
-    """Return a net CSV with the settings that have been found."""
-    candidate = found.candidate
-    row = (network.station, candidate.mode, candidate.check, network.port, candidate.baud,
-           network.parity, 300)
-    return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
-            + ','.join(map(str, row)))
+def _only_port() -> str:
+    """Return the port where there is just one; raises ConfigurationError."""
+    ports = serial_ports()
+    if len(ports) == 1:
+        print(f'port: {ports[0].device} {ports[0].adapter}'.rstrip())
+        return ports[0].stable or ports[0].device
+    listed = ', '.join(port.device for port in ports) or 'this machine has none'
+    raise ConfigurationError([Problem('--port', f'name the port: {listed}')])
+
+
+def _ports(options: argparse.Namespace) -> int:
+    ports = serial_ports()
+    rows = [(port.device, port.adapter, port.stable,
+             '' if port.may_open else 'not for this user') for port in ports]
+    if not ports:
+        _complain('this machine has no serial port: is the adapter plugged in? In a virtual '
+                  'machine or container it has to be passed through')
+        return EXIT_FAILED
+    print(table(('port', 'adapter', 'name that stays', ''), rows))
+    if not all(port.may_open for port in ports):
+        _complain(advice_for(errno.EACCES))
+    return 0
+
+
+def _files(options: argparse.Namespace) -> int:
+    with Session(network_of(options)) as session:
+        try:
+            kind = {'PLC_Type': options.plc_type} if options.plc_type \
+                else data.ask_kind(session, options.station)
+            family = PlcType(kind['PLC_Type'])
+            if family not in files.FAMILIES:
+                raise FormatError(f'a {family.value} has no files that can be looked for')
+            progress = Progress()
+            found = []
+            for entry in files.find_files(session, options.station, family, options.files,
+                                          progress.show):
+                found.append(entry)
+                if not options.map:
+                    progress.clear()
+                    print(f'{str(entry):6} {entry.elements or "":4} '
+                          f'{"elements" if entry.elements else "by rack or slot"}', flush=True)
+            progress.clear()
+        except Abdf1Error as error:
+            return _failed(session, options.station, error)
+    if options.map:
+        print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period')
+        for row in files.map_rows(found, options.station, family, kind.get('Processor', '')):
+            print(row)
+    return 0 if found else EXIT_FAILED
 
 
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
-    'scan': _scan, 'detect': _detect}
+    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files}
 
 
 def _complain(text: str) -> None:

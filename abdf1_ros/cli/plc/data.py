@@ -38,7 +38,7 @@ from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.values import Values, ValueType
 
 # The family in a diagnostic status, and its PLC_Type.
-_FAMILIES = {'SLC': 'SLC', 'PLC-5': 'PLC5', 'PLC-3': 'PLC3', 'PLC-2': 'PLC2'}
+FAMILIES = {'SLC': 'SLC', 'PLC-5': 'PLC5', 'PLC-3': 'PLC3', 'PLC-2': 'PLC2'}
 
 # What stands on the command line for a column of a map CSV.
 _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
@@ -95,9 +95,9 @@ def ask_kind(session: Session, station: int) -> dict[str, str]:
     Raises LinkError, RemoteError, or FormatError where that cannot be told.
     """
     identity = session.ask(station, identify())
-    if identity.family not in _FAMILIES:
+    if identity.family not in FAMILIES:
         raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
-    return {'PLC_Type': _FAMILIES[identity.family], 'Processor': processor_of(identity)}
+    return {'PLC_Type': FAMILIES[identity.family], 'Processor': processor_of(identity)}
 
 
 def processor_of(identity: Identity) -> str:

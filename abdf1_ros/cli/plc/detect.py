@@ -53,6 +53,11 @@ class Found:
     candidate: Candidate
     presence: Presence
 
+    def network(self, base: Network) -> Network:
+        """Return ``base`` with these settings."""
+        return replace(base, baud=self.candidate.baud, mode=self.candidate.mode,
+                       error_code=self.candidate.check)
+
 
 class Search:
     """

@@ -60,8 +60,11 @@ exit status:
 """
 _EPILOG = _STATUSES + """
 examples:
+  plc ports                                   which ports are there?
+  plc init                                    find all, and write net.csv and map.csv
   plc detect --port /dev/ttyUSB0              which settings does this line have?
   plc scan 0-31 --net net.csv                 who is there?
+  plc files 1 --net net.csv                   which data files does it have?
   plc status 1 --port /dev/ttyUSB0 --baud 19200
   plc read N7:0 --length 10 --peer --port /dev/ttyUSB0
   plc write N7:10 5 6 7 --yes --net net.csv
@@ -110,7 +113,28 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
                         help='who may be there in half duplex (default: 0-7)')
     search.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
+    begin = add('init', 'find port, settings and stations, and write net.csv and map.csv',
+                'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4',
+                defaults=_DETECT_DEFAULTS)
+    begin.add_argument('--into', metavar='FOLDER', default='.',
+                       help='where the files are to be (default: here)')
+    begin.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
+                       help='who may be there in half duplex (default: 0-7)')
+    begin.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
+    _complete_files(add('files', 'tell which data files a PLC has and how long they are',
+                        'files 1 --net net.csv', 'files 1 --map --net net.csv'))
+    commands.add_parser('ports', help='list serial ports and adapters',
+                        description='List serial ports and adapters.')
     return parser
+
+
+def _complete_files(found: argparse.ArgumentParser) -> None:
+    found.add_argument('station', metavar='STATION', type=_station)
+    found.add_argument('--files', metavar='LIST', type=_stations, default=tuple(range(32)),
+                       help='numbers to look for, up to 254 (default: 0-31)')
+    found.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in PlcType],
+                       help='default: the PLC is asked what it is')
+    found.add_argument('--map', action='store_true', help='print rows for a map CSV')
 
 
 def _complete_write(write: argparse.ArgumentParser) -> None:

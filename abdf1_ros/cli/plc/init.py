@@ -1,0 +1,95 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The first net.csv and map.csv of a line, made from what its PLCs say of themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from abdf1_ros.cli.plc.data import FAMILIES, processor_of
+from abdf1_ros.cli.plc.detect import Found
+from abdf1_ros.cli.plc.presence import Presence
+from abdf1_ros.errors import Problem
+from abdf1_ros.settings.network import Network
+
+_TIMEOUT = 300  # ms; the default of a net CSV is long for a line where somebody waits
+
+_HEAD = """\
+# One row a mapping: a PLC address that becomes a topic. A row that begins with # is not used:
+# take the # away, and write the address and tag that you need.
+# Command is Read, Write, ReadWrite or Serve.
+Tag,Command,Address,Station,PLC_Type,Processor,Length,Period
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """Where the two files are to be."""
+
+    folder: Path
+
+    @property
+    def net(self) -> Path:
+        """Return the net CSV."""
+        return self.folder / 'net.csv'
+
+    @property
+    def map(self) -> Path:  # noqa: A003
+        """Return the map CSV."""
+        return self.folder / 'map.csv'
+
+    def check(self) -> None:
+        """Raise Problem where a file is there already, or has no folder."""
+        if not self.folder.is_dir():
+            raise Problem(str(self.folder), 'there is no such folder; make it, or name another '
+                                            'with --into')
+        for path in (self.net, self.map):
+            if path.exists():
+                raise Problem(str(path), 'is there already and stays as it is; name another '
+                                         'folder with --into')
+
+    def write(self, network: Network, found: Found, stations: Sequence[Presence]) -> None:
+        """Write both; raises OSError."""
+        self.net.write_text(net_csv(network, found) + '\n', encoding='utf-8')
+        self.map.write_text(_HEAD + ''.join(map_rows(stations)), encoding='utf-8')
+
+
+def net_csv(network: Network, found: Found) -> str:
+    """Return a net CSV with the settings that have been found."""
+    candidate = found.candidate
+    row = (network.station, candidate.mode, candidate.check, network.port, candidate.baud,
+           network.parity, _TIMEOUT)
+    return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
+            + ','.join(map(str, row)))
+
+
+def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
+    """Yield a row that works and some that only have to be uncommented, for each station."""
+    for presence in stations:
+        number, identity = presence.station, presence.identity
+        family = FAMILIES.get(identity.family) if identity else None
+        yield f'# station {number}: {presence}\n'
+        if family is None or identity is None:
+            yield f'# its family is not known: write PLC_Type yourself\n' \
+                  f'# words_{number},Read,N7:0,{number},SLC,,10,1000\n'
+            continue
+        tail = f'{number},{family},{processor_of(identity)}'
+        # The status file is there in every processor of these families; N7 need not be.
+        yield f'status_{number},Read,S:0,{tail},4,1000\n'
+        yield f'# words_{number},Read,N7:0,{tail},10,1000\n'
+        yield f'# interlocks_{number},Read,B3:0/0,{tail},8,250\n'
+        yield f'# setpoint_{number},Write,N7:100,{tail},1,\n'

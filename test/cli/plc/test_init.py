@@ -1,0 +1,150 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""First files of a line, the data files of a PLC, and the ports of this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import time
+
+from abdf1_ros.cli.plc import command
+from abdf1_ros.cli.plc.command import main
+from abdf1_ros.ports.listing import SerialPortInfo
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.network import load_network
+import pytest
+from support.driver_bench import simulated_plc
+from support.plc_line import plc_line
+
+Output = pytest.CaptureFixture[str]
+
+PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
+        ('ST9:0', 84), ('A12:0', 7), ('D13:0', 1), ('C20:0', 3))
+SLC = (('I:3.0', 2), ('S:0', 64), ('B3:0', 1), ('N7:0', 100), ('F10:0', 8), ('L11:0', 4))
+
+
+@pytest.fixture(scope='module')
+def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Return a line with a PLC-5 as station 1 and an SLC as station 2."""
+    plcs = (simulated_plc(1, 'PLC5', time.monotonic, *PLC5),
+            simulated_plc(2, 'SLC', time.monotonic, *SLC))
+    with plc_line(tmp_path_factory.mktemp('line') / 'plc', *plcs) as name:
+        yield name
+
+
+def test_init_writes_files_that_the_node_takes(
+        port: str, tmp_path: Path, capsys: Output) -> None:
+    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
+                 '--stations', '1-3']) == 0
+    said = capsys.readouterr().out
+    assert 'station 1: PLC-5/40' in said and 'station 2: SLC 5/03' in said
+    network = load_network(str(tmp_path / 'net.csv'))
+    assert (network.port, network.baud, network.mode, network.error_code) == (
+        port, 19200, 'Master', 'CRC')
+    mappings, problems = load_mappings(str(tmp_path / 'map.csv'))
+    assert problems == []
+    assert [(mapping.tag, mapping.plc_type.value, mapping.station) for mapping in mappings] == [
+        ('status_1', 'PLC5', 1), ('status_2', 'SLC', 2)]
+
+
+def test_rows_that_are_only_comments_are_good_rows_too(
+        port: str, tmp_path: Path, capsys: Output) -> None:
+    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
+                 '--stations', '1,2']) == 0
+    capsys.readouterr()
+    path = tmp_path / 'map.csv'
+    rows = [line.removeprefix('# ') if line.count(',') == 7 else line
+            for line in path.read_text(encoding='utf-8').splitlines()]
+    path.write_text('\n'.join(rows), encoding='utf-8')
+    mappings, problems = load_mappings(str(path))
+    assert (len(mappings), problems) == (8, [])
+
+
+def test_init_leaves_files_alone_that_are_there(
+        port: str, tmp_path: Path, capsys: Output) -> None:
+    (tmp_path / 'map.csv').write_text('mine', encoding='utf-8')
+    assert main(['init', '--port', port, '--into', str(tmp_path)]) == 2
+    assert 'map.csv: is there already' in capsys.readouterr().err
+    assert not (tmp_path / 'net.csv').exists()
+    assert main(['init', '--port', port, '--into', str(tmp_path / 'nowhere')]) == 2
+    assert 'there is no such folder' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('station', 'found'), [
+    ('1', {'O0': 0, 'S2': 32, 'B3': 5, 'T4': 10, 'N7': 256, 'F8': 10, 'ST9': 2, 'A12': 7,
+           'D13': 1, 'C20': 1}),
+    ('2', {'I1': 0, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L11': 2})])
+def test_files_are_found_with_type_and_length(
+        port: str, station: str, found: dict[str, int], capsys: Output) -> None:
+    assert main(['files', station, '--port', port, '--files', '0-21']) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert {name: int(count) if count.isdigit() else 0 for name, count, *_ in lines} == found
+
+
+@pytest.mark.parametrize('station', ['1', '2'])
+def test_files_become_rows_of_a_map(
+        port: str, station: str, tmp_path: Path, capsys: Output) -> None:
+    assert main(['files', station, '--port', port, '--files', '2-13', '--map']) == 0
+    path = tmp_path / 'map.csv'
+    path.write_text(capsys.readouterr().out, encoding='utf-8')
+    mappings, problems = load_mappings(str(path))
+    assert problems == []
+    assert {mapping.tag for mapping in mappings} >= {'s2', 'b3', 'n7'}
+
+
+def test_station_without_files_is_an_error(port: str, capsys: Output) -> None:
+    assert main(['files', '1', '--port', port, '--files', '30-31']) == 1
+    assert main(['files', '1', '--port', port, '--plc-type', 'PLC2']) == 1
+    assert 'no files that can be looked for' in capsys.readouterr().err
+
+
+ADAPTER = SerialPortInfo('/dev/ttyUSB0', '/dev/serial/by-id/usb-FTDI', 'FT232R', True)
+OTHER = SerialPortInfo('/dev/ttyS0', '', '', False)
+
+
+def _with_ports(monkeypatch: pytest.MonkeyPatch, *ports: SerialPortInfo) -> None:
+    monkeypatch.setattr(command, 'serial_ports', lambda: list(ports))
+
+
+def test_ports_are_listed_with_what_keeps_one_from_opening_them(
+        monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+    _with_ports(monkeypatch, ADAPTER, OTHER)
+    assert main(['ports']) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[1].split() == ['/dev/ttyUSB0', 'FT232R', ADAPTER.stable]
+    assert said.out.splitlines()[2].endswith('not for this user')
+    assert 'usermod -aG dialout' in said.err
+
+
+def test_machine_without_ports_says_so(
+        monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+    _with_ports(monkeypatch)
+    assert main(['ports']) == 1
+    assert 'no serial port' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('ports', [(), (ADAPTER, OTHER)])
+def test_init_asks_for_the_port_where_it_is_not_plain(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Output,
+        ports: tuple[SerialPortInfo, ...]) -> None:
+    _with_ports(monkeypatch, *ports)
+    assert main(['init', '--into', str(tmp_path)]) == 2
+    assert 'name the port' in capsys.readouterr().err
+
+
+def test_port_that_is_not_there_leads_to_the_list(capsys: Output) -> None:
+    assert main(['read', 'N7:0', '--port', '/dev/ttyUSB99']) == 2
+    assert '"plc ports" lists the ports' in capsys.readouterr().err
