@@ -61,8 +61,8 @@ MAX_KEPT = 2 * MAX_FORWARDS
 # before it.
 MOST_QUEUED = 8
 
-# Times as long as for one poll of the dead is left to the living.
-LIVING_SHARE = 7
+# After inactive stations have had the line for t, 7 t are left to the active ones.
+_OTHERS_SHARE = 7
 
 # What answers a message and a poll, but for the frames that answer a poll too.
 _MESSAGE_ANSWERS = (Code.ACK, Code.NAK)
@@ -124,7 +124,7 @@ class MasterLine:
         self._last_code = 0
         self._forwards: deque[Packet] = deque()
         self._behind: dict[int, int] = {}  # by station: the one of this line that it is behind
-        self._next_revival = 0.0
+        self._next_probe = 0.0
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf
                 ) -> Generator[Step, Symbol | None, float]:
@@ -396,14 +396,23 @@ class MasterLine:
 
     def _revive_for_others(self, number: int) -> Talk:
         """Poll an inactive station, but not where it has its turn, nor beyond an eighth."""
-        begun = self.machine.now
-        if number in self.polled or begun < self._next_revival:
+        if number in self.polled or not self.may_probe:
             raise StationInactive(number)
+        begun = self.machine.now
         try:
             yield from self.revive(number)
         finally:
-            now = self.machine.now
-            self._next_revival = now + LIVING_SHARE * (now - begun)
+            self.probed(begun)
+
+    @property
+    def may_probe(self) -> bool:
+        """Tell whether inactive stations have had less than an eighth of the line's time."""
+        return self.machine.now >= self._next_probe
+
+    def probed(self, begun: float) -> None:
+        """Take note that an inactive station has had the line since ``begun`` (s)."""
+        now = self.machine.now
+        self._next_probe = now + _OTHERS_SHARE * (now - begun)
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""

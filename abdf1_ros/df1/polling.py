@@ -44,7 +44,6 @@ from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.master_line import (
     is_good,
-    LIVING_SHARE,
     MasterLine,
     MasterSettings,
     MOST_QUEUED,
@@ -176,7 +175,9 @@ class StandardPollingMaster:
         # s) they may. There is no second one for them, or several senders would soon fill a sink
         # that a poll empties by one message, and our own commands would find no room in it.
         self._given: dict[int, float] = {}
-        self._next_inactive_poll = 0.0
+        # Stations that have answered a probe, and no command since. What they cost is as good as
+        # the time of another probe: one that takes no commands would else come back at once.
+        self._doubtful: set[int] = set()
         self._last_probed: _PollList | None = None
 
     @property
@@ -194,6 +195,7 @@ class StandardPollingMaster:
         self._line.forget_forwards()
         self._outstanding.clear()
         self._given.clear()
+        self._doubtful.clear()
         self._priority.started = self._normal.started = None  # no scan lasts across a stop
         while True:
             begun = self._machine.now
@@ -236,8 +238,7 @@ class StandardPollingMaster:
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
         """Poll one inactive station of a list, if the living can spare the time."""
         number = polled.inactive(self._is_active)
-        polled.is_kept_waiting = number is not None \
-            and self._machine.now < self._next_inactive_poll
+        polled.is_kept_waiting = number is not None and not self._line.may_probe
         other = self._normal if polled is self._priority else self._priority
         is_others_turn = other.is_kept_waiting and polled is self._last_probed
         if number is None or polled.is_kept_waiting or is_others_turn:
@@ -249,9 +250,9 @@ class StandardPollingMaster:
         answer = yield from self._line.probe(number)
         if is_good(answer):
             yield from self._answered(number, answer)
-        spent = self._machine.now - begun
+            self._doubtful.add(number)
         if any(station.active for station in self._stations):
-            self._next_inactive_poll = self._machine.now + LIVING_SHARE * spent
+            self._line.probed(begun)
 
     def _visit(self, number: int, source: TaskSource) -> Talk:
         """Send what waits, then poll one active station; our own place is for commands."""
@@ -268,7 +269,7 @@ class StandardPollingMaster:
                 answer = yield from self._line.poll_with_retries(
                     number, 0.0, entry.task.reply_size if entry else 0)
             except StationInactive as error:
-                self._end(number, error)
+                self._lost(number, begun, error)
                 return
             yield from self._answered(number, answer)
             is_more_wanted = isinstance(answer, Frame) and self._polling.multiple \
@@ -362,12 +363,21 @@ class StandardPollingMaster:
             return
         task.sent = True
         entry = self._outstanding[number] = _Outstanding(task)
+        now = self._machine.now
         try:
             begun = yield from self._line.deliver(number, task.command, task.expires)
         except StationInactive as error:
-            self._end(number, error)
+            self._lost(number, now, error)
         except CommandExpired as error:
             task.sent = error.sent
             self._end(number, error)
         else:
+            self._doubtful.discard(number)
             entry.deadline = begun + self._settings.cmd_timeout
+
+    def _lost(self, number: int, begun: float, error: StationInactive) -> None:
+        """Take note that a station does not answer any more, and has had the line since then."""
+        self._end(number, error)
+        if number in self._doubtful:
+            self._doubtful.remove(number)
+            self._line.probed(begun)

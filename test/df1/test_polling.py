@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -27,6 +28,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings, StandardPollingMaster
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
+import hypothesis
 from hypothesis import given, strategies
 import pytest
 from support.multidrop import MasterBench
@@ -85,7 +87,7 @@ def test_group_goes_on_where_it_stopped(size: int, expected: list[int]) -> None:
 def test_group_counts_active_stations_only() -> None:
     rig = bench(PollingSettings((1, 2, 3, 4), priority=(9,), group_size=2), dead=(1, 3))
     rig.start(1, 3)
-    rig.master.link._next_inactive_poll = 1e9  # type: ignore[union-attr]
+    rig.master.link._line._next_probe = 1e9  # type: ignore[union-attr]
     assert polls(rig, 6) == [9, 2, 4, 9, 2, 4]
 
 
@@ -127,6 +129,49 @@ def test_inactive_stations_get_an_eighth_of_the_time_at_most(priority: tuple[int
     assert 0.1 <= wasted * SETTINGS.timeout / 20.0 <= 1 / 8 + 0.01
     each = [len(rig.master.times(f'P{number}')) for number in dead]
     assert max(each) - min(each) <= 1
+
+
+def share_of(rig: MasterBench, names: Collection[str], count: int) -> float:
+    """Return the share of the line's time that these frames take until there are so many."""
+    log = rig.master.machine.log
+
+    def spans() -> list[tuple[float, float]]:
+        return [(when, after) for (when, name), (after, _) in pairwise(log) if name in names]
+
+    # The pause after the last one belongs to it.
+    rig.line.run(lambda: len(spans()) > count, 1e9)
+    begun, end = spans()[0][0], spans()[count][0]
+    return sum(after - when for when, after in spans()[:count]) / (end - begun)
+
+
+@hypothesis.settings(max_examples=25)
+@given(timeout=strategies.integers(0, 360_000), tx_delay=strategies.integers(0, 65_535),
+       retries=strategies.integers(0, 10), dead=strategies.integers(1, 253),
+       priority=strategies.integers(0, 253), group_size=strategies.integers(0, 254))
+def test_inactive_stations_get_an_eighth_at_most_whatever_the_settings(
+        timeout: int, tx_delay: int, retries: int, dead: int, priority: int,
+        group_size: int) -> None:
+    """The ranges of the specification, and 1 to 254 stations of which one is there."""
+    numbers = [number for number in range(255) if number != SETTINGS.station][:dead + 1]
+    polling = PollingSettings(
+        tuple(numbers[priority:]), tuple(numbers[:priority]), group_size)
+    settings = replace(SETTINGS, timeout=timeout / 1000, nak_retries=retries,
+                       enq_retries=retries)
+    # So slow a line that a run has few polls; an answer takes a tenth of Timeout.
+    rig = bench(polling, dead=tuple(numbers[:-1]), settings=settings,
+                baud=200 / max(settings.timeout, 0.02), tx_delay=tx_delay / 1000)
+    rig.start(*numbers[:-1])
+    assert share_of(rig, [f'P{number}' for number in numbers[:-1]], 5) <= 1 / 8
+
+
+def test_station_that_answers_polls_and_takes_no_command_gets_an_eighth_at_most() -> None:
+    rig = bench(PollingSettings((1, 2)))
+    rig[1].deaf = True
+    rig.start(1)
+    while rig.clock() < 8.0:
+        rig.ask(1)
+        rig.run(0.05)
+    assert share_of(rig, ['C1'], 3 * (SETTINGS.nak_retries + 1)) <= 1 / 8
 
 
 def test_dead_priority_station_does_not_keep_normal_ones_from_coming_back() -> None:

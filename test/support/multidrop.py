@@ -218,12 +218,13 @@ class MasterBench:
 
     def __init__(self, *numbers: int, settings: MasterSettings,
                  polling: PollingSettings | None = None, serve: Serve | None = Packet.reply,
-                 baud: int = 19200, dead: Iterable[int] = (), retries: int = 3) -> None:
+                 baud: float = 19200, dead: Iterable[int] = (), retries: int = 3,
+                 tx_delay: float = 0.0) -> None:
         self.slaves = {number: Slave(number, self.clock, retries=retries) for number in numbers}
         for number in dead:
             self.slaves[number].silent = True
         self.master = MasterNode(settings, self.clock, polling, numbers=numbers, serve=serve,
-                                 timing=LineTiming(char_time(baud)))
+                                 timing=LineTiming(char_time(baud), tx_delay))
         self.far = Machine(multidrop(list(self.slaves.values())), checksum=settings.checksum)
         self.line = VirtualLine(self.master.machine, self.far, baud=baud, chunk=1000)
         self._tns = 0x0100

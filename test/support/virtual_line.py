@@ -86,7 +86,7 @@ class VirtualLine:
     from then on.
     """
 
-    def __init__(self, *machines: Machine, baud: int = 19200, propagation: float = 0.0,
+    def __init__(self, *machines: Machine, baud: float = 19200, propagation: float = 0.0,
                  chunk: int = 1, noise: Damage = QUIET, seed: int = 0) -> None:
         self.now = 0.0
         self.noise = noise
@@ -193,6 +193,6 @@ class VirtualLine:
                 heapq.heappush(self._arrivals, (here, self._count, receiver, part))
 
 
-def char_time(baud: int) -> float:
+def char_time(baud: float) -> float:
     """Return the seconds that a character takes."""
     return BITS_PER_CHARACTER / baud
