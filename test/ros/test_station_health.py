@@ -93,6 +93,7 @@ class Desk:
         self.driver = Driver(
             Network(), mappings, DriverSettings(), Recorder(time.monotonic))
         self.driver.is_online = True
+        self.driver.health.begin(0.0)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.service = LinkCounterService(self.driver, self.link)
         observer.node.create_service(Trigger, '~/read', self.service.answer,
