@@ -24,6 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.text import printable
 
 
@@ -61,6 +62,10 @@ _MODE_WORDS = {'RUN': 'run', 'PROG': 'program', 'TEST': 'test', 'SUSPEND': 'susp
 _MODULE_COUNTERS = 55
 
 
+_PLC_TYPES = {'SLC': PlcType.SLC, 'PLC-5': PlcType.PLC5, 'PLC-3': PlcType.PLC3,
+              'PLC-2': PlcType.PLC2}
+
+
 @dataclass(frozen=True, slots=True)
 class Identity:
     """
@@ -88,6 +93,11 @@ class Identity:
     interface: int | None = None
     counter_address: int = 0
     counter_size: int = _MODULE_COUNTERS
+
+    @property
+    def plc_type(self) -> PlcType | None:
+        """Return the PLC_Type of its family, None where that is unknown."""
+        return _PLC_TYPES.get(self.family)
 
     @property
     def is_running(self) -> bool | None:

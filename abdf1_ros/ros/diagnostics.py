@@ -29,8 +29,10 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.port import LinkThread
-from abdf1_ros.ros.station_health import health_values, trouble
+from abdf1_ros.ros.station_health import health_values, trouble, wrong_type
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -78,13 +80,15 @@ class Diagnostics:
     All statuses of one node, named ``<node>: <section>``.
 
     ``has_namesake`` is to be set when another node has its name. ``left_out`` are the faults of
-    the rows that the map was read without.
+    the rows that the map was read without, ``map_name`` is what the file is called.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
-                 left_out: Sequence[Problem] = ()) -> None:
+                 left_out: Sequence[Problem] = (), map_name: str = 'map') -> None:
         self.has_namesake = False
         self._left_out = left_out
+        self._map_name = map_name
+        self._rows_by_type = _rows_by_type(driver.mappings)
         self._driver = driver
         self._port = port
         self._link: LinkThread | None = None
@@ -205,6 +209,16 @@ class Diagnostics:
             lambda now: self._judge_station(station, now),
             lambda now: self._station_values(station, now))
 
+    def wrong_types(self) -> list[str]:
+        """Return which PLCs are of another family than the map says."""
+        found = (self._wrong_type(station.number) for station in self._driver.stations)
+        return [text for text in found if text is not None]
+
+    def _wrong_type(self, station: int) -> str | None:
+        identity = self._driver.health.known(station).identity
+        return wrong_type(station, identity, self._rows_by_type[station].values(),
+                          self._map_name)
+
     def _judge_station(self, station: Station, now: float) -> Verdict:
         if self._link is None or not self._link.state.is_open:
             return ERROR, f'station {station.number} unknown: the port is not open'
@@ -216,6 +230,8 @@ class Diagnostics:
         why = trouble(self._driver.health.known(station.number).identity)
         if why is not None:
             return WARN, f'station {station.number} active, but {why}'
+        if (wrong := self._wrong_type(station.number)) is not None:
+            return WARN, wrong
         return OK, f'station {station.number} active'
 
     def _station_values(self, station: Station, now: float) -> dict[str, str]:
@@ -267,6 +283,15 @@ class Diagnostics:
             if point.freshness(now) is not Freshness.FRESH:
                 values[f'tag {tag}' if tag in values else tag] = _describe(point, now)
         return values
+
+
+def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mapping]]:
+    """Return the first row of each PLC type at each station."""
+    rows: defaultdict[int, dict[PlcType, Mapping]] = defaultdict(dict)
+    for mapping in mappings:
+        if not mapping.serves:
+            rows[mapping.station].setdefault(mapping.plc_type, mapping)
+    return rows
 
 
 _Moment = tuple[Event | str, float]

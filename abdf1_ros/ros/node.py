@@ -27,6 +27,7 @@ from collections import defaultdict, deque
 from collections.abc import Sequence
 from functools import partial
 import os
+from pathlib import Path
 import random
 import re
 import signal
@@ -164,7 +165,9 @@ class BridgeNode(Node):
         self.driver = self._make_driver(configuration)
         self._create_reads()
         self._diagnostics = Diagnostics(
-            self.get_name(), self.driver, configuration.port, configuration.map_problems)
+            self.get_name(), self.driver, configuration.port, configuration.map_problems,
+            Path(configuration.parameters.map_file).name)
+        self._wrong_types: list[str] = []
         self._diagnostics_period = configuration.parameters.diagnostics_period
         # Every node has this service, and nobody gives it another name.
         service = f'{self.get_fully_qualified_name()}/get_parameters'
@@ -337,6 +340,11 @@ class BridgeNode(Node):
         if self._namesakes.look(now):
             self._namesake_came_or_went(self._namesakes.has_found)
         self._tell_speed(self.driver.machine.rate.seen)
+        wrong_types = self._diagnostics.wrong_types()
+        for text in wrong_types:
+            if text not in self._wrong_types:
+                self._lines.warning('types of PLCs', text)
+        self._wrong_types = wrong_types
         levels = self._diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels

@@ -16,12 +16,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 import time
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.health import StationHealth
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.settings.mapping import Mapping
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -38,6 +41,23 @@ def trouble(identity: Identity | None) -> str | None:
     if identity.mode is None or identity.mode.is_running:
         return None
     return f'in {identity.mode.words} mode ({identity.mode_text})'
+
+
+def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping],
+               file: str) -> str | None:
+    """
+    Return that a PLC is of another family than a row of the map says, None when it is not.
+
+    Rows of type PLC2 are right for any PLC: all families know these commands.
+    """
+    if identity is None or identity.plc_type is None:
+        return None
+    for row in rows:
+        if row.plc_type not in (identity.plc_type, PlcType.PLC2):
+            article = 'an' if identity.model.startswith('SLC') else 'a'
+            return (f'station {station} is {article} {identity.model}, {file}:{row.line} says '
+                    f'{row.plc_type.value}')
+    return None
 
 
 def health_values(health: StationHealth, now: float) -> dict[str, str]:

@@ -474,6 +474,17 @@ def test_line_that_is_faster_than_baud_says_so_once(
     assert told.count(', but the line shows at least ') == 1
 
 
+def test_plc_of_another_family_than_the_map_says_is_named_in_log_and_diagnostics(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench('level,Read,N7:0,1,SLC,1,')
+    status = until_status(bench.diagnostics, 'station 1', WARN)
+    assert status.message == 'WARN: station 1 is a PLC-5/40, map.csv:2 says SLC'
+    bench.stop()
+    told = [line for line in ''.join(capfd.readouterr()).splitlines() if 'PLC-5/40' in line]
+    assert len(told) == 1
+    assert told[0].endswith('[abdf1]: station 1 is a PLC-5/40, map.csv:2 says SLC')
+
+
 def test_odd_settings_are_told_in_the_log_but_not_without_end(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     make_bench(*(f'N7:{number},Read,N7:{number},1,PLC5,1,' for number in range(23)))

@@ -25,7 +25,8 @@ from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.port import LinkThread
-from abdf1_ros.ros.station_health import health_values, LinkCounterService, trouble
+from abdf1_ros.ros.station_health import health_values, LinkCounterService, trouble, wrong_type
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -57,6 +58,21 @@ def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
 def test_what_keeps_a_processor_from_its_work(identity: Identity | None,
                                               text: str | None) -> None:
     assert trouble(identity) == text
+
+
+PLC5 = Identity('PLC-5', 'PLC-5/40')
+LEVEL = make_mapping('N7:0', plc='SLC', item=6)
+
+
+@pytest.mark.parametrize(('identity', 'rows', 'text'), [
+    (PLC5, [LEVEL], 'station 1 is a PLC-5/40, map.csv:7 says SLC'), (SLC, [LEVEL], None),
+    (SLC, [LEVEL, make_mapping('N7:0', plc='PLC5', item=2)],
+     'station 1 is an SLC 5/03, map.csv:3 says PLC5'),
+    (PLC5, [make_mapping('020', plc='PLC2')], None), (Identity('', '1770-KF2'), [LEVEL], None),
+    (None, [LEVEL], None), (PLC5, [], None)])
+def test_plc_of_another_family_than_its_rows(
+        identity: Identity | None, rows: list[Mapping], text: str | None) -> None:
+    assert wrong_type(1, identity, rows, 'map.csv') == text
 
 
 def test_values_before_anything_is_known() -> None:

@@ -37,9 +37,6 @@ from abdf1_ros.settings.map_row import Fault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.values import Values, ValueType
 
-# The family in a diagnostic status, and its PLC_Type.
-FAMILIES = {'SLC': 'SLC', 'PLC-5': 'PLC5', 'PLC-3': 'PLC3', 'PLC-2': 'PLC2'}
-
 # What stands on the command line for a column of a map CSV.
 _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
               'Word_Order': '--word-order', 'Access': '--access', 'Processor': '--processor'}
@@ -95,9 +92,9 @@ def ask_kind(session: Session, station: int) -> dict[str, str]:
     Raises LinkError, RemoteError, or FormatError where that cannot be told.
     """
     identity = session.ask(station, identify())
-    if identity.family not in FAMILIES:
+    if identity.plc_type is None:
         raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
-    return {'PLC_Type': FAMILIES[identity.family], 'Processor': processor_of(identity)}
+    return {'PLC_Type': identity.plc_type.value, 'Processor': processor_of(identity)}
 
 
 def processor_of(identity: Identity) -> str:

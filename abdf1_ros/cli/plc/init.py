@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from abdf1_ros.cli.plc.data import FAMILIES, processor_of
+from abdf1_ros.cli.plc.data import processor_of
 from abdf1_ros.cli.plc.detect import Found
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.errors import Problem
@@ -81,13 +81,13 @@ def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
     """Yield a row that works and some that only have to be uncommented, for each station."""
     for presence in stations:
         number, identity = presence.station, presence.identity
-        family = FAMILIES.get(identity.family) if identity else None
+        family = identity.plc_type if identity else None
         yield f'# station {number}: {presence}\n'
         if family is None or identity is None:
             yield f'# its family is not known: write PLC_Type yourself\n' \
                   f'# words_{number},Read,N7:0,{number},SLC,,10,1000\n'
             continue
-        tail = f'{number},{family},{processor_of(identity)}'
+        tail = f'{number},{family.value},{processor_of(identity)}'
         # The status file is there in every processor of these families; N7 need not be.
         yield f'status_{number},Read,S:0,{tail},4,1000\n'
         yield f'# words_{number},Read,N7:0,{tail},10,1000\n'
