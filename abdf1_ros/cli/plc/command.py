@@ -104,12 +104,13 @@ def _mappings(options: argparse.Namespace, session: Session, command: Command,
     return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
 
 
-def _failed(session: Session, station: int, error: Abdf1Error) -> int:
+def _failed(session: Session, station: int, error: Abdf1Error,
+            plc_type: str | None = None) -> int:
     """Say why a station has not done what it should; return the exit status."""
     if isinstance(error, ConfigurationError | PortLost):
         raise error
     _complain(f'station {station}: {error}')
-    advice = presence.hint(session, error)
+    advice = presence.hint(session, error) or presence.type_hint(session, station, error, plc_type)
     if advice:
         _complain(advice)
     return EXIT_FAILED
@@ -123,11 +124,13 @@ def _read(options: argparse.Namespace) -> int:
                 options, session, Command.READ, options.addresses, options.length)
         except Abdf1Error as error:
             return _failed(session, options.station, error)
+        plc_type = options.plc_type
         for mapping in mappings:
             try:
                 values = data.read(session, mapping)
             except Abdf1Error as error:
-                status = _failed(session, mapping.station, error)
+                status = _failed(session, mapping.station, error, plc_type)
+                plc_type = None  # told once is enough
             else:
                 _print_values(mapping, values)
     return status

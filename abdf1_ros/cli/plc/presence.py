@@ -22,7 +22,7 @@ import time
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.transactions import echo, identify
-from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, StationInactive
+from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.settings.network import Network
 
@@ -106,3 +106,16 @@ def hint(session: Session, error: Abdf1Error) -> str:
         return (f'{received} characters came, but no answer that makes sense: baud rate, '
                 'check, duplex, or another master? "plc detect" tries other settings')
     return ''
+
+
+def type_hint(session: Session, station: int, error: Abdf1Error, plc_type: str | None) -> str:
+    """Return what a PLC is that refuses commands of the type that was given, and is another."""
+    if plc_type is None or not isinstance(error, RemoteError):
+        return ''
+    try:
+        identity = session.ask(station, identify())
+    except Abdf1Error:
+        return ''
+    if identity.plc_type is None or identity.plc_type.value == plc_type:
+        return ''
+    return f'station {station} is {identity}; --plc-type says {plc_type}'

@@ -90,6 +90,14 @@ def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
     assert plc('read', 'N7:0', '--plc-type', 'plc5').lines == ['N7:0 1200']
 
 
+def test_type_that_is_not_that_of_the_plc_is_named_once(plc: Plc) -> None:
+    said = plc('read', 'N7:0', 'N7:1', '--plc-type', 'SLC')
+    assert (said.status, said.lines) == (1, [])
+    assert said.err.count('plc: station 1: STS ') == 2
+    assert said.err.count('plc: station 1 is PLC-5/40') == 1
+    assert said.err.splitlines()[1].endswith('; --plc-type says SLC')
+
+
 def test_read_goes_on_after_a_refusal(plc: Plc) -> None:
     said = plc('read', 'N99:0', 'N7:0')
     assert (said.status, said.lines) == (1, ['N7:0 1200'])
