@@ -29,7 +29,7 @@ import sys
 
 from abdf1_ros.cli.plc import data, detect, files, init, presence
 from abdf1_ros.cli.plc.line import MODES, network_of
-from abdf1_ros.cli.plc.options import make_parser
+from abdf1_ros.cli.plc.options import DEFAULT_STATION, make_parser
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
@@ -56,6 +56,12 @@ EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_UNKNOWN = 3
 EXIT_INTERRUPTED = 130
+
+_ALL_TRIED_IN_VAIN = (
+    'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
+    'PLC-5 shows its own in octal)')
+_ONE_PLC_ANSWERS_TO_ALL = (
+    'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
 
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
@@ -144,7 +150,13 @@ def _print_values(mapping: Mapping, values: Values) -> None:
 
 
 def _write(options: argparse.Namespace) -> int:
-    with Session(network_of(options)) as session:
+    network = network_of(options)
+    if options.station is None and network.mode != MODES['full']:
+        raise ConfigurationError([Problem(
+            '--station', 'say which station to write to: a half-duplex line may have several')])
+    if options.station is None:
+        options.station = DEFAULT_STATION
+    with Session(network) as session:
         try:
             length = data.length_of(options.address, options.type, options.values)
             mapping, = _mappings(
@@ -189,7 +201,8 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
         _complain(f'{mapping.address} of station {mapping.station}: {text}')
         return EXIT_UNKNOWN if ending.outcome in _UNCERTAIN else EXIT_FAILED
     try:
-        print(f'{colour(text, GREEN, sys.stdout)}; now:', flush=True)
+        place = f'{mapping.address} of station {mapping.station}'
+        print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)
         _print_values(mapping, data.read(session, mapping))
         sys.stdout.flush()
     except KeyboardInterrupt:  # it is written all the same
@@ -252,7 +265,8 @@ def _ping(options: argparse.Namespace) -> int:
 def _scan(options: argparse.Namespace) -> int:
     progress = Progress()
     found = 0
-    for number, there in enumerate(presence.scan(network_of(options), options.stations), 1):
+    network = network_of(options)
+    for number, there in enumerate(presence.scan(network, options.stations), 1):
         if there.is_there:
             found += 1
             progress.clear()
@@ -260,6 +274,8 @@ def _scan(options: argparse.Namespace) -> int:
         progress.show(f'{number} of {len(options.stations)} stations asked, {found} found')
     progress.clear()
     print(f'{found} of {len(options.stations)} stations answer')
+    if found > 1 and network.mode == MODES['full']:
+        print(_ONE_PLC_ANSWERS_TO_ALL)
     return 0 if found else EXIT_FAILED
 
 
@@ -286,7 +302,7 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
     progress.clear()
     if found is None:
         _complain('nothing answers with any of these settings')
-        for trace in search.traces or [presence.SILENCE]:
+        for trace in search.traces or [_ALL_TRIED_IN_VAIN]:
             _complain(trace)
     return found
 

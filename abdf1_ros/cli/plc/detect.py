@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from abdf1_ros.cli.plc.line import MODES
-from abdf1_ros.cli.plc.presence import look_at, Presence
+from abdf1_ros.cli.plc.presence import look_at, Presence, understands
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.settings.network import Network
@@ -86,10 +86,12 @@ class Search:
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
         """Try one speed and discipline; where nobody is heard, the check does not matter."""
-        stations = self._stations
+        # Most full-duplex ports take whatever they get; one that compares is mostly 0 or 1.
+        stations = self._stations[:2] if mode == MODES['full'] else self._stations
         for check in checks:
             heard = []
-            for presence in self._look(Candidate(baud, mode, check), stations):
+            is_first = check == checks[0]
+            for presence in self._look(Candidate(baud, mode, check), stations, is_first):
                 if presence.takes_commands:
                     return Found(Candidate(baud, mode, check), presence)
                 if presence.is_there:
@@ -99,15 +101,21 @@ class Search:
             stations = heard or stations
         return None
 
-    def _look(self, candidate: Candidate, stations: Sequence[int]) -> Iterator[Presence]:
+    def _look(self, candidate: Candidate, stations: Sequence[int],
+              is_first: bool) -> Iterator[Presence]:
+        """Yield what each station is; one that only seems to take commands does not."""
         network = replace(self._network, baud=candidate.baud, mode=candidate.mode,
                           error_code=candidate.check)
-        # In full duplex there is one PLC, and most take whatever they get.
-        listed = stations[:1] if candidate.mode == MODES['full'] else stations
-        with Session(network, absent=listed) as session:
-            for station in listed:
+        # One that is not absent is asked with ENQ when it is silent, which any full-duplex port
+        # answers, whatever its check and its own station are.
+        asks = is_first and candidate.mode == MODES['full']
+        with Session(network, absent=stations[1:] if asks else stations) as session:
+            for station in stations:
                 self._show(f'trying {candidate}, station {station}')
-                yield look_at(session, station)
+                presence = look_at(session, station)
+                if presence.takes_commands and not understands(session, station):
+                    presence = replace(presence, takes_commands=False)
+                yield presence
             if session.counters.chars_received:
                 self.traces.append(
                     f'{candidate}: {session.counters.chars_received} characters came')

@@ -28,7 +28,7 @@ from abdf1_ros.settings.network import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
 from abdf1_ros.settings.values import ValueType, WordOrder
 
-_DEFAULT_STATION = 1
+DEFAULT_STATION = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +67,8 @@ examples:
   plc files 1 --net net.csv                   which data files does it have?
   plc status 1 --port /dev/ttyUSB0 --baud 19200
   plc read N7:0 --length 10 --peer --port /dev/ttyUSB0
-  plc write N7:10 5 6 7 --yes --net net.csv
-  plc write F8:2 --yes --net net.csv -- -1.5e3
+  plc write N7:10 5 6 7 --station 1 --yes --net net.csv
+  plc write F8:2 --station 1 --yes --net net.csv -- -1.5e3
   plc watch B3:0 N7:0 T4:0.ACC --net net.csv
 
 "plc COMMAND --help" explains each command.
@@ -94,13 +94,13 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
 
     _add_addresses(add('read', 'read addresses once', 'read N7:0 --length 10 --net net.csv'))
     _complete_write(add('write', 'write values to an address',
-                        'write N7:10 5 6 7 --yes --net net.csv',
-                        'write F8:2 --yes --net net.csv -- -1.5e3'))
+                        'write N7:10 5 6 7 --station 1 --yes --net net.csv',
+                        'write F8:2 --station 1 --yes --net net.csv -- -1.5e3'))
     _complete_watch(add('watch', 'show values live until Ctrl-C',
                         'watch B3:0 N7:0 --period 0.5 --net net.csv'))
     status = add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv')
     status.add_argument('station', metavar='STATION', nargs='?', type=_station,
-                        default=_DEFAULT_STATION, help='default: %(default)s')
+                        default=DEFAULT_STATION, help='default: %(default)s')
     ping = add('ping', 'measure how long a PLC takes to send something back',
                'ping 1 --count 10 --net net.csv')
     ping.add_argument('station', metavar='STATION', type=_station)
@@ -138,7 +138,7 @@ def _complete_files(found: argparse.ArgumentParser) -> None:
 
 
 def _complete_write(write: argparse.ArgumentParser) -> None:
-    _add_data_options(write)
+    _add_data_options(write, None, f'needed in half duplex (default in full: {DEFAULT_STATION})')
     write.add_argument('address', metavar='ADDRESS', help='such as N7:10, B3:0/5, F8:2')
     write.add_argument('values', metavar='VALUE', nargs='+',
                        help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string; '
@@ -184,10 +184,11 @@ def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
                         help='the same as --duplex full')
 
 
-def _add_data_options(parser: argparse.ArgumentParser) -> None:
+def _add_data_options(parser: argparse.ArgumentParser, station: int | None = DEFAULT_STATION,
+                      note: str = '(default: %(default)s)') -> None:
     group = parser.add_argument_group('data')
-    group.add_argument('--station', metavar='N', type=_station, default=_DEFAULT_STATION,
-                       help='address of the PLC (default: %(default)s)')
+    group.add_argument('--station', metavar='N', type=_station, default=station,
+                       help=f'address of the PLC {note}')
     group.add_argument('--plc-type', type=str.upper,
                        choices=[kind.value for kind in PlcType],
                        help='default: the PLC is asked what it is')

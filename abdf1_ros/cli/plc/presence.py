@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+import os
 import time
 
 from abdf1_ros.cli.plc.session import Session
@@ -28,7 +29,9 @@ from abdf1_ros.settings.network import Network
 
 _ECHO = bytes(range(1, 17))
 
-SILENCE = 'not one character came: cable, port, power?'
+# A half-duplex station says nothing at all when it is not asked rightly; so these come first.
+SILENCE = ('not one character came: station (a PLC-5 shows its own in octal), check or duplex '
+           'wrong? Then cable, port, power.')
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,23 @@ def scan(network: Network, stations: Sequence[int]) -> Iterator[Presence]:
     with Session(network, absent=stations) as session:
         for station in stations:
             yield look_at(session, station)
+
+
+def understands(session: Session, station: int) -> bool:
+    """
+    Tell whether a station sends random data back, or refuses to; raises PortLost.
+
+    Nothing else is proof: an echo, or somebody who acknowledges whatever comes, does not do it.
+    """
+    try:
+        session.ask(station, echo(os.urandom(len(_ECHO))))
+    except PortLost:
+        raise
+    except RemoteError:
+        return True
+    except Abdf1Error:
+        return False
+    return True
 
 
 def ping(session: Session, station: int) -> float:

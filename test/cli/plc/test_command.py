@@ -120,7 +120,8 @@ def test_read_over_a_net_file(line: str, files: Files,
 def test_write(plc: Plc, address: str, values: tuple[str, ...], options: tuple[str, ...],
                lines: list[str]) -> None:
     said = plc('write', address, *values, '--yes', '--station', '2', *options)
-    assert (said.status, said.lines, said.err) == (0, ['written; now:', *lines], '')
+    assert (said.status, said.lines, said.err) == (
+        0, [f'{address} of station 2: written; now:', *lines], '')
 
 
 def test_write_without_yes_writes_nothing(plc: Plc) -> None:
@@ -207,8 +208,8 @@ def test_write_without_a_reply_is_unknown(plc: Plc, simulator: Process) -> None:
 @pytest.mark.parametrize('count', [1, 3])
 def test_write_broken_off_is_unknown(tmp_path: Path, count: int) -> None:
     line = Pty(tmp_path / 'line')
-    with Process('plc', 'write', 'N7:0', '1', '--yes', '--plc-type', 'SLC', '--port',
-                 str(line.name), '--timeout', '9000') as process:
+    with Process('plc', 'write', 'N7:0', '1', '--yes', '--plc-type', 'SLC', '--station', '1',
+                 '--port', str(line.name), '--timeout', '9000') as process:
         line.read(10)  # the command is on its way
         process.send(*[signal.SIGINT] * count)
         assert process.result() == 3
@@ -311,6 +312,15 @@ def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
     assert screen.rstrip().endswith(b'[1200]')
 
 
+def test_write_names_its_station_where_there_may_be_several(plc: Plc) -> None:
+    said = plc('write', 'N7:21', '5', '--yes')
+    assert (said.status, said.lines) == (2, [])
+    assert said.err == ('plc: --station: say which station to write to: a half-duplex line may '
+                        'have several\n')
+    assert plc('write', 'N7:21', '5', '--yes', '--station', '2').lines == [
+        'N7:21 of station 2: written; now:', 'N7:21 5']
+
+
 def test_full_duplex(tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / 'peer')
     options = ('--pty', port, '--data', str(files.simulator), '--full-duplex', '2')
@@ -318,7 +328,11 @@ def test_full_duplex(tmp_path: Path, files: Files, capsys: pytest.CaptureFixture
         line = ('--port', port, '--peer', '--check', 'bcc', '--station', '2', *FAST)
         assert call(main, capsys, 'write', 'N7:10', '7', '--yes', *line).status == 0
         assert call(main, capsys, 'read', 'N7:10', *line).lines == ['N7:10 7']
+        scanned = call(main, capsys, 'scan', '2-3', *line[:5], *FAST)
         found = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--baud', '9600')
+    assert scanned.lines[-2:] == [
+        '2 of 2 stations answer', 'full duplex tells no addresses apart: most PLCs answer to '
+        'every station, so these may be one']
     assert (found.status, found.lines[0].partition(':')[0]) == (
         0, '9600 baud, full duplex, BCC')
 
@@ -343,7 +357,8 @@ def test_detect_of_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     line.close()
     assert said.status == 1
     assert said.err == ('plc: nothing answers with any of these settings\n'
-                        'plc: not one character came: cable, port, power?\n')
+                        'plc: not one character came: cable, port, power? Or a station that was '
+                        'not asked (--stations; a PLC-5 shows its own in octal)\n')
 
 
 def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,

@@ -19,9 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import threading
 
 from abdf1_ros.cli.plc.detect import BAUD_RATES, Candidate, Search
-from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.frames import Duplex, Frame
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
@@ -44,13 +45,14 @@ class Trying(list[str]):
 
 
 @contextmanager
-def plc_on(path: Path, check: str, duplex: Duplex) -> Iterator[Network]:
+def plc_on(path: Path, check: str, duplex: Duplex,
+           kind: type[FullDuplexPeer] = FullDuplexPeer) -> Iterator[Network]:
     """Put an SLC that is station 1 on a pseudo-terminal."""
     plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 10), checksum=check)
     checksum = Network(error_code=check).checksum
     line = PtyLine(str(path))
     procedure = multidrop([plc]) if duplex is Duplex.HALF \
-        else _full_duplex(plc, PeerSettings(checksum))
+        else _full_duplex(plc, PeerSettings(checksum), kind)
     link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
     link.start()
     try:
@@ -60,9 +62,9 @@ def plc_on(path: Path, check: str, duplex: Duplex) -> Iterator[Network]:
         line.close()
 
 
-def _full_duplex(plc: SimulatedPlc,
-                 settings: PeerSettings) -> Callable[[Machine], Procedure]:
-    return lambda machine: FullDuplexPeer(
+def _full_duplex(plc: SimulatedPlc, settings: PeerSettings,
+                 kind: type[FullDuplexPeer]) -> Callable[[Machine], Procedure]:
+    return lambda machine: kind(
         machine, settings, ActiveStationList(), plc.serve).run(plc)
 
 
@@ -77,7 +79,8 @@ def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
     search = Search(Network(com_port=str(line.name), timeout=20), [3, 1], trying)
     assert search.run((19200, 9600)) is None
     line.close()
-    one_speed = ['full duplex, CRC, station 3', 'full duplex, BCC, station 3',
+    one_speed = ['full duplex, CRC, station 3', 'full duplex, CRC, station 1',
+                 'full duplex, BCC, station 3', 'full duplex, BCC, station 1',
                  'half duplex, CRC, station 3', 'half duplex, CRC, station 1']
     assert trying == [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
     assert search.traces == []
@@ -85,7 +88,7 @@ def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('duplex, check, mode, tried', [
     (Duplex.FULL, 'CRC', 'Peer', 1), (Duplex.FULL, 'BCC', 'Peer', 2),
-    (Duplex.HALF, 'CRC', 'Master', 4), (Duplex.HALF, 'BCC', 'Master', 5)])
+    (Duplex.HALF, 'CRC', 'Master', 6), (Duplex.HALF, 'BCC', 'Master', 7)])
 def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check: str, mode: str,
                                            tried: int) -> None:
     trying = Trying()
@@ -97,6 +100,50 @@ def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check
     assert found.candidate == Candidate(19200, mode, check)
     assert found.presence.station == 1
     assert len(trying) == tried
+
+
+class Particular(FullDuplexPeer):
+    """A full-duplex port that passes over what is not for its own station, which is 1."""
+
+    def _message(self, frame: Frame) -> bytes:
+        return super()._message(frame) if frame.data[:1] == b'\x01' else b''
+
+
+def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> None:
+    trying = Trying()
+    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Particular) as network:
+        found = Search(network, range(8), trying).run([9600])
+    assert found is not None
+    assert (found.candidate.mode, found.presence.station) == ('Peer', 1)
+    assert trying == ['9600 baud, full duplex, CRC, station 0',
+                      '9600 baud, full duplex, CRC, station 1']
+
+
+def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: Path) -> None:
+    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Particular) as network:
+        search = Search(network, [5])
+        assert search.run([9600], ['Peer'], ['CRC']) is None
+    assert search.traces == ['9600 baud, full duplex, CRC: 2 characters came']  # NAK to an ENQ
+
+
+def test_flood_of_acks_is_no_plc(tmp_path: Path) -> None:
+    line = Pty(tmp_path / 'line')
+    over = threading.Event()
+
+    def flood() -> None:
+        while not over.wait(0.005):
+            line.write(b'\x10\x06')
+
+    flooding = threading.Thread(target=flood)
+    flooding.start()
+    try:
+        search = Search(Network(com_port=str(line.name), timeout=100), [0, 1])
+        assert search.run([9600], ['Peer'], ['CRC']) is None
+    finally:
+        over.set()
+        flooding.join()
+        line.close()
+    assert len(search.traces) == 1
 
 
 def test_traces_of_the_wrong_settings(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
 def test_help_tells_where_such_a_value_goes(capsys: pytest.CaptureFixture[str]) -> None:
     text = help_of(capsys, 'write')
     assert 'one such as -1.5e3 goes last, behind all options and --' in text
-    assert 'plc write F8:2 --yes --net net.csv -- -1.5e3' in text
+    assert 'plc write F8:2 --station 1 --yes --net net.csv -- -1.5e3' in text
 
 
 def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[str]) -> None:
