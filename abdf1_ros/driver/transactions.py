@@ -62,7 +62,14 @@ def read_packet(block: Block, number: int,
     Raises LinkError, RemoteError, or FormatError for a reply that cannot be used.
     """
     request = block.requests[number]
-    reply = check_status((yield command), block.mappings[0].plc_type)
+    try:
+        reply = check_status((yield command), block.mappings[0].plc_type)
+    except RemoteError as error:
+        if error.sts == STS_ILLEGAL_COMMAND and \
+                request.words > block.dialect.sure_read(request.start.file_type):
+            raise RemoteError(error.sts, error.ext_sts, f'{error}, or too many words at once for '
+                              'this processor: name it in the column Processor') from None
+        raise
     return block.dialect.read_data(request.start, request.words, reply)
 
 

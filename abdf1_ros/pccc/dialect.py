@@ -60,6 +60,9 @@ class Dialect(Protocol):
     def max_read(self, file_type: FileType) -> int:
         """Return the most words that one read of such a file brings, whole elements."""
 
+    def sure_read(self, file_type: FileType) -> int:
+        """Return the most words that every processor of the family brings in one read."""
+
     def max_write(self, file_type: FileType) -> int:
         """Return the most words that one write to such a file takes, whole elements."""
 

@@ -122,6 +122,8 @@ class Planner:
         self.line = line
         self._default_period = default_period
         self._refused: defaultdict[Place, set[Span]] = defaultdict(set)
+        # Words per packet of blocks that were refused with more of them.
+        self._limits: dict[tuple[Place, Span], int] = {}
         self._costs: dict[tuple[Dialect, FileType], list[float]] = {}
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
@@ -139,15 +141,28 @@ class Planner:
                 for block in self._plan_place(place, group, scan_time)]
 
     def split(self, block: Block) -> list[Block]:
-        """Return two blocks, each with half of the mappings; none if all are the same words."""
+        """
+        Return what to read instead of a refused block.
+
+        That is two blocks, each with half of the mappings; where all are the same words, the
+        same block in shorter packets, as long as some processor may need them; else nothing.
+        """
         spans = sorted(set(map(_span, block.mappings)))
         if len(spans) == 1:
-            return []
+            return self._shortened(block)
         middle = spans[len(spans) // 2]
         halves: tuple[list[Mapping], list[Mapping]] = [], []
         for mapping in block.mappings:
             halves[_span(mapping) >= middle].append(mapping)
         return [self._block(half, _cover(half)) for half in halves]
+
+    def _shortened(self, block: Block) -> list[Block]:
+        words = max(request.words for request in block.requests)
+        least = block.dialect.sure_read(block.start.file_type)
+        if words <= least:
+            return []
+        self._limits[block.place, block.span] = max(least, words // 2)
+        return [self._block(block.mappings, block.span)]
 
     def refuse(self, place: Place, span: Span) -> None:
         """Take note that no read at ``place`` may hold all of ``span``."""
@@ -172,7 +187,8 @@ class Planner:
         alone: defaultdict[Span, list[Mapping]] = defaultdict(list)
         together = []
         for wish in wishes:
-            if wish.span.words > terms.limit or any(map(wish.span.holds, refused)):
+            if (wish.span.words > terms.limit or (place, wish.span) in self._limits
+                    or any(map(wish.span.holds, refused))):
                 alone[wish.span].append(wish.mapping)
             else:
                 together.append(wish)
@@ -203,9 +219,10 @@ class Planner:
 
     def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
         first = mappings[0]
-        limit = _max_words(first)
+        limit = min(_max_words(first), self._limits.get((_place(first), span), span.words))
         if span.words > limit:  # a long mapping: no packet ends within a value
-            limit -= limit % max(mapping.codec.element_words for mapping in mappings)
+            limit -= limit % max(_per_element(first), *(
+                mapping.codec.element_words for mapping in mappings))
         requests = tuple(
             Request(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))

@@ -17,8 +17,9 @@ What to read instead of a block that a station refuses.
 
 A block is refused as a whole for one address that the station does not have: that of a
 mapping, or of a gap that was bridged. It is divided until the parts are good or can be divided
-no more. What has been found is then known to the planner, and all mappings of the block are
-planned anew: the good ones together, and never again with the bad.
+no more. A long mapping may also be refused because the processor takes shorter packets than we
+think: it is tried in shorter ones. What has been found is then known to the planner, and all
+mappings of the block are planned anew: the good ones together, and never again with the bad.
 """
 
 from __future__ import annotations
@@ -49,13 +50,14 @@ class _Search:
         self._refused: list[Span] = []
 
     def divide(self, block: Block, halves: Sequence[Block]) -> None:
-        """Put the halves of a refused block in its place."""
-        left, right = (half.span for half in halves)
-        gap = Span(left.end - 1, right.first + 1)  # with the word on each side of it
-        self._divided.append((block.span, gap if gap.words > 1 else block.span))
+        """Put the halves of a refused block in its place, or itself in shorter packets."""
         self.parts.remove(block)
         self.parts += halves
-        self._open += 1
+        if len(halves) > 1:
+            left, right = (half.span for half in halves)
+            gap = Span(left.end - 1, right.first + 1)  # with the word on each side of it
+            self._divided.append((block.span, gap if gap.words > 1 else block.span))
+            self._open += 1
 
     def settle(self, block: Block, is_refused: bool) -> bool:
         """Take note of the end of one branch; return whether it was the last."""

@@ -134,14 +134,14 @@ def test_old_slc_is_read_and_written_in_packets_of_82_bytes() -> None:
     assert stored(plc, 'N7:199') == (199).to_bytes(2, 'little')
 
 
-def test_packets_of_a_5_03_are_too_long_for_an_old_slc() -> None:
+def test_packets_of_a_5_03_are_too_long_for_an_old_slc_and_become_shorter() -> None:
     mapping = make_mapping('N7:0', plc='SLC', length=100)
     bench = DriverBench([mapping])
-    old_plc(bench)
+    store(old_plc(bench), 'N7:0', list(range(100)))
     bench.run(1.0)
-    assert bench.listener.values(mapping) == []
-    assert bench.listener.reasons == [
-        ('N7:0', 'STS 10: illegal command, format or length, or the file does not exist')]
+    assert bench.listener.values(mapping)[-1] == list(range(100))
+    assert bench.listener.reasons == []
+    assert bench.driver.stations[1].remote_errors == 2  # 100 words, then 50
 
 
 def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:

@@ -229,3 +229,10 @@ def test_echo() -> None:
 def test_echo_of_something_else() -> None:
     with pytest.raises(FormatError, match='01 02 came back as 01'):
         converse(echo(b'\1\2'), [reply(b'\1')])
+
+
+def test_refusal_of_a_long_read_names_the_column_that_makes_it_shorter() -> None:
+    for length, hint in ((42, True), (41, False)):
+        with pytest.raises(RemoteError) as caught:
+            converse(read_block(block_of('N7:0', length)), [reply(sts=0x10)])
+        assert str(caught.value).endswith('name it in the column Processor') is hint

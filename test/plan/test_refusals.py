@@ -22,7 +22,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.plan.line_model import LineModel
-from abdf1_ros.plan.partition import Span
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Refusals
 from abdf1_ros.settings.mapping import Mapping
@@ -42,20 +41,22 @@ class Plc:
 
     def __init__(self, mappings: Sequence[Mapping], *missing: int) -> None:
         self.missing = set(missing)
+        self.packet = 118
         self.refused = 0
         self.failed: set[str] = set()
         self._planner = Planner(LINE, 0.1)
         self._refusals = Refusals(self._planner)
         self.blocks = self._planner.plan(mappings)
 
-    def lacks(self, span: Span) -> bool:
-        """Tell whether a word is not there."""
-        return any(span.first <= word < span.end for word in self.missing)
+    def refuses(self, block: Block) -> bool:
+        """Tell whether a word is not there, or a request is too long."""
+        return any(block.span.first <= word < block.span.end for word in self.missing) \
+            or any(request.words > self.packet for request in block.requests)
 
     def read(self, block: Block) -> bool:
         """Read a block; return whether other blocks take its place."""
         tags = {mapping.tag for mapping in block.mappings}
-        if self.lacks(block.span):
+        if self.refuses(block):
             self.refused += 1
             self.failed |= tags
             change = self._refusals.refused(block)
@@ -140,6 +141,29 @@ def test_mapping_that_has_recovered_is_read_with_its_neighbours_again() -> None:
     assert not plc.failed
 
 
+def test_long_mapping_is_read_in_packets_as_short_as_the_processor_takes_them() -> None:
+    long = make_mapping('N7:10', length=118, plc='SLC')
+    plc = Plc([long, make_mapping('N7:0', plc='SLC')])
+    plc.packet = 41
+    plc.settle()
+    assert not plc.failed
+    assert [[request.words for request in block.requests]
+            for block in plc.blocks if block.mappings == (long,)] == [[41, 41, 36]]
+    assert plc.refused <= 3
+
+
+def test_long_mapping_that_is_not_there_is_asked_for_in_the_shortest_packets() -> None:
+    plc = Plc([make_mapping('N7:10', length=118, plc='SLC')], 11)
+    plc.settle()
+    assert plc.failed
+    assert plc.refused < 6
+    block, = plc.blocks
+    assert max(request.words for request in block.requests) == 41
+    plc.missing.clear()
+    plc.settle()
+    assert not plc.failed
+
+
 def test_single_mapping_that_is_refused_is_asked_for_again() -> None:
     plc = Plc(words(3), 3)
     plc.settle()
@@ -158,13 +182,13 @@ def test_only_mappings_that_are_not_there_fail_and_the_rest_is_read_as_planned(
                 for number, (first, length) in enumerate(places)]
     plc = Plc(mappings, *missing)
     plc.settle()
-    bad = {mapping.tag for mapping in mappings if plc.lacks(Span(
-        mapping.address.offset, mapping.address.offset + mapping.length))}
+    bad = {mapping.tag for mapping in mappings if missing.intersection(
+        range(mapping.address.offset, mapping.address.offset + mapping.length))}
     assert plc.failed == bad
     read = [mapping.tag for block in plc.blocks for mapping in block.mappings]
     assert sorted(read) == sorted(mapping.tag for mapping in mappings)
     for block in plc.blocks:
-        if plc.lacks(block.span):
+        if plc.refuses(block):
             assert len({(mapping.address, mapping.length) for mapping in block.mappings}) == 1
     plc.missing.clear()
     plc.settle()

@@ -44,6 +44,8 @@ class Plc2Dialect:
         """Return the most words per read."""
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_READ) // 2
 
+    sure_read = max_read
+
     def max_write(self, file_type: FileType) -> int:
         """Return the most words per write."""
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_WRITE) // 2

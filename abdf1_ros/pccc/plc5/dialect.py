@@ -39,6 +39,8 @@ class Plc5Dialect:
         """Return the most words per read."""
         return _most_words(file_type, plc5.MAX_REPLY)
 
+    sure_read = max_read
+
     def max_write(self, file_type: FileType) -> int:
         """Return the most words per write."""
         return _most_words(file_type, plc5.MAX_WRITE - plc5.MAX_ELEMENT_ADDRESS)

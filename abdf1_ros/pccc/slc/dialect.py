@@ -40,6 +40,10 @@ class SlcDialect:
         """Return the most words per read."""
         return _whole_elements(file_type, self._processor.max_read)
 
+    def sure_read(self, file_type: FileType) -> int:
+        """Return what the oldest processor brings."""
+        return _whole_elements(file_type, Processor.SLC_5_01.max_read)
+
     def max_write(self, file_type: FileType) -> int:
         """Return the most words per write."""
         return _whole_elements(file_type, self._processor.max_write)

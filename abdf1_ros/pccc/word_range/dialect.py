@@ -65,6 +65,8 @@ class WordRangeDialect:
         words = layout_of(file_type, self._family.plc_type).words
         return word_range.MAX_READ // 2 // words * words
 
+    sure_read = max_read
+
     def max_write(self, file_type: FileType) -> int:
         """Return the most words per write."""
         words = layout_of(file_type, self._family.plc_type).words
