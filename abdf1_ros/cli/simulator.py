@@ -55,7 +55,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
-from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute

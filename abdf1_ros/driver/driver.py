@@ -16,8 +16,9 @@
 The driver of one line: carries out jobs one after the other and hands on what comes of them.
 
 It is sans-IO like the link layer below it: ``Driver.machine`` takes bytes and a clock value,
-and a ``Listener`` gets values, results and events. ``abdf1_ros.ports.port.LinkThread`` gives it a
-port and a clock; the tests give it a virtual line.
+and a ``Listener`` gets values, results and events.
+``abdf1_ros.ports.link_thread.LinkThread`` gives it a port and a clock; the tests give it a
+virtual line.
 """
 
 from __future__ import annotations

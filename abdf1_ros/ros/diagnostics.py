@@ -30,7 +30,7 @@ from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.station_health import health_values, trouble, wrong_type
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
@@ -47,7 +47,7 @@ _LONGEST_UNPOLLED = 5.0
 
 # A node that was killed is seen for up to 20 s more, the lease of its DDS participant. In so many
 # looks in a row, a second apart, another node of our name is no earlier run of this one.
-_LOOKS_FOR_NAMESAKES = 30
+_LOOKS_FOR_DUPLICATES = 30
 
 # So many faults of rows that were left out are repeated with every status; check has them all.
 _MOST_LEFT_OUT = 20
@@ -79,13 +79,13 @@ class Diagnostics:
     """
     All statuses of one node, named ``<node>: <section>``.
 
-    ``has_namesake`` is to be set when another node has its name. ``left_out`` are the faults of
-    the rows that the map was read without, ``map_name`` is what the file is called.
+    ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
+    faults of the rows that the map was read without, ``map_name`` is what the file is called.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
                  left_out: Sequence[Problem] = (), map_name: str = 'map') -> None:
-        self.has_namesake = False
+        self.has_duplicate_name = False
         self._left_out = left_out
         self._map_name = map_name
         self._rows_by_type = _rows_by_type(driver.mappings)
@@ -155,7 +155,7 @@ class Diagnostics:
 
     def _judge_link(self, now: float) -> Verdict:
         level, text = self._judge_line(now)
-        if self.has_namesake:
+        if self.has_duplicate_name:
             return max(level, WARN), f'{text}; another node is called {self._node_name} too'
         return level, text
 
@@ -303,7 +303,7 @@ def _with_age(moment: _Moment | None, now: float) -> str:
     return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
 
 
-class NamesakeWatch:
+class DuplicateNameWatch:
     """
     Find out when another node has our name, so that topics and services of both are one.
 
@@ -322,7 +322,7 @@ class NamesakeWatch:
             return False
         self._next_look = now + 1.0
         self._looks = self._looks + 1 if self._count() > 1 else 0
-        before, self.has_found = self.has_found, self._looks >= _LOOKS_FOR_NAMESAKES
+        before, self.has_found = self.has_found, self._looks >= _LOOKS_FOR_DUPLICATES
         return self.has_found != before
 
 

@@ -28,7 +28,6 @@ from collections.abc import Sequence
 from functools import partial
 import os
 from pathlib import Path
-import random
 import re
 import signal
 import sys
@@ -39,15 +38,14 @@ from typing import Any
 
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.plan.report import setting_remarks
-from abdf1_ros.ports.port import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch, speed_seen
+from abdf1_ros.ros.diagnostics import Diagnostics, DuplicateNameWatch, speed_seen
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import (
     encoder,
@@ -162,7 +160,8 @@ class BridgeNode(Node):
         self._active = self.create_publisher(
             UInt16MultiArray, '~/active_stations', latched_qos())
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self.driver = self._make_driver(configuration)
+        self.driver = Driver(configuration.network, configuration.mappings,
+                             configuration.driver_settings(), self)
         self._create_reads()
         self._diagnostics = Diagnostics(
             self.get_name(), self.driver, configuration.port, configuration.map_problems,
@@ -171,7 +170,7 @@ class BridgeNode(Node):
         self._diagnostics_period = configuration.parameters.diagnostics_period
         # Every node has this service, and nobody gives it another name.
         service = f'{self.get_fully_qualified_name()}/get_parameters'
-        self._namesakes = NamesakeWatch(lambda: self.count_services(service))
+        self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
         self._next_diagnostics = 0.0
         self._levels: list[bytes] = []
         self.create_service(Trigger, '~/reset_counters', self._reset_counters)
@@ -219,22 +218,6 @@ class BridgeNode(Node):
         self._publish_diagnostics(time.monotonic())
         # Without a publisher, what is still under way would not arrive.
         self._diagnostics_publisher.wait_for_all_acked(_LAST_WORDS)
-
-    def _make_driver(self, configuration: Configuration) -> Driver:
-        parameters = configuration.parameters
-        settings = DriverSettings(
-            default_period=parameters.default_period / 1000,
-            stale_after=parameters.stale_after, write_timeout=parameters.write_timeout,
-            read_only=parameters.read_only,
-            nak_on_command_timeout=parameters.nak_on_command_timeout,
-            max_outstanding=parameters.max_outstanding,
-            accept_slave_messages=parameters.accept_slave_messages,
-            polling=configuration.polling, eot_suppression=parameters.eot_suppression,
-            duplicate_detection=parameters.duplicate_detection,
-            poll_timeout=parameters.poll_timeout,
-            processor_period=parameters.processor_period,
-            first_tns=random.randrange(0x10000))
-        return Driver(configuration.network, configuration.mappings, settings, self)
 
     def _create_reads(self) -> None:
         # The default callbacks make every publisher a burden on every turn of the executor.
@@ -337,8 +320,8 @@ class BridgeNode(Node):
     def _check_diagnostics(self) -> None:
         now = time.monotonic()
         self._link_counters.check(now)
-        if self._namesakes.look(now):
-            self._namesake_came_or_went(self._namesakes.has_found)
+        if self._duplicate_names.look(now):
+            self._duplicate_name_came_or_went(self._duplicate_names.has_found)
         self._tell_speed(self.driver.machine.rate.seen)
         wrong_types = self._diagnostics.wrong_types()
         for text in wrong_types:
@@ -362,8 +345,8 @@ class BridgeNode(Node):
         else:
             self._lines.warning('the speed', f'{text}: time-outs begin before frames have left')
 
-    def _namesake_came_or_went(self, is_there: bool) -> None:
-        self._diagnostics.has_namesake = is_there
+    def _duplicate_name_came_or_went(self, is_there: bool) -> None:
+        self._diagnostics.has_duplicate_name = is_there
         name = self.get_fully_qualified_name()
         if is_there:
             self._lines.warning(

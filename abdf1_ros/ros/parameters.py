@@ -16,13 +16,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 import difflib
 from pathlib import Path
+import random
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
@@ -123,6 +125,15 @@ class Configuration:
     map_problems: list[Problem]
     polling: PollingSettings | None = None
     ignored: list[str] = field(default_factory=list)
+
+    def driver_settings(self) -> DriverSettings:
+        """Return parameters of the same names, and what follows from others."""
+        own = {entry.name for entry in fields(Parameters)}
+        same = {entry.name: getattr(self.parameters, entry.name)
+                for entry in fields(DriverSettings) if entry.name in own}
+        return replace(
+            DriverSettings(**same), default_period=self.parameters.default_period / 1000,
+            polling=self.polling, first_tns=random.randrange(0x10000))
 
     def __str__(self) -> str:
         """Return one line that tells what the node runs with."""

@@ -23,7 +23,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.task import Future
 from std_srvs.srv import Trigger

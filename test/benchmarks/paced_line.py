@@ -50,7 +50,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
-from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values, ValueType

@@ -49,7 +49,7 @@ from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
-from abdf1_ros.ports.port import Port  # noqa: E402
+from abdf1_ros.ports.link_thread import Port  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import ValueType  # noqa: E402

@@ -25,7 +25,7 @@ import subprocess
 import sys
 
 from abdf1_ros.ports.endpoints import PtyLine, SerialLine, TcpLine, WAITING
-from abdf1_ros.ports.port import Port
+from abdf1_ros.ports.link_thread import Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly

@@ -28,8 +28,8 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.ports.port import LinkThread, PortState
-from abdf1_ros.ros.diagnostics import Diagnostics, NamesakeWatch, WriteLog
+from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ros.diagnostics import Diagnostics, DuplicateNameWatch, WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
@@ -151,8 +151,8 @@ def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
     assert bench.says('link')[0] == OK
 
 
-def test_link_of_a_node_with_a_namesake(bench: Bench) -> None:
-    bench.diagnostics.has_namesake = True
+def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
+    bench.diagnostics.has_duplicate_name = True
     assert bench.says('link') == (WARN, 'WARN: port open, 0 of 2 stations have answered; '
                                         'another node is called line_a too')
     bench.set_port(False, 'gone')
@@ -162,17 +162,17 @@ def test_link_of_a_node_with_a_namesake(bench: Bench) -> None:
 def changes_of(counts: Sequence[int]) -> list[tuple[int, bool]]:
     """Return when a watch that counts these nodes, one a second, changes its mind."""
     rest = iter(counts)
-    watch = NamesakeWatch(lambda: next(rest))
+    watch = DuplicateNameWatch(lambda: next(rest))
     return [(now, watch.has_found) for now in range(len(counts))
             if any([watch.look(now), watch.look(now + 0.9)])]
 
 
-def test_namesake_is_found_when_it_stays() -> None:
+def test_duplicate_name_is_found_when_it_stays() -> None:
     assert changes_of([1] * 5 + [2] * 40 + [1] * 5) == [(34, True), (45, False)]
     assert changes_of([3] * 30) == [(29, True)]
 
 
-def test_earlier_run_that_was_killed_is_no_namesake() -> None:
+def test_earlier_run_that_was_killed_is_not_a_duplicate() -> None:
     assert changes_of([2] * 25 + [1] + [2] * 25 + [0] + [2] * 29) == []
 
 

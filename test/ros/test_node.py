@@ -26,7 +26,7 @@ from typing import Any
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.port import PortState
+from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.node import BridgeNode, main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -445,16 +445,16 @@ def test_argument_outside_of_ros_arguments(
     assert 'parameters follow --ros-args' in capsys.readouterr().err
 
 
-def test_namesake_is_told_and_forgotten(
+def test_duplicate_name_is_told_and_forgotten(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.diagnostics._LOOKS_FOR_NAMESAKES', 1)
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics._LOOKS_FOR_DUPLICATES', 1)
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
-    namesake = Node('abdf1', context=observer.context, use_global_arguments=False)
+    other = Node('abdf1', context=observer.context, use_global_arguments=False)
     status = until_status(bench.diagnostics, 'link', WARN)
     assert status.message.endswith('; another node is called abdf1 too')
-    namesake.destroy_node()
+    other.destroy_node()
     bench.diagnostics.clear()
     until_status(bench.diagnostics, 'link', OK)
     told = ''.join(capfd.readouterr())

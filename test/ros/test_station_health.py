@@ -24,7 +24,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.identity import Identity, Mode
-from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.station_health import health_values, LinkCounterService, trouble, wrong_type
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

@@ -24,7 +24,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.ports.endpoints import PtyLine
-from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 
 

@@ -38,7 +38,7 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.paths import config_file
 from abdf1_ros.ports.endpoints import PtyLine
-from abdf1_ros.ports.port import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.messages import latched_qos
 from abdf1_ros.simulator.commands import execute
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc

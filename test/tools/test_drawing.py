@@ -31,7 +31,7 @@ def test_what_a_longer_way_implies_is_left_out() -> None:
 def test_arrows_are_the_imports() -> None:
     found = drawing.arrows()
     assert room_of('pccc/address.py') in found[room_of('settings/mapping.py')]
-    assert room_of('ports/port.py') in found[room_of('ros/node.py')]
+    assert room_of('ports/link_thread.py') in found[room_of('ros/node.py')]
     assert found[room_of('messages.py')] == set()
 
 

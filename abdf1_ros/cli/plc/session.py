@@ -28,8 +28,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.errands import Errands, Order
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
-from abdf1_ros.ports.port import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 

@@ -30,8 +30,8 @@ from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
+from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
-from abdf1_ros.ports.port import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 import serial
