@@ -12,14 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the files of this package lie."""
+"""Where the files of this package lie, and which version of it they are."""
 
 from __future__ import annotations
 
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 import sys
 
 _PACKAGE = 'abdf1_ros'
+
+
+def package_version() -> str:
+    """Return the version of this package, as it is installed."""
+    try:
+        return version(_PACKAGE)
+    except PackageNotFoundError:
+        return 'of the source tree'
 
 
 def config_file(name: str) -> Path:

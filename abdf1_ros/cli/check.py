@@ -28,7 +28,16 @@ import json
 import sys
 from typing import Any
 
-from abdf1_ros.cli.terminal import colour, drop_output, GREEN, prepare_output, RED, table, YELLOW
+from abdf1_ros.cli.terminal import (
+    colour,
+    command_parser,
+    drop_output,
+    GREEN,
+    prepare_output,
+    RED,
+    table,
+    YELLOW,
+)
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
@@ -108,9 +117,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='check', description=__doc__, epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('check', __doc__, _EPILOG)
     parser.add_argument('net', metavar='NET', help='the net CSV')
     parser.add_argument('map', metavar='MAP', help='the map CSV')
     parser.add_argument('--json', action='store_true',

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from importlib.metadata import PackageNotFoundError, version
 import os
 from pathlib import Path
 import random
@@ -36,6 +35,7 @@ from typing import Any
 from abdf1_ros.cli.plc.line import network_of
 from abdf1_ros.cli.plc.options import add_line_options, LineDefaults
 from abdf1_ros.cli.terminal import (
+    command_parser,
     drop_output,
     interruptible,
     prepare_output,
@@ -52,7 +52,7 @@ from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import ConfigurationError
-from abdf1_ros.paths import config_file
+from abdf1_ros.paths import config_file, package_version
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Line, PtyLine, TcpLine
 from abdf1_ros.ports.opening import open_port
@@ -162,7 +162,7 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
             print(line_of(result), flush=True)
     facts = {'target': target.value, 'station': str(options.station), 'check': wire.check.value,
              'port': options.tcp or options.pty or network.port, 'baud': str(network.baud),
-             'answer time': f'{options.answer_time:g} s', 'abdf1_ros': _version()}
+             'answer time': f'{options.answer_time:g} s', 'abdf1_ros': package_version()}
     if options.junit:
         Path(options.junit).write_text(as_junit(facts, results) + '\n', encoding='utf-8')
     if options.json:
@@ -247,17 +247,8 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
             time.sleep(0.05)
 
 
-def _version() -> str:
-    try:
-        return version('abdf1_ros')
-    except PackageNotFoundError:
-        return 'source tree'
-
-
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='conform', description=__doc__, epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('conform', __doc__, _EPILOG)
     parser.add_argument('target', choices=[target.value for target in Target],
                         help='what stands at the other end')
     parser.add_argument('--station', type=whole_option, default=1, metavar='N',

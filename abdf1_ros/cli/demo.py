@@ -33,7 +33,7 @@ import tempfile
 import time
 from typing import Any
 
-from abdf1_ros.cli.terminal import ignore_further, interruptible
+from abdf1_ros.cli.terminal import command_parser, ignore_further, interruptible
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.messages import MESSAGES
@@ -306,8 +306,7 @@ def _seconds(text: str) -> float:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo; return 0, or 1 when something did not happen."""
-    parser = argparse.ArgumentParser(prog='demo', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('demo', __doc__)
     parser.add_argument('--seconds', type=_seconds, default=20.0,
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
     parser.add_argument('--peer', action='store_true',

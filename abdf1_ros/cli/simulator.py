@@ -37,6 +37,7 @@ import time
 import traceback
 
 from abdf1_ros.cli.terminal import (
+    command_parser,
     drop_output,
     interruptible,
     prepare_output,
@@ -221,9 +222,7 @@ class _Announcer:
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='simulator', description=__doc__, epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('simulator', __doc__, _EPILOG)
     parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
     line = parser.add_mutually_exclusive_group()
     line.add_argument('--pty', metavar='NAME', type=_name,

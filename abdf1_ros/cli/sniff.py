@@ -37,6 +37,7 @@ import time
 
 from abdf1_ros.cli.sniff_report import ReportBundle
 from abdf1_ros.cli.terminal import (
+    command_parser,
     drop_output,
     interruptible,
     prepare_output,
@@ -203,9 +204,7 @@ def _decode(options: argparse.Namespace) -> int:
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='sniff', description=__doc__, epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('sniff', __doc__, _EPILOG)
     parser.add_argument('files', metavar='FILE', nargs='*',
                         help='captures or hex dumps, decoded one after the other')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')

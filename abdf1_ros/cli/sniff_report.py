@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import csv
 from dataclasses import dataclass, field, replace
-from importlib.metadata import PackageNotFoundError, version
 import io
 import json
 from pathlib import Path
@@ -35,6 +34,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import Abdf1Error
+from abdf1_ros.paths import package_version
 from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.sniffer.entries import Entry, Kind
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
@@ -143,11 +143,7 @@ class ReportBundle:
 
 
 def _versions() -> dict[str, str]:
-    try:
-        ours = version('abdf1_ros')
-    except PackageNotFoundError:
-        ours = 'source tree'
-    return {'abdf1_ros': ours, 'python': platform.python_version(),
+    return {'abdf1_ros': package_version(), 'python': platform.python_version(),
             'system': f'{platform.system()} {platform.release()} {platform.machine()}'}
 
 

@@ -29,6 +29,7 @@ from types import FrameType
 from typing import TextIO
 
 from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.paths import package_version
 
 RED, YELLOW, GREEN = 31, 33, 32
 
@@ -122,6 +123,21 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[in
                   for number, (cell, width) in enumerate(zip(row, widths, strict=True))]
         lines.append('  '.join(padded).rstrip())
     return '\n'.join(lines)
+
+
+def command_parser(name: str, description: str | None,
+                   epilog: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser of a command: its texts keep their lines, and it knows --version."""
+    parser = argparse.ArgumentParser(
+        prog=name, description=description, epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
+    return parser
+
+
+def cut(line: str, width: int) -> str:
+    """Return ``line`` in ``width`` characters; where it is longer its end says so."""
+    return line if len(line) <= width else line[:max(width - 3, 0)] + '...'[:width]
 
 
 class Progress:

@@ -41,6 +41,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.paths import package_version
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
@@ -445,6 +446,7 @@ def _parse(args: Sequence[str]) -> None:
     """Tell who asks for help; all that the node takes are ROS arguments."""
     parser = argparse.ArgumentParser(
         prog='node', description=_HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
     _, unknown = parser.parse_known_args(args)
     if unknown:
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '

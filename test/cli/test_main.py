@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 import os
 from pathlib import Path
 import signal
@@ -77,3 +78,13 @@ def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
     assert result.returncode == 2
     assert result.stderr == ('-c: the Python module rclpy is missing; is ROS 2 sourced, as by '
                              '". /opt/ros/jazzy/setup.bash"?\n')
+
+
+@pytest.mark.parametrize('name', sorted(COMMANDS))
+def test_every_command_tells_its_version(
+        name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, 'argv', [name, '--version'])
+    with pytest.raises(SystemExit) as end:
+        import_module(COMMANDS[name]).main()
+    assert end.value.code == 0
+    assert capsys.readouterr().out.startswith('abdf1_ros ')

@@ -63,7 +63,7 @@ def test_parts_that_are_only_read_stand_in_parentheses() -> None:
 
 def test_packets_tell_limits_and_what_is_lacking() -> None:
     found = {row[0]: row[1:] for row in rows(tables.packets())}
-    assert found['SLC, Processor 5/01'] == ['41', '41', 'F ST L']
+    assert found['SLC, Processor 5/01'] == ['41', '41', 'F ST A D L']
     assert found['PLC-5'] == ['110', '110', '']
     assert {'F', 'ST', 'A'} <= set(found['SLC, Processor ML1000'][2].split())
 

@@ -39,7 +39,7 @@ from types import FrameType
 
 from abdf1_ros.cli.monitor.node import full_name, Watch
 from abdf1_ros.cli.monitor.view import Line, render, Style
-from abdf1_ros.cli.terminal import drop_output, prepare_output, seconds_option
+from abdf1_ros.cli.terminal import command_parser, drop_output, prepare_output, seconds_option
 from abdf1_ros.errors import FormatError
 from abdf1_ros.text import printable
 from rclpy.utilities import remove_ros_args
@@ -178,9 +178,7 @@ def _run(options: argparse.Namespace, words: list[str]) -> int:
 
 
 def _parse(args: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='monitor', description=__doc__, epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('monitor', __doc__, _EPILOG)
     parser.add_argument('--node', default='/abdf1',
                         help='name of the bridge with its namespace (default: %(default)s)')
     parser.add_argument('--once', action='store_true', help='print one picture and end')

@@ -29,7 +29,7 @@ import sys
 
 from abdf1_ros.cli.plc import data, detect, files, init, presence
 from abdf1_ros.cli.plc.line import MODES, network_of
-from abdf1_ros.cli.plc.options import DEFAULT_STATION, make_parser
+from abdf1_ros.cli.plc.options import DEFAULT_STATION, make_parser, RADIXES
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
@@ -223,7 +223,7 @@ def _watch(options: argparse.Namespace) -> int:
                 options, session, Command.READ, options.addresses, options.length)
         except Abdf1Error as error:
             return _failed(session, options.station, error)
-    failed = Watch(network, mappings, options.period).run(options.count)
+    failed = Watch(network, mappings, options.period, RADIXES[options.radix]).run(options.count)
     return EXIT_FAILED if failed else 0
 
 
@@ -268,9 +268,11 @@ def _scan(options: argparse.Namespace) -> int:
     network = network_of(options)
     for number, there in enumerate(presence.scan(network, options.stations), 1):
         if there.is_there:
+            if not found:
+                print('station    answer  processor')
             found += 1
             progress.clear()
-            print(f'{there.station:3}  {there.seconds * 1000:4.0f} ms  {there}', flush=True)
+            print(f'{there.station:7}  {there.seconds * 1000:5.0f} ms  {there}', flush=True)
         progress.show(f'{number} of {len(options.stations)} stations asked, {found} found')
     progress.clear()
     print(f'{found} of {len(options.stations)} stations answer')

@@ -20,6 +20,8 @@ import argparse
 from dataclasses import dataclass
 
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
+from abdf1_ros.cli.plc.watch import Radix
+from abdf1_ros.cli.terminal import command_parser
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.file_types import PlcType
@@ -41,6 +43,8 @@ class LineDefaults:
     timeout: str = str(DEFAULTS.timeout)
     net: str = 'the line'
 
+
+RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'bin': Radix.BINARY}
 
 _TRIED = 'all are tried'
 _DETECT_DEFAULTS = LineDefaults(
@@ -77,9 +81,7 @@ examples:
 
 def make_parser(description: str | None) -> argparse.ArgumentParser:
     """Return the parser; the name of the command is in ``command``."""
-    parser = argparse.ArgumentParser(
-        prog='plc', description=description, epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_parser('plc', description, _EPILOG)
     commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
 
     def add(name: str, text: str, *examples: str,
@@ -97,7 +99,8 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
                         'write N7:10 5 6 7 --station 1 --yes --net net.csv',
                         'write F8:2 --station 1 --yes --net net.csv -- -1.5e3'))
     _complete_watch(add('watch', 'show values live until Ctrl-C',
-                        'watch B3:0 N7:0 --period 0.5 --net net.csv'))
+                        'watch B3:0 N7:0 --period 0.5 --net net.csv',
+                        'watch I:1.0 --radix bin --net net.csv'))
     status = add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv')
     status.add_argument('station', metavar='STATION', nargs='?', type=_station,
                         default=DEFAULT_STATION, help='default: %(default)s')
@@ -152,6 +155,8 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
     _add_addresses(watch)
     watch.add_argument('--period', type=_seconds, default=0.5, metavar='S',
                        help='s between reads (default: %(default)s)')
+    watch.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
+                       help='how whole numbers are written (default: %(default)s)')
     watch.add_argument('--count', type=_count, metavar='N', help='end after so many reads')
 
 

@@ -19,13 +19,15 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Sequence
 from datetime import datetime
+from enum import Enum
+import math
 import random
 import shutil
 import sys
 import threading
 
 from abdf1_ros.cli.plc.session import opened
-from abdf1_ros.cli.terminal import is_terminal, table
+from abdf1_ros.cli.terminal import cut, is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
@@ -34,7 +36,7 @@ from abdf1_ros.messages import Event
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
+from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.text import printable
 
 # So often (s) what is shown is made anew where nothing has come: ages and errors.
@@ -42,6 +44,19 @@ _GLANCE = 0.25
 
 # Values that came faster than they could be shown; the older ones are dropped.
 _MAX_NEWS = 1000
+
+# So long (s) a value that has changed is marked.
+_MARKED = 1.0
+
+_BITS = {ValueType.INT16: 16, ValueType.UINT16: 16, ValueType.INT32: 32, ValueType.UINT32: 32}
+
+
+class Radix(Enum):
+    """How numbers are written; the value is that of Python's formats."""
+
+    DECIMAL = 'd'
+    HEXADECIMAL = 'X'
+    BINARY = 'b'
 
 
 class Watch:
@@ -51,8 +66,11 @@ class Watch:
     It is the driver's ``Listener``. Raises OSError when the port cannot be opened.
     """
 
-    def __init__(self, network: Network, mappings: Sequence[Mapping], period: float) -> None:
+    def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
+                 radix: Radix = Radix.DECIMAL) -> None:
         self._mappings = mappings
+        self._radix = radix
+        self._changed: dict[Mapping, float] = {}
         settings = DriverSettings(
             default_period=period, read_only=True, first_tns=random.randrange(0x10000))
         self._driver = Driver(network, mappings, settings, self)
@@ -87,7 +105,7 @@ class Watch:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a read; called in the link thread."""
-        self._news.append((mapping, printable(show(values))))
+        self._news.append((mapping, printable(shown(mapping, values, self._radix))))
         self._reads[mapping] += 1
         self._has_news.set()
 
@@ -121,7 +139,7 @@ class Watch:
             if error is not None:
                 changed.append((mapping, f'no value: {printable(error)}'))
         if is_terminal(sys.stdout):
-            self._shown.update(changed)
+            self._note_changes(changed)
             self._redraw()
         else:
             self._print(changed)
@@ -134,18 +152,46 @@ class Watch:
                 time = datetime.now().isoformat(timespec='milliseconds').partition('T')[2]
                 print(f'{time}  {mapping.address}  {text}', flush=True)
 
+    def _note_changes(self, news: Sequence[tuple[Mapping, str]]) -> None:
+        """Keep what is to be shown, and since when it is another value than before."""
+        for mapping, text in news:
+            if self._shown.get(mapping, text) != text:
+                self._changed[mapping] = self._driver.machine.now
+            self._shown[mapping] = text
+
     def _redraw(self) -> None:
         """Draw the table over the one before."""
         now = self._driver.machine.now
         rows = []
         for mapping in self._mappings:
             age = self._driver.points[mapping].age(now)
+            is_new = now - self._changed.get(mapping, -math.inf) < _MARKED
             rows.append((str(mapping.address), str(mapping.station), mapping.type.value,
-                         '' if age is None else f'{max(age, 0.0):.1f}',
+                         '' if age is None else f'{max(age, 0.0):.1f}', '*' if is_new else '',
                          self._shown.get(mapping, '')))
         width, height = shutil.get_terminal_size()
-        lines = table(('address', 'station', 'type', 'age s', 'value'), rows, right=(1, 3))
-        shown = [line[:width - 1] for line in lines.split('\n')[:height - 1]]
+        head = ('address', 'station', 'type', 'age s', '', 'value')
+        lines = table(head, rows, right=(1, 3)).split('\n')
+        if len(lines) > height - 1:
+            hidden = len(lines) - (height - 2)
+            lines = [*lines[:height - 2], f'+{hidden} more; a higher window shows them']
+        picture = [cut(line, width - 1) for line in lines]
         up = f'\x1b[{self._height}A' if self._height else ''
-        print(up + '\n'.join(f'\x1b[K{line}' for line in shown), flush=True)
-        self._height = len(shown)
+        print(up + '\n'.join(f'\x1b[K{line}' for line in picture), flush=True)
+        self._height = len(picture)
+
+
+def shown(mapping: Mapping, values: Values, radix: Radix) -> str:
+    """
+    Return values as text.
+
+    In another radix than ten a number has as many digits as its type has bits; strings, floats
+    and single bits are the same in all.
+    """
+    kind = mapping.type
+    if radix is Radix.DECIMAL or isinstance(values, str) or kind not in _BITS:
+        return show(values)
+    bits = _BITS[kind]
+    digits = bits if radix is Radix.BINARY else bits // 4
+    texts = (f'{int(value) & (1 << bits) - 1:0{digits}{radix.value}}' for value in values)
+    return '[' + ', '.join(texts) + ']'

@@ -245,16 +245,17 @@ def test_ping_of_nobody(plc: Plc) -> None:
 def test_scan(plc: Plc) -> None:
     said = plc('scan', '0-2,9')
     assert said.status == 0
-    assert [line.split()[0] for line in said.lines] == ['1', '2', '2']
-    assert 'PLC-5/40' in said.lines[0]
-    assert said.lines[2] == '2 of 4 stations answer'
+    assert said.lines[0].split() == ['station', 'answer', 'processor']
+    assert [line.split()[0] for line in said.lines[1:]] == ['1', '2', '2']
+    assert 'PLC-5/40' in said.lines[1]
+    assert said.lines[3] == '2 of 4 stations answer'
 
 
 def test_scan_finds_who_does_not_say_what_it_is(plc: Plc, simulator: Process) -> None:
     simulator.say('error 2 10')
     said = plc('scan', '2')
     assert said.status == 0
-    assert 'answers, but not who it is: STS 10' in said.lines[0]
+    assert 'answers, but not who it is: STS 10' in said.lines[1]
 
 
 def test_scan_of_nobody(plc: Plc) -> None:

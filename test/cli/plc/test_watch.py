@@ -17,9 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import io
+import os
 from pathlib import Path
 import threading
 
+from abdf1_ros.cli.plc import watch
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -98,6 +101,44 @@ def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str])
     assert Watch(network_on(plcs), [SPEED], 0.01).run(2) == 1
     assert shown(capsys) == [
         'N7:0  no value: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
+
+
+@pytest.mark.parametrize(('kind', 'values', 'radix', 'text'), [
+    ('int16', [-2, 10], watch.Radix.HEXADECIMAL, '[FFFE, 000A]'),
+    ('uint16', [5], watch.Radix.BINARY, '[0000000000000101]'),
+    ('int32', [-1], watch.Radix.HEXADECIMAL, '[FFFFFFFF]'),
+    ('int16', [-2], watch.Radix.DECIMAL, '[-2]'),
+    ('float32', [1.5], watch.Radix.HEXADECIMAL, '[1.5]')])
+def test_values_are_written_in_another_radix(
+        kind: str, values: list[float], radix: watch.Radix, text: str) -> None:
+    mapping = make_mapping('F8:0' if kind == 'float32' else 'N7:0', kind=kind,
+                           length=len(values))
+    assert watch.shown(mapping, values, radix) == text
+
+
+class Terminal(io.StringIO):
+    """An output that people look at."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_table_marks_changes_and_says_what_does_not_fit(
+        plcs: Plcs, monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Terminal()
+    monkeypatch.setattr('sys.stdout', screen)
+    monkeypatch.setenv('TERM', 'xterm')
+    monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size((48, 5)))
+    addresses = [make_mapping(f'N7:{number}', item=number + 1) for number in range(4)]
+    table = Watch(network_on(plcs), addresses, 0.01)
+    table._note_changes([(addresses[0], '[1]'), (addresses[1], '[123456789, 123456789, 123456789]')])
+    table._note_changes([(addresses[0], '[2]')])
+    table._redraw()
+    lines = screen.getvalue().replace('\x1b[K', '').splitlines()
+    assert len(lines) == 4
+    assert lines[1].split() == ['N7:0', '1', 'int16', '*', '[2]']
+    assert lines[2].endswith('...') and len(lines[2]) == 47
+    assert lines[3].startswith('+2 more')
 
 
 def test_port_that_is_not_there() -> None:
