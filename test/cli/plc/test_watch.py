@@ -131,7 +131,8 @@ def test_table_marks_changes_and_says_what_does_not_fit(
     monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size((48, 5)))
     addresses = [make_mapping(f'N7:{number}', item=number + 1) for number in range(4)]
     table = Watch(network_on(plcs), addresses, 0.01)
-    table._note_changes([(addresses[0], '[1]'), (addresses[1], '[123456789, 123456789, 123456789]')])
+    long = '[' + ', '.join(['123456789'] * 3) + ']'
+    table._note_changes([(addresses[0], '[1]'), (addresses[1], long)])
     table._note_changes([(addresses[0], '[2]')])
     table._redraw()
     lines = screen.getvalue().replace('\x1b[K', '').splitlines()
