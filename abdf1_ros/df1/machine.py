@@ -133,9 +133,9 @@ class Machine:
 
     ``reply_size`` is the bytes behind the header of the reply that is waited for, if it tells no
     error; 0 where that is not known. ``unsent`` asks the port how many bytes have still to leave,
-    as far as it can tell. ``rate`` is what the line has shown of its speed. ``late`` is the sum
-    of the seconds by which it was called after a deadline of its procedure: so long this process,
-    or its host, has not run.
+    as far as it can tell; ``position`` counts the bytes given out so far. ``rate`` is what the
+    line has shown of its speed. ``late`` is the sum of the seconds by which it was called after a
+    deadline of its procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -150,6 +150,7 @@ class Machine:
         self.reply_size = 0
         self.background: Background | None = None
         self.late = 0.0
+        self.position = 0
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self.rate = LineRate(self._timing.char_time)
@@ -186,10 +187,13 @@ class Machine:
         """Return when what is being sent has left, by its size (clock value in s)."""
         return self._line_free
 
+    def has_left(self, position: int) -> bool:
+        """Tell whether the bytes up to this ``position`` have left, as far as the port knows."""
+        return self.position - self._still_here >= position
+
     @property
-    def is_sending(self) -> bool:
-        """Tell whether something of what is to be sent has not left yet, as the port says."""
-        return bool(self._out) or self.unsent() > 0
+    def _still_here(self) -> int:
+        return len(self._out) + self.unsent()
 
     @property
     def spare_time(self) -> float:
@@ -322,9 +326,8 @@ class Machine:
             symbol = self.decoder.next_symbol()
             if symbol is None:
                 return
-            if self._answers(symbol):
-                self.rate.answered(self._heard_with_sent, self.now)
-                self._line_free = min(self._line_free, self.now)
+            if self._is_half_duplex or symbol in _RESPONSES:
+                self._take_as_answer()
             if isinstance(symbol, Frame) and self._message.number == self.decoder.begun:
                 self.rate.message(self.counters.chars_received - self._message.heard,
                                   self.now - self._message.begun)
@@ -335,9 +338,13 @@ class Machine:
         """Return the characters heard that could not pass while others were sent."""
         return self.counters.chars_received if self._is_half_duplex else 0
 
-    def _answers(self, symbol: Symbol) -> bool:
-        """Tell whether what comes now proves that what we have sent has left."""
-        return self._is_half_duplex or symbol in _RESPONSES and not self.is_sending
+    def _take_as_answer(self) -> None:
+        """Conclude from an answer that what we have sent has left, but what is still here."""
+        here = 0 if self._is_half_duplex else self._still_here
+        if not here:
+            self.rate.answered(self._heard_with_sent, self.now)
+        left = self.now + here * self._timing.char_time
+        self._line_free = min(self._line_free, left)
 
     def _resume(self, symbol: Symbol | None, error: CommandExpired | None = None) -> None:
         """Run the procedure up to a step that has to wait."""
@@ -373,6 +380,7 @@ class Machine:
             size = len(step.frame)
             self._out += step.frame
             self.counters.chars_sent += size
+            self.position += size
             self._line_free = free = free + size * self._timing.char_time
             self._echo_due += size
             if self._forget_on_send:

@@ -35,9 +35,9 @@ at a time where ``max_outstanding`` allows, and replies find them by station, co
 A reply that overtakes its ACK counts as one (M 4-13).
 
 A message is sent again when its sender has not understood our response (M 4-5), so a repetition
-comes within the time of its retries, and before an end that asks no more has acknowledged our
-reply. Whatever comes later with the same number is another message: some processors count from 0
-after each power-up, some programs always send 0.
+comes within the time of its retries, and of one of them where the sender has acknowledged our
+reply and not asked again. Whatever comes later with the same number is another message: some
+processors count from 0 after each power-up, some programs always send 0.
 """
 
 from __future__ import annotations
@@ -78,8 +78,9 @@ _MIN_RESPONSE_TIME = 0.02
 # that overtook it.
 _LATE_RESPONSE = 0.1
 
-# How long (s) the retries of the products take as they come: ACK time-outs of 1 s, and 3 ENQs.
-_RETRY_TIME = 4.0
+# The ACK time-out (s) and ENQs of the products as they come.
+_ACK_TIMEOUT = 1.0
+_ENQ_LIMIT = 3
 
 # How often (s) a look is taken at what has become overdue while a response is waited for.
 _TICK = 0.25
@@ -99,10 +100,9 @@ class PeerSettings:
     max_outstanding: int = 1
     duplicate_detection: bool = True
 
-    @property
-    def retry_time(self) -> float:
-        """Return how long (s) the other end may repeat a message, set like us or as it comes."""
-        return max(_RETRY_TIME, (self.enq_retries + 1) * self.timeout)
+    def retry_time(self, enq_retries: int) -> float:
+        """Return how long (s) so many ENQs take the other end, set like us or as it comes."""
+        return (enq_retries + 1) * max(_ACK_TIMEOUT, self.timeout)
 
 
 @dataclass(slots=True)
@@ -116,21 +116,16 @@ class _Outstanding:
 @dataclass(slots=True)
 class _Accepted:
     """
-    The last message accepted: its key (M 4-4), and until when (s) it may come again.
+    The last message accepted: its key (M 4-4), and when (clock value in s) it came.
 
     ``is_answered`` tells that our reply to it has been acknowledged, ``is_doubted`` that its
     sender has asked for a response again, or has had a NAK.
     """
 
     key: tuple[int, int, int]
-    deadline: float
+    when: float
     is_answered: bool = False
     is_doubted: bool = False
-
-    def is_repeated_by(self, packet: Packet, now: float) -> bool:
-        """Tell whether ``packet`` is this message once more."""
-        is_possible = self.is_doubted or not self.is_answered
-        return is_possible and now < self.deadline and packet.duplicate_key == self.key
 
 
 class FullDuplexPeer:
@@ -286,10 +281,10 @@ class FullDuplexPeer:
         machine = self._machine
         machine.decoder.last_byte = 0
         symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires)
-        end = machine.free_at + self._timeout
-        while symbol is not None or machine.now < end:
+        end, position = machine.free_at + self._timeout, machine.position
+        while symbol is not None or self._left(end) > 0:
             answer = b''
-            if symbol in (Control(Code.ACK), Control(Code.NAK)) and not machine.is_sending:
+            if symbol in (Control(Code.ACK), Control(Code.NAK)) and machine.has_left(position):
                 assert isinstance(symbol, Control)
                 self._count_response(symbol.code)
                 return symbol.code
@@ -306,14 +301,18 @@ class FullDuplexPeer:
         """Only receive for a while; responses that come now belong to nothing."""
         end = max(self._machine.now, self._machine.free_at) + seconds
         symbol = yield from self._next(b'', end)
-        while symbol is not None or self._machine.now < end:
+        while symbol is not None or self._left(end) > 0:
             symbol = yield from self._next(self._hear(symbol) if symbol else b'', end)
+
+    def _left(self, end: float) -> float:
+        """Return the seconds up to ``end`` in which nothing of ours is on the line."""
+        return end - max(self._machine.now, self._machine.free_at)
 
     def _next(self, answer: bytes,
               end: float) -> Generator[Step, Symbol | None, Symbol | None]:
         """Send an answer, then return the next symbol up to ``end``, or up to the next tick."""
         self._expire()
-        left = end - max(self._machine.now, self._machine.free_at)
+        left = self._left(end)
         if left > 0:
             return (yield Step(answer, min(left, _TICK)))
         if answer:
@@ -362,8 +361,7 @@ class FullDuplexPeer:
         if not packet.is_reply and len(self._replies) >= MAX_WAITING_REPLIES:
             self._counters.refused_for_memory += 1
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
-        self._accepted = _Accepted(
-            packet.duplicate_key, self._machine.now + self._settings.retry_time)
+        self._accepted = _Accepted(packet.duplicate_key, self._machine.now)
         if packet.is_reply:
             self._take_reply(packet)
         else:
@@ -373,8 +371,12 @@ class FullDuplexPeer:
 
     def _is_repetition(self, packet: Packet) -> bool:
         """Tell whether this is the last message once more (M 4-4, 4-8)."""
-        return self._settings.duplicate_detection and self._accepted is not None \
-            and self._accepted.is_repeated_by(packet, self._machine.now)
+        last, settings = self._accepted, self._settings
+        if last is None or last.key != packet.duplicate_key or not settings.duplicate_detection:
+            return False
+        is_settled = last.is_answered and not last.is_doubted
+        enq_retries = 0 if is_settled else max(_ENQ_LIMIT, settings.enq_retries)
+        return self._machine.now - last.when < settings.retry_time(enq_retries)
 
     def _expect_repetition(self) -> None:
         """Take note that the other end may send its last message again."""

@@ -161,5 +161,6 @@ def test_other_modes_are_served_by_the_same_orders() -> None:
     ends = Ends()
     errands.add(1, identify(), ends.results.append, ends.errors.append)
     errands.machine.start(0.0)
+    errands.machine.handle_timeout(0.1)
     assert errands.machine.data_to_send().startswith(b'\x10\x02\x01\x05\x06\x00')
     assert ends.count() == 0
