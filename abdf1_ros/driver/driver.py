@@ -32,16 +32,17 @@ from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.driver.health import Health
+from abdf1_ros.driver.agenda import Agenda
+from abdf1_ros.driver.checks import Check, Checks
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import JobTasks, Steps
+from abdf1_ros.driver.job_tasks import JobTask, JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
-from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES, Scheduler, waited_too_long
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.transactions import carry_out
+from abdf1_ros.driver.writes import MAX_WAITING_WRITES, waited_too_long
 from abdf1_ros.errors import CommandExpired, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.file_types import PlcType
@@ -51,6 +52,7 @@ from abdf1_ros.plan.forecast import (
     block_time,
     intervals,
     line_model,
+    longest_probe,
     longest_transaction,
     longest_wait,
     scan_time,
@@ -121,15 +123,16 @@ class Driver:
         blocks = planner.plan(mappings)
         self.expected_scan_time = scan_time(blocks)
         self.points = self._make_points(blocks)
-        self._scheduler = Scheduler(
-            self.stations, probe_time=network.timeout / 1000,
-            write_timeout=settings.write_timeout, report=listener.written)
-        self._scheduler.add_reads(map(self._job, blocks), 0.0)
-        self._read_backs = ReadBacks(settings.write_timeout, listener.written)
-        self.health = Health(
+        self.health = Checks(
             self.stations, {block.station for block in blocks}, settings.processor_period,
-            self._scheduler, lambda station, error: self._link_failed(station, (), error),
+            lambda station, error: self._link_failed(station, (), error),
             lambda: self.machine.now)
+        self._agenda = Agenda(
+            self.stations, self.health, self._tasks, probe_time=longest_probe(network),
+            patience=settings.write_timeout, report=listener.written)
+        self._reads, self._writes = self._agenda.reads, self._agenda.writes
+        self._reads.replace((), map(self._job, blocks), 0.0)
+        self._read_backs = ReadBacks(settings.write_timeout, listener.written)
 
     @property
     def transactions(self) -> int:
@@ -139,17 +142,17 @@ class Driver:
     @property
     def scan_time(self) -> float | None:
         """Return how long (s) the slowest mapping has waited between its last two reads."""
-        return self._scheduler.scan_time
+        return self._reads.scan_time
 
     @property
     def longest_scan_time(self) -> float | None:
         """Return the longest ``scan_time`` (s) there has been, outages not counted."""
-        return self._scheduler.longest_scan_time
+        return self._reads.longest_scan_time
 
     @property
     def blocks(self) -> list[Block]:
         """Return what is read together."""
-        return [job.block for job in self._scheduler.jobs]
+        return [job.block for job in self._reads.jobs]
 
     def write(self, mappings: Sequence[Mapping], values: Sequence[float] | str,
               now: float) -> None:
@@ -184,7 +187,7 @@ class Driver:
             return 'this node is read_only'
         if not self.is_online:
             return _NOT_OPEN
-        waiting = len(self._inbox) + self._scheduler.waiting_writes
+        waiting = len(self._inbox) + len(self._writes)
         return 'too many writes are waiting' if waiting + count > MAX_WAITING_WRITES else ''
 
     def request_counters(self, station: int) -> None:
@@ -236,59 +239,42 @@ class Driver:
         return ReadJob(block, [self.points[mapping] for mapping in block.mappings], longest)
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return the next command: of a write first, but after some in a row of anything else."""
+        """Return the command that has the line next, not for a ``busy`` station."""
         self.expire(now)
-        task = self._next_of_writes(now, busy) if self._scheduler.is_turn_of_writes else None
-        return task or self._next_other(now, busy) or self._next_of_writes(now, busy)
-
-    def _next_of_writes(self, now: float, busy: Container[int]) -> Task | None:
-        """Return the next command of a write: new ones, and those under way, in turns."""
-        under_way = self._tasks.waiting(busy)
-        write = None
-        if under_way is None or not self._has_begun_write:
-            write = self._scheduler.next_write(now, busy)
-        self._has_begun_write = write is not None
-        if write is not None:
-            return self._tasks.start(write.mapping.station, self._write_steps(write), now,
-                                     requested=write.requested)
-        if under_way is None:
-            return None
-        self._scheduler.write_goes_on()
-        return self._tasks.take(under_way, now)
-
-    def _next_other(self, now: float, busy: Container[int]) -> Task | None:
-        """Return the next check or read."""
-        check = self.health.next_check(now, busy)
-        if check is not None:
-            return self._tasks.start(check.station, self.health.steps(check), now)
-        job = self._scheduler.next_read(now, busy)
+        job = self._agenda.next(now, busy)
         if job is None:
             return None
+        if isinstance(job, JobTask):
+            return self._tasks.take(job, now)
+        if isinstance(job, Write):
+            return self._tasks.start(
+                job.mapping.station, self._write_steps(job), now, requested=job.requested)
+        if isinstance(job, Check):
+            return self._tasks.start(job.station, self._check_steps(job), now)
         return self._tasks.start(
             job.station, self._read_steps(job, now), now, reply_size=job.reply_size)
 
     def next_due(self) -> float | None:
         """Return when there is something to do next (clock value in s), None for never."""
-        moments = self._scheduler.next_due(), self.health.next_due()
-        return min((moment for moment in moments if moment is not None), default=None)
+        return self._agenda.next_due()
 
     def expire(self, now: float) -> None:
         """Do what needs no line: store what we serve, end what has waited too long for it."""
         self._sort_inbox(now)
-        self._scheduler.expire(now)
+        self._writes.expire(now)
         self._tasks.expire(now)
         self._read_backs.expire(now)
 
     def next_expiry(self) -> float | None:
         """Return when ``expire`` has something to do (clock value in s), None for never."""
         due = self._read_backs.next_due()
-        first = min(self._scheduler.next_expiry(), self._tasks.next_expiry(),
+        first = min(self._writes.next_expiry(), self._tasks.next_expiry(),
                     math.inf if due is None else due)
         return None if math.isinf(first) else first
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
-            self._scheduler.release(station.number, self.machine.now)
+            self._reads.release(station.number, self.machine.now)
             self.health.came_back(station.number, self.machine.now)
         else:
             self.health.went_away(station.number)
@@ -299,7 +285,7 @@ class Driver:
         timeout = self._settings.write_timeout
         for write in self._inbox.take():
             if not write.mapping.serves:
-                self._scheduler.add_write(write, now)
+                self._writes.add(write, now)
             elif now - write.requested > timeout:
                 self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
             else:
@@ -320,7 +306,7 @@ class Driver:
 
     def _run(self) -> Procedure:
         """Work as long as there is a port."""
-        self._scheduler.begin(self.machine.now)
+        self._reads.begin(self.machine.now)
         self.health.begin(self.machine.now)
         self._inbox.open()
         self.is_online = True
@@ -338,14 +324,14 @@ class Driver:
         self.is_online = False
         self._tasks.fail(error)
         self.health.end(str(error))
-        for job in self._scheduler.jobs:
+        for job in self._reads.jobs:
             job.interrupted()
         for mapping, point in self.points.items():
             if mapping.polls:
                 point.fail(str(error))
         for write in self._inbox.close():
             self._end_write(write, Outcome.NOT_SENT, str(error))
-        self._scheduler.drop_writes(str(error), self.machine.now)
+        self._writes.drop(str(error), self.machine.now)
         self._read_backs.end(self.machine.now)
 
     def _read_steps(self, job: ReadJob, now: float) -> Steps:
@@ -368,7 +354,14 @@ class Driver:
             elif data is not None:
                 self._read_done(job, data)
         finally:
-            self._scheduler.finished(job, self.machine.now)
+            self._reads.ended(job, self.machine.now)
+
+    def _check_steps(self, check: Check) -> Steps:
+        begun = self.machine.now
+        try:
+            yield from self.health.steps(check)
+        finally:
+            self._agenda.check_ended(check, begun, self.machine.now)
 
     def _read_done(self, job: ReadJob, data: bytes) -> None:
         """Hand on what was read to the points that want it."""
@@ -376,7 +369,7 @@ class Driver:
         self._read_backs.read(job.block, data, job.started, now)
         has_recovered = any(point.error is not None for point in job.points)
         for point, place in zip(job.points, job.slices, strict=True):
-            if job.is_hastened or point.is_due(now, job.block.period):
+            if job.is_refresh or point.is_due(now, job.block.period):
                 self._update(point, data[place])
         job.done(now)
         if has_recovered:
@@ -398,7 +391,7 @@ class Driver:
     def _read_failed(self, job: ReadJob, reason: str, is_refusal: bool) -> None:
         """Fail the points; what is read after a refusal is another block's matter."""
         job.interrupted()
-        is_news = is_refusal and job in self._scheduler.jobs
+        is_news = is_refusal and job in self._reads.jobs
         change = self._refusals.refused(job.block) if is_news else None
         is_divided = change is not None and list(change.old) == [job.block]
         for point in job.points:
@@ -411,8 +404,8 @@ class Driver:
     def _change(self, change: Change | None) -> None:
         """Read other blocks from now on."""
         if change is not None:
-            old = [job for job in self._scheduler.jobs if job.block in change.old]
-            self._scheduler.replace(old, map(self._job, change.new), self.machine.now)
+            old = [job for job in self._reads.jobs if job.block in change.old]
+            self._reads.replace(old, map(self._job, change.new), self.machine.now)
 
     def _link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
         """Fail what the end of a transaction without a reply concerns."""
@@ -426,12 +419,13 @@ class Driver:
             point.fail(str(error))
 
     def _write_steps(self, write: Write) -> Steps:
-        station = write.mapping.station
-        self._read_backs.overtaken(write, self.machine.now)
+        station, begun, is_answered = write.mapping.station, self.machine.now, True
+        self._read_backs.overtaken(write, begun)
         try:
             ending = yield from carry_out(write)
+            is_answered = not isinstance(ending.error, LinkError)
         finally:
-            self._scheduler.write_ended(write)
+            self._agenda.write_ended(write, begun, self.machine.now, is_answered=is_answered)
         if isinstance(ending.error, RemoteError):
             self.stations[station].remote_errors += 1
         if ending.is_unsure:
@@ -440,7 +434,5 @@ class Driver:
             self._end_write(write, ending.outcome, ending.detail)
         if isinstance(ending.error, LinkError) and not isinstance(ending.error, CommandExpired):
             self._link_failed(station, (), ending.error)
-            if station != BROADCAST and not self.stations[station].active:
-                self._scheduler.unanswered(self.machine.now)
         if ending.done or ending.is_unsure:
-            self._scheduler.hasten(write, self.machine.now)
+            self._reads.refresh(write, self.machine.now)

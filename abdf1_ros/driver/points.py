@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -24,6 +23,7 @@ from enum import Enum
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
+from abdf1_ros.settings.limits import raw_values, value_text
 from abdf1_ros.settings.mapping import Mapping, Publish
 from abdf1_ros.settings.values import Values, ValueType
 
@@ -154,14 +154,15 @@ class Write:
 
     Raises FormatError, saying what is wrong, when they cannot or must not be written.
     ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that
-    it takes.
+    it takes. ``is_probe`` tells that its station was inactive when it got the line.
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
         self.mapping = mapping
         self.requested = now
+        self.is_probe = False
         self.value = show(values)
-        self.raw = _raw(mapping, values)
+        self.raw = raw_values(mapping, values)
         self.commands = _commands(mapping, self.raw)
 
     @property
@@ -211,40 +212,9 @@ def show(values: Sequence[float] | str) -> str:
         rest = len(values) - _SHOWN_CHARACTERS
         more = f' and {rest} more characters' if rest > 0 else ''
         return repr(values[:_SHOWN_CHARACTERS]) + more
-    text = ', '.join(map(_text, values[:_SHOWN_VALUES]))
+    text = ', '.join(map(value_text, values[:_SHOWN_VALUES]))
     rest = len(values) - _SHOWN_VALUES
     return f'[{text}, and {rest} more]' if rest > 0 else f'[{text}]'
-
-
-def _text(value: float) -> str:
-    return str(value) if isinstance(value, int) else f'{value:.7g}'  # what a float32 is good for
-
-
-def _raw(mapping: Mapping, values: Sequence[float] | str) -> Sequence[float] | str:
-    """Return what the PLC is to hold; FormatError unless all of it can and may be written."""
-    codec, scaling = mapping.codec, mapping.scaling
-    if isinstance(values, str) or scaling is None:
-        codec.check(values)
-        _check_limits(mapping, values)
-        return values
-    raw = scaling.raw(values, mapping.type)
-    codec.check(raw)
-    _check_limits(mapping, values)
-    if mapping.type is not ValueType.FLOAT32:  # rounding must not lead past a limit either
-        _check_limits(mapping, scaling.publish(raw), ', the nearest that can be written,')
-    return raw
-
-
-def _check_limits(mapping: Mapping, values: Sequence[float] | str, what: str = '') -> None:
-    if isinstance(values, str):
-        return
-    minimum, maximum = mapping.minimum, mapping.maximum
-    if mapping.message_type is ValueType.FLOAT32:  # limits as near as values can come to them
-        minimum, maximum = array('f', (minimum, maximum))
-    for index, value in enumerate(values):
-        if not minimum <= value <= maximum:
-            raise FormatError(f'value {_text(value)} at index {index}{what} is outside '
-                              f'Min {mapping.minimum:.15g}, Max {mapping.maximum:.15g}')
 
 
 def _commands(mapping: Mapping, values: Sequence[float] | str) -> list[Request]:

@@ -55,10 +55,11 @@ class ReadJob:
 
     ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
     between its last two good reads and ``longest`` the greatest of these; an outage of the
-    station does not count. ``is_hastened`` tells that a write has changed what it shows, the
-    last time at ``hastened``. ``started`` is when the read under way or the last one began, and
+    station does not count. ``is_refresh`` tells that a write has changed what it shows, the
+    last time at ``refreshed``. ``started`` is when the read under way or the last one began, and
     ``late`` what ``Machine.late`` was then. Packets that come within ``longest_read`` seconds are
-    of one read. ``is_to_repeat`` tells that the last read was dropped.
+    of one read. ``is_to_repeat`` tells that the last read was dropped, ``is_probe`` that it asks a
+    silent station.
     ``ticket`` is the queue's: the entry that counts.
     """
 
@@ -73,11 +74,12 @@ class ReadJob:
         self.due = 0.0
         self.interval: float | None = None
         self.longest: float | None = None
-        self.is_hastened = False
-        self.hastened = -math.inf
+        self.is_refresh = False
+        self.refreshed = -math.inf
         self.started = 0.0
         self.late = 0.0
         self.is_to_repeat = False
+        self.is_probe = False
         self._longest_read = longest_read
         self.ticket = 0
         self._last_done: float | None = None
@@ -135,7 +137,7 @@ class ReadJob:
 
     def done(self, now: float) -> None:
         """Take note of a good read."""
-        self.is_hastened = self.started < self.hastened
+        self.is_refresh = self.started < self.refreshed
         if self._last_done is not None:
             self.interval = now - self._last_done
             self.longest = max(self.interval, self.longest or 0.0)
@@ -193,7 +195,7 @@ class ReadQueue:
         heap = self._heaps.setdefault(job.block.period, [])
         heapq.heappush(heap, (due, job.ticket, job))
         if len(heap) > _MOST_ENTRIES * len(self.jobs):
-            # Writes hasten slow reads, whose old entries would stay until they had been due.
+            # Writes refresh slow reads, whose old entries would stay until they had been due.
             heap[:] = filter(self._counts, heap)
             heapq.heapify(heap)
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from abdf1_ros.df1.master_line import MIN_RESPONSE_TIME
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
@@ -32,6 +33,7 @@ from abdf1_ros.settings.network import BAUD_RATES, Network
 
 USUAL_RESPONSE_TIME = 0.01
 _ANSWERS = 2
+_POLL_CHARACTERS = 4
 
 # A read without a period takes what the others leave, but has its turn at least in so many
 # times the time in which everything could be read once.
@@ -95,6 +97,12 @@ def longest_transaction(network: Network) -> float:
     """
     tries = network.nak_retries + 1 + network.enq_retries + 1
     return (tries * network.timeout + network.cmd_timeout) / 1000
+
+
+def longest_probe(network: Network) -> float:
+    """Return the seconds that a silent station has the line when it is asked once."""
+    return max(network.timeout / 1000, MIN_RESPONSE_TIME) + network.timing.tx_delay \
+        + _POLL_CHARACTERS * network.timing.char_time
 
 
 def needed_baud(network: Network, mappings: Iterable[Mapping], default_period: float,

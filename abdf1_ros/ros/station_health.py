@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 import time
 
+from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.link_thread import LinkThread

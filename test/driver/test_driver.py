@@ -25,7 +25,7 @@ from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome
-from abdf1_ros.driver.scheduler import MAX_WAITING_WRITES
+from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
@@ -876,7 +876,7 @@ def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
     bench, plc = make_bench(fast, long)
     bench.open()
-    job, = (job for job in bench.driver._scheduler.jobs if job.block.mappings == (long,))
+    job, = (job for job in bench.driver._reads.jobs if job.block.mappings == (long,))
     bench.run_until(lambda: job.is_under_way)  # while the fast one has the line
     bench.lose_port()
     store(plc, 'N7:0', [1] * 250)

@@ -382,7 +382,7 @@ def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
 
 def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
-    jobs: Any = bench.driver._scheduler._reads.jobs
+    jobs: Any = bench.driver._reads.jobs
 
     class Part:
         """A job that has not been done yet."""

@@ -20,8 +20,8 @@ from collections.abc import Iterator
 from pathlib import Path
 import time
 
+from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.health import StationHealth
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.link_thread import LinkThread

@@ -22,7 +22,7 @@ from dataclasses import replace
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.health import ECHO_PERIOD
+from abdf1_ros.driver.checks import ECHO_PERIOD
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.pccc.emulated import Setting

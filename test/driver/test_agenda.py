@@ -17,15 +17,18 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Container
 import itertools
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
+from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
 from abdf1_ros.driver.read_queue import ReadJob
-from abdf1_ros.driver.scheduler import MAX_WRITES_IN_A_ROW, Scheduler
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
@@ -45,31 +48,41 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
 
 
 class Bench:
-    """A scheduler whose jobs are done by hand."""
+    """An agenda without checks, whose jobs are done by hand."""
 
     def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
         self.results: list[WriteResult] = []
         self.stations = ActiveStationList([job.station for job in jobs])
-        self.scheduler = Scheduler(
-            self.stations, probe_time=PROBE_TIME, write_timeout=write_timeout,
-            report=self.results.append)
-        self.scheduler.add_reads(jobs, 0.0)
+        self.tasks = JobTasks(5, 0)
+        stations = {job.station for job in jobs}
+        checks = Checks(self.stations, stations, 0.0, lambda station, error: None, lambda: 0.0)
+        checks.begin(0.0)
+        self.agenda = Agenda(self.stations, checks, self.tasks, probe_time=PROBE_TIME,
+                             patience=write_timeout, report=self.results.append)
+        self.reads, self.writes = self.agenda.reads, self.agenda.writes
+        self.reads.replace((), jobs, 0.0)
 
-    def next(self, now: float) -> ReadJob | Write | None:
-        """Return the next job, as the driver asks for it."""
-        write = self.next_write(now) if self.scheduler.is_turn_of_writes else None
-        return write or self.scheduler.next_read(now) or self.next_write(now)
+    def next(self, now: float) -> object:  # noqa: A003
+        """Return who has the line next; a write ends at once."""
+        job = self.agenda.next(now)
+        if isinstance(job, Write):
+            self.writes.ended(job)
+        return job
 
     def next_write(self, now: float) -> Write | None:
         """Take the next write, which ends at once."""
-        write = self.scheduler.next_write(now)
+        write = self.writes.next(now)
         if write is not None:
-            self.scheduler.write_ended(write)
+            self.writes.ended(write)
         return write
+
+    def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
+        """Take the next probe or read."""
+        return self.agenda._read(now, busy)
 
     def read(self, now: float, took: float = 0.0) -> ReadJob | None:
         """Take the next read and give it back done."""
-        job = self.scheduler.next_read(now)
+        job = self.next_read(now)
         if job is not None:
             self.finish(job, now, now + took)
         return job
@@ -77,7 +90,7 @@ class Bench:
     def finish(self, job: ReadJob, started: float, now: float) -> None:
         """Give a read back that was made from ``started`` to ``now``."""
         job.started = started
-        self.scheduler.finished(job, now)
+        self.reads.ended(job, now)
 
     def write(self, mapping: Mapping, value: float, now: float) -> Write:
         write = Write(mapping, [value], now)
@@ -85,7 +98,7 @@ class Bench:
         return write
 
     def add(self, write: Write) -> None:
-        self.scheduler.add_write(write, write.requested)
+        self.writes.add(write, write.requested)
 
     def outcomes(self) -> list[Outcome]:
         return [result.outcome for result in self.results]
@@ -100,7 +113,7 @@ def test_reads_come_when_they_are_due() -> None:
     slow, fast = make_job('N7:0', period=1000), make_job('N9:0', period=100)
     bench = Bench(slow, fast)
     assert [bench.read(0.0), bench.read(0.0), bench.read(0.0)] == [fast, slow, None]
-    assert bench.scheduler.next_due() == 0.1
+    assert bench.agenda.next_due() == 0.1
     assert bench.read(0.099) is None
     assert bench.read(0.1) is fast
     assert [bench.read(time / 10 + 0.01) for time in range(2, 10)] == [fast] * 8
@@ -135,7 +148,7 @@ def test_saturated_line_is_shared_by_all_in_turn() -> None:
 
 def test_nothing_is_ever_due_without_reads() -> None:
     bench = Bench()
-    assert (bench.scheduler.next_due(), bench.next(1e9), bench.scheduler.scan_time) == (
+    assert (bench.agenda.next_due(), bench.next(1e9), bench.reads.scan_time) == (
         None, None, None)
 
 
@@ -161,17 +174,25 @@ def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
     assert order == [*writes[:4], job, *writes[4:8], job, *writes[8:]]
 
 
+def nine_packets() -> Steps:
+    """Yield as many requests."""
+    for _ in range(9):
+        yield 0x0F, b''
+
+
 def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
     job = make_job()
     bench = Bench(job)
     write = bench.write(WORD, 1, 0.0)
     assert bench.next(0.0) is write
+    task = bench.tasks.start(1, nine_packets(), 0.0)
     for _ in range(MAX_WRITES_IN_A_ROW - 1):
-        assert bench.scheduler.is_turn_of_writes
-        bench.scheduler.write_goes_on()
-    bench.write(WORD, 2, 0.0)
+        task.reply(task.command.reply())
+        assert bench.next(0.0) is task
+        bench.tasks.take(task, 0.0)
+    another = bench.write(WORD, 2, 0.0)
     assert bench.next(0.0) is job
-    assert bench.scheduler.is_turn_of_writes
+    assert bench.next(0.0) is another
 
 
 def test_writes_go_on_when_no_read_is_due() -> None:
@@ -185,9 +206,9 @@ def test_probe_of_an_inactive_station_has_its_turn_among_writes() -> None:
     bench = Bench(make_job(station=9))
     bench.stations.lost(9, 0.0)
     bench.read(0.0)
-    assert bench.scheduler.next_read(0.0) is not None  # the first probe
+    assert bench.next_read(0.0) is not None  # the first probe
     late = make_job('N9:0', station=9)
-    bench.scheduler.add_reads([late], 0.0)
+    bench.reads.replace((), [late], 0.0)
     writes = [bench.write(BIT, n % 2, 0.0) for n in range(6)]
     assert [bench.next(0.0) for _ in range(7)] == [*writes[:5], late, *writes[5:]]
 
@@ -262,14 +283,13 @@ def test_writes_of_the_same_words_are_never_under_way_together() -> None:
     bench, elsewhere = Bench(), make_mapping('N7:0', 'Write', station=2)
     first, second = bench.write(BIT, 1, 0.0), bench.write(BIT, 0, 0.0)
     behind, other = bench.write(WORD, 1, 0.0), bench.write(elsewhere, 1, 0.0)
-    scheduler = bench.scheduler
-    assert scheduler.next_write(0.0) is first
-    assert scheduler.next_write(0.0) is other  # but not another of the same station, out of turn
-    assert scheduler.next_write(0.0) is None
-    scheduler.write_ended(first)
-    assert scheduler.next_write(0.0) is second
-    assert scheduler.next_write(0.0) is behind
-    assert scheduler.next_write(0.0) is None
+    assert bench.writes.next(0.0) is first
+    assert bench.writes.next(0.0) is other  # but not another of the same station, out of turn
+    assert bench.writes.next(0.0) is None
+    bench.writes.ended(first)
+    assert bench.writes.next(0.0) is second
+    assert bench.writes.next(0.0) is behind
+    assert bench.writes.next(0.0) is None
 
 
 def test_write_that_has_waited_too_long_is_not_sent() -> None:
@@ -312,9 +332,9 @@ def test_dropped_writes_all_have_their_result() -> None:
     bench.next(0.0)
     for n in range(3):
         bench.write(BIT, n % 2, 0.0)
-    bench.scheduler.next_write(0.0)
+    bench.writes.next(0.0)
     bench.write(WORD, 1, 0.5)
-    bench.scheduler.drop_writes('the cable is off', 1.0)
+    bench.writes.drop('the cable is off', 1.0)
     assert bench.outcomes() == [Outcome.NOT_SENT] * 3
     assert {result.detail for result in bench.results} == {'the cable is off'}
     assert [result.latency for result in bench.results] == [1.0, 1.0, 0.5]
@@ -324,7 +344,7 @@ def test_dropped_writes_all_have_their_result() -> None:
 def test_reads_of_an_inactive_station_are_set_aside() -> None:
     dead, living = make_job(station=1), make_job('N9:0', station=2)
     bench = Bench(dead, living)
-    assert bench.scheduler.next_read(0.0) is dead
+    assert bench.next_read(0.0) is dead
     bench.stations.lost(1, 0.5)
     bench.finish(dead, 0.0, 0.5)
     assert bench.read(0.5) is living
@@ -339,9 +359,9 @@ def _simulate(dead: list[ReadJob], living: list[ReadJob], seconds: float,
     lost = {job.station for job in dead}
     now, reads = 0.0, Counter[int]()
     while now < seconds:
-        job = bench.scheduler.next_read(now)
+        job = bench.next_read(now)
         if job is None:
-            due = bench.scheduler.next_due()
+            due = bench.agenda.next_due()
             assert due is not None
             now = max(now + 1e-3, due)
             continue
@@ -377,7 +397,7 @@ def test_stations_that_reply_late_take_no_more_than_an_eighth_of_a_busy_line() -
     now, lost = 0.0, 0.0
     reads = Counter[int]()
     while now < 400:
-        job = bench.scheduler.next_read(now)
+        job = bench.next_read(now)
         assert job is not None
         started = now
         now += 0.02 if job is living else 1.0
@@ -393,10 +413,10 @@ def test_station_that_replies_in_time_again_has_all_its_reads_at_once() -> None:
     late, other, living = make_job(), make_job('N9:0'), make_job(station=2)
     bench = Bench(late, other, living)
     bench.stations[1].overdue = 2
-    assert [bench.read(0.0), bench.scheduler.next_read(0.0)] == [living, late]
+    assert [bench.read(0.0), bench.next_read(0.0)] == [living, late]
     bench.stations[1].overdue = 0
     bench.finish(late, 0.0, 0.02)
-    assert bench.scheduler.next_read(0.02) is other
+    assert bench.next_read(0.02) is other
 
 
 def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> None:
@@ -404,7 +424,7 @@ def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> Non
     bench = Bench(fast, slow, dead)
     bench.stations.lost(2, 0.0)
     assert {bench.read(0.0), bench.read(0.0), bench.read(0.01)} == {fast, slow, dead}
-    bench.scheduler.begin(5.0)
+    bench.reads.begin(5.0)
     assert [bench.read(5.0), bench.read(5.01), bench.read(5.02)] == [dead, fast, slow]
     assert bench.read(5.03) is None
 
@@ -412,19 +432,19 @@ def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> Non
 def test_order_of_the_plan_is_kept_when_the_line_comes_up() -> None:
     jobs = [make_job(f'N{file}:0') for file in range(7, 27)]
     bench = Bench(*jobs)
-    bench.scheduler.begin(5.0)
-    assert [bench.scheduler.next_read(5.0) for _ in jobs] == jobs
+    bench.reads.begin(5.0)
+    assert [bench.next_read(5.0) for _ in jobs] == jobs
 
 
 def test_station_that_is_back_is_not_read_twice_for_what_it_has_missed() -> None:
     job = make_job()
     bench = Bench(job)
     bench.stations.lost(1, 0.0)
-    assert bench.scheduler.next_read(0.0) is None
-    assert bench.scheduler.next_read(8.0) is job
+    assert bench.next_read(0.0) is None
+    assert bench.next_read(8.0) is job
     bench.stations.heard(1, 8.01)
     bench.finish(job, 8.0, 8.02)
-    assert bench.scheduler.next_due() == 8.1
+    assert bench.agenda.next_due() == 8.1
 
 
 def test_line_that_has_nobody_else_probes_every_period() -> None:
@@ -436,8 +456,8 @@ def test_station_that_answers_again_has_all_its_reads_at_once() -> None:
     jobs = [make_job(f'N{file}:0', station=1) for file in (7, 9, 10, 11)]
     bench = Bench(*jobs)
     bench.stations.lost(1, 0.0)
-    assert bench.scheduler.next_read(0.0) is None
-    probe = bench.scheduler.next_read(0.0)
+    assert bench.next_read(0.0) is None
+    probe = bench.next_read(0.0)
     assert probe is not None
     bench.stations.heard(1, 0.1)
     bench.finish(probe, 0.0, 0.1)
@@ -448,11 +468,11 @@ def test_station_that_a_write_has_brought_back_has_its_reads_at_once() -> None:
     job = make_job(station=1)
     bench = Bench(job, make_job(station=2))
     bench.stations.lost(1, 0.0)
-    probe = bench.scheduler.next_read(0.0) or bench.scheduler.next_read(0.0)
+    probe = bench.next_read(0.0) or bench.next_read(0.0)
     while probe is not job:
         assert probe is not None
         bench.finish(probe, 0.0, 0.0)
-        probe = bench.scheduler.next_read(0.0)
+        probe = bench.next_read(0.0)
     bench.finish(job, 0.0, 0.5)
     assert job not in [bench.read(0.6), bench.read(0.6)]
     bench.stations.heard(1, 0.7)  # it refused a write, say
@@ -467,8 +487,8 @@ def test_read_that_shows_a_write_is_due_at_once() -> None:
         bench.read(0.0)
     write = bench.write(WORD, 1, 1.0)
     assert bench.next(1.0) is write
-    bench.scheduler.hasten(write, 1.5)
-    assert bench.scheduler.next_due() == 1.5
+    bench.reads.refresh(write, 1.5)
+    assert bench.agenda.next_due() == 1.5
     assert [bench.read(1.5), bench.read(1.5)] == [covers, None]
     assert bench.read(5.0) is None  # the entry of before is void
     assert covers.due == 11.5
@@ -482,9 +502,9 @@ def test_writes_that_hasten_a_slow_read_leave_nothing_behind() -> None:
     for second in range(1, 1000):
         write = bench.write(WORD, 1, float(second))
         assert bench.next(float(second)) is write
-        bench.scheduler.hasten(write, float(second))
+        bench.reads.refresh(write, float(second))
         assert [bench.read(float(second)), bench.read(float(second))] == [slow, None]
-        assert len(bench.scheduler._reads._heaps[86_400.0]) <= 8
+        assert len(bench.reads._due._heaps[86_400.0]) <= 8
     assert (slow.due, other.due) == (86_400.0 + 999.0, 86_400.0)
     assert bench.read(86_400.0) is other
 
@@ -492,27 +512,27 @@ def test_writes_that_hasten_a_slow_read_leave_nothing_behind() -> None:
 def test_reads_of_a_busy_station_are_passed_over_and_stay_due() -> None:
     one, other = make_job(station=1), make_job(station=2)
     bench = Bench(one, other)
-    assert bench.scheduler.next_read(0.0, busy={1}) is other
-    assert bench.scheduler.next_read(0.0, busy={1}) is None
-    assert bench.scheduler.next_read(0.0) is one
+    assert bench.next_read(0.0, busy={1}) is other
+    assert bench.next_read(0.0, busy={1}) is None
+    assert bench.next_read(0.0) is one
 
 
 def test_writes_to_a_busy_station_wait_and_the_others_go() -> None:
     bench = Bench()
     first = bench.write(WORD, 1, 0.0)
     second = bench.write(make_mapping('N7:5', 'Write', station=2), 1, 0.0)
-    assert bench.scheduler.next_write(0.0, busy={1}) is second
-    assert bench.scheduler.next_write(0.0, busy={1}) is None
-    assert bench.scheduler.next_write(0.0) is first
+    assert bench.writes.next(0.0, busy={1}) is second
+    assert bench.writes.next(0.0, busy={1}) is None
+    assert bench.writes.next(0.0) is first
 
 
 def test_parts_replace_a_job() -> None:
     whole, left, right = make_job(), make_job('N7:1'), make_job('N7:2')
     bench = Bench(whole)
-    assert bench.scheduler.next_read(0.0) is whole
-    bench.scheduler.replace([whole], [left, right], 0.0)
+    assert bench.next_read(0.0) is whole
+    bench.reads.replace([whole], [left, right], 0.0)
     bench.finish(whole, 0.0, 0.0)
-    assert bench.scheduler.jobs == {left, right}
+    assert bench.reads.jobs == {left, right}
     assert [bench.read(0.0), bench.read(0.0), bench.read(0.0)] == [left, right, None]
 
 
@@ -520,27 +540,27 @@ def test_scan_time_is_that_of_the_slowest_job() -> None:
     one, other = make_job(), make_job('N9:0')
     bench = Bench(one, other)
     one.done(1.0)
-    assert bench.scheduler.scan_time is None
+    assert bench.reads.scan_time is None
     one.done(1.5)
     other.done(1.0)
     other.done(3.0)
-    assert bench.scheduler.scan_time == 2.0
+    assert bench.reads.scan_time == 2.0
     other.done(3.1)
-    assert bench.scheduler.scan_time == 0.5
-    assert bench.scheduler.longest_scan_time == 2.0
+    assert bench.reads.scan_time == 0.5
+    assert bench.reads.longest_scan_time == 2.0
 
 
 def test_scan_time_does_not_count_an_outage() -> None:
     job = make_job()
     bench = Bench(job)
-    assert bench.scheduler.longest_scan_time is None
+    assert bench.reads.longest_scan_time is None
     job.done(1.0)
     job.done(1.5)
     job.interrupted()
-    assert bench.scheduler.scan_time is None
+    assert bench.reads.scan_time is None
     job.done(60.0)
     job.done(60.25)
-    assert (bench.scheduler.scan_time, bench.scheduler.longest_scan_time) == (0.25, 0.5)
+    assert (bench.reads.scan_time, bench.reads.longest_scan_time) == (0.25, 0.5)
 
 
 class AnyOrder(RuleBasedStateMachine):
@@ -563,7 +583,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(busy=st.frozensets(st.integers(1, 2)))
     def take_read(self, busy: frozenset[int]) -> None:
-        job = self.bench.scheduler.next_read(self.now, busy)
+        job = self.bench.next_read(self.now, busy)
         if job is not None:
             assert job not in self.taken
             self.taken.append(job)
@@ -583,7 +603,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.spare += 2
         parts = [make_job(f'N{self.spare + n}:0', job.station) for n in range(2)]
         self.jobs += parts
-        self.bench.scheduler.replace([job], parts, self.now)
+        self.bench.reads.replace([job], parts, self.now)
         self.bench.finish(job, self.now, self.now)
 
     @rule(station=st.integers(1, 2), answers=st.booleans())
@@ -605,26 +625,26 @@ class AnyOrder(RuleBasedStateMachine):
             self.sent.append(write)
             if worked:
                 self.bench.stations.heard(write.mapping.station, self.now)
-                self.bench.scheduler.hasten(write, self.now)
+                self.bench.reads.refresh(write, self.now)
 
     @rule()
     def drop(self) -> None:
-        self.bench.scheduler.drop_writes('port', self.now)
-        assert self.bench.scheduler.next_write(self.now) is None
+        self.bench.writes.drop('port', self.now)
+        assert self.bench.writes.next(self.now) is None
 
     @invariant()
     def every_write_is_in_one_place(self) -> None:
         assert len(self.accepted) == len(self.sent) + len(self.bench.results) \
-            + self.bench.scheduler.waiting_writes
+            + len(self.bench.writes)
 
     @invariant()
     def every_job_is_in_one_place(self) -> None:
-        scheduler = self.bench.scheduler
-        entries = itertools.chain(*scheduler._reads._heaps.values())
+        reads = self.bench.reads
+        entries = itertools.chain(*reads._due._heaps.values())
         queued = [job for _, ticket, job in entries
-                  if ticket == job.ticket and job in scheduler.jobs and job not in self.taken]
-        parked = [job for jobs in scheduler._parked.values() for job in jobs]
-        assert scheduler.jobs == set(self.jobs)
+                  if ticket == job.ticket and job in reads.jobs and job not in self.taken]
+        parked = [job for jobs in reads._aside.values() for job in jobs]
+        assert reads.jobs == set(self.jobs)
         # A job that was popped and parked keeps its ticket, but its entry is gone.
         assert Counter(queued + parked + self.taken) == Counter(self.jobs)
 

@@ -19,9 +19,8 @@ A station is asked for its diagnostic status at the start, when it comes back, a
 ``processor_period``; one that nothing is read from gets an echo when it has not been heard for a
 while, or nobody would notice its silence. Link counters are read on request only.
 
-None of these delays a read that is due by more than one transaction: after one of them, every
-read that was due at that moment goes first. They count neither as reads nor in scan times. What
-a station refuses is no fault of it.
+They count neither as reads nor in scan times. What a station refuses is not a fault of it. When a
+check has the line is told in ``agenda``.
 """
 
 from __future__ import annotations
@@ -34,7 +33,6 @@ import math
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Steps
-from abdf1_ros.driver.scheduler import Scheduler
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
@@ -66,13 +64,15 @@ class Check:
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
     It is infinite while the job is under way, and while there is no station to ask.
-    ``period`` is in seconds, infinite for a job that is done once.
+    ``period`` is in seconds, infinite for a job that is done once. ``is_probe`` tells that it asks
+    an inactive station whether it is there again.
     """
 
     station: int
     kind: Kind
     period: float
     due: float = 0.0
+    is_probe: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class StationHealth:
     no_counters: str = ''
 
 
-class Health:
+class Checks:
     """
     The checks of all ``stations``, of which only the ones in ``read`` have reads of their own.
 
@@ -102,11 +102,10 @@ class Health:
     """
 
     def __init__(self, stations: ActiveStationList, read: Container[int], period: float,
-                 scheduler: Scheduler, link_failed: Callable[[int, LinkError], None],
+                 link_failed: Callable[[int, LinkError], None],
                  clock: Callable[[], float]) -> None:
         self.counters_wanted: set[int] = set()
         self._stations = stations
-        self._scheduler = scheduler
         self._link_failed = link_failed
         self._clock = clock
         self._known: dict[int, StationHealth] = {}
@@ -116,7 +115,6 @@ class Health:
         self._checks += [Check(station.number, Kind.ECHO, ECHO_PERIOD)
                          for station in stations if station.number not in read]
         self._next_due = 0.0
-        self._last_start = -math.inf
 
     def known(self, station: int) -> StationHealth:
         """Return what a station has said."""
@@ -159,28 +157,30 @@ class Health:
         """Return when the next check is due (clock value in s), None for never."""
         return None if math.isinf(self._next_due) else self._next_due
 
-    def next_check(self, now: float, busy: Container[int] = ()) -> Check | None:
-        """Return the next check that is due and may go before a read, not of a busy station."""
+    def is_due(self, now: float) -> bool:
+        """Tell whether a check is due."""
         for station in self._requests.take():
             self._add_request(station, now)
-        if now < self._next_due or self._scheduler.is_read_due(self._last_start):
-            return None
+        return now >= self._next_due
+
+    def next(self, now: float, busy: Container[int], echo_from: float  # noqa: A003
+             ) -> Check | None:
+        """
+        Return the next check that is due, not of a busy station.
+
+        An echo may be a probe from the clock value ``echo_from`` (s) on.
+        """
         for check in sorted(self._checks, key=lambda check: check.due):
             if check.due <= now and check.station in busy:
                 return None  # it is next: others in between would make it the turn of reads
             if check.due <= now:
-                check.due = self._wanted_from(check, now)
+                check.due = self._wanted_from(check, echo_from)
                 if check.due <= now:
-                    return self._start(check, now)
+                    check.due, check.is_probe = math.inf, not self._stations[check.station].active
+                    self._plan()
+                    return check
         self._plan()
         return None
-
-    def _start(self, check: Check, now: float) -> Check:
-        check.due = math.inf
-        self._last_start = now
-        self._scheduler.check_goes()
-        self._plan()
-        return check
 
     def steps(self, check: Check) -> Steps:
         """Ask, and take the answer."""
@@ -232,16 +232,14 @@ class Health:
         elif self._stations[check.station].active:
             check.due = next_due
         elif check.kind is Kind.ECHO:
-            now = self._clock()
-            self._scheduler.probe_failed(now)
-            check.due = now + check.period
+            check.due = self._clock() + check.period
         self._plan()
 
-    def _wanted_from(self, check: Check, now: float) -> float:
+    def _wanted_from(self, check: Check, echo_from: float) -> float:
         """Return the clock value (s) from which a check that is due wants the line."""
         station = self._stations[check.station]
         if not station.active:
-            return self._scheduler.probe_from(now) if check.kind is Kind.ECHO else math.inf
+            return echo_from if check.kind is Kind.ECHO else math.inf
         if check.kind is Kind.ECHO and station.last_heard is not None:
             return station.last_heard + check.period
         return check.due

@@ -1,0 +1,139 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Who has the line next: one place decides.
+
+There are three queues. ``writes`` go first, but after four of their commands in a row a check or
+read that is due has its turn. A check, such as the question for a station's mode, goes before
+the reads, but after one every read that was due when it began goes before the next. ``reads`` go
+in the order that ``read_queue`` tells. All that asks a silent station whether it is there again is
+a probe, and keeps to an eighth of the line's time (``probes``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container
+import math
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.checks import Check, Checks, Kind
+from abdf1_ros.driver.job_tasks import JobTask, JobTasks
+from abdf1_ros.driver.points import Write, WriteResult
+from abdf1_ros.driver.probes import Probes
+from abdf1_ros.driver.read_queue import ReadJob
+from abdf1_ros.driver.reads import Reads
+from abdf1_ros.driver.writes import WriteQueue
+
+MAX_WRITES_IN_A_ROW = 4
+
+
+class Agenda:
+    """
+    Say who has the line next, of the ``writes``, the ``checks``, the ``reads``.
+
+    ``tasks`` are those under way: each packet of a write has a turn of its own. A probe usually
+    takes ``probe_time`` seconds. ``patience`` and ``report`` are those of the writes.
+    """
+
+    def __init__(self, stations: ActiveStationList, checks: Checks, tasks: JobTasks, *,
+                 probe_time: float, patience: float,
+                 report: Callable[[WriteResult], None]) -> None:
+        self._stations = stations
+        self._tasks = tasks
+        self._probes, self._write_probes = Probes(probe_time), Probes(probe_time)
+        self.checks = checks
+        self.reads = Reads(stations, self._probes)
+        self.writes = WriteQueue(stations, self._write_probes, patience, report)
+        self._writes_in_a_row = 0
+        self._has_begun_write = False
+        self._last_check = -math.inf
+        self._last_probe_was_echo = False
+
+    def next(self, now: float, busy: Container[int] = (),  # noqa: A003
+             ) -> JobTask | Write | Check | ReadJob | None:
+        """Return who has the line next, nobody for a station in ``busy``; None for nobody."""
+        if self._writes_in_a_row < MAX_WRITES_IN_A_ROW and (write := self._write(now, busy)):
+            return write
+        return self._check(now, busy) or self._read(now, busy) or self._write(now, busy)
+
+    def _write(self, now: float, busy: Container[int]) -> JobTask | Write | None:
+        """Return a new write, or the next packet of one under way, in turns."""
+        under_way = self._tasks.waiting(busy)
+        write = None
+        if under_way is None or not self._has_begun_write:
+            write = self.writes.next(now, busy)
+        self._has_begun_write = write is not None
+        self._writes_in_a_row += (write or under_way) is not None
+        return write or under_way
+
+    def _check(self, now: float, busy: Container[int]) -> Check | None:
+        """Return a check that is due; it does not use up the turn of the reads."""
+        if not self.checks.is_due(now) or self.reads.is_due(self._last_check):
+            return None
+        check = self.checks.next(now, busy, self._echo_from(now))
+        if check is None:
+            return None
+        self._last_check = now
+        self._last_probe_was_echo |= check.is_probe
+        if self.writes:
+            self._writes_in_a_row = MAX_WRITES_IN_A_ROW
+        return check
+
+    def _echo_from(self, now: float) -> float:
+        """
+        Return from when on (clock value in s) an echo may be a probe.
+
+        Where reads of other silent stations wait as well, they take turns.
+        """
+        if now >= self._probes.next and self.reads.has_silent and self._last_probe_was_echo:
+            return now + self._probes.interval
+        return self._probes.next
+
+    def _read(self, now: float, busy: Container[int]) -> ReadJob | None:
+        """Return a probe or read that is due."""
+        job = self.reads.next_probe(now, busy)
+        if job is not None:
+            self._last_probe_was_echo = False
+        else:
+            job = self.reads.next(now, busy)
+        if job is not None:
+            self._writes_in_a_row = 0
+        return job
+
+    def next_due(self) -> float | None:
+        """Return when there is something to do next (clock value in s), None for never."""
+        moments = self.reads.next_due(), self.checks.next_due()
+        return min((moment for moment in moments if moment is not None), default=None)
+
+    def write_ended(self, write: Write, begun: float, now: float, *, is_answered: bool) -> None:
+        """Take note that a write has ended that had the line from ``begun`` on."""
+        self.writes.ended(write)
+        station = write.mapping.station
+        if is_answered or station == BROADCAST or self._stations[station].active:
+            return
+        if self.reads.others_wait:
+            self._write_probes.spend(now - begun if write.is_probe else 0.0, now)
+        else:
+            self._write_probes.wait(0.0, now)
+
+    def check_ended(self, check: Check, begun: float, now: float) -> None:
+        """Take note that a check has ended that had the line from ``begun`` on."""
+        if check.kind is not Kind.ECHO or self._stations[check.station].active:
+            return
+        if self.reads.others_wait:
+            self._probes.spend(now - begun if check.is_probe else 0.0, now)
+        else:
+            self._probes.wait(0.0, now)

@@ -1,0 +1,161 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+All reads of a line: those that are due, in the order of ``read_queue``, and those set aside.
+
+The reads of a station that is inactive, or that acknowledges commands and does not reply to them
+in time, are set aside. Every now and then one of them goes out as a probe.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Container, Iterable
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.points import Write
+from abdf1_ros.driver.probes import Probes
+from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
+
+
+class Reads:
+    """Keep all read jobs; ``probes`` says when one of a silent station may go out."""
+
+    def __init__(self, stations: ActiveStationList, probes: Probes) -> None:
+        self._stations = stations
+        self._probes = probes
+        self._due = ReadQueue()
+        self._aside: dict[int, deque[ReadJob]] = {}
+
+    @property
+    def jobs(self) -> frozenset[ReadJob]:
+        """Return all read jobs."""
+        return frozenset(self._due.jobs)
+
+    @property
+    def has_silent(self) -> bool:
+        """Tell whether reads of silent stations wait for their probe."""
+        return bool(self._aside)
+
+    @property
+    def others_wait(self) -> bool:
+        """Tell whether there is anybody who is kept waiting by a probe."""
+        return bool(self._due)
+
+    @property
+    def scan_time(self) -> float | None:
+        """Return the longest time (s) between the last two good reads of any job."""
+        return max((job.interval for job in self.jobs if job.interval is not None),
+                   default=None)
+
+    @property
+    def longest_scan_time(self) -> float | None:
+        """Return the longest time (s) there has ever been between two good reads of a job."""
+        return max((job.longest for job in self.jobs if job.longest is not None), default=None)
+
+    def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
+        """Put ``new`` jobs, due at once, in the place of ``old`` ones."""
+        self._due.replace(old, new, now)
+
+    def begin(self, now: float) -> None:
+        """Make all reads due at once: there has been no line for a while."""
+        waiting = self._due.jobs.difference(*self._aside.values())
+        for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
+            self._due.put(job, now)
+
+    def next_probe(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
+        """Return the next read of a silent station, when it may go out."""
+        for number in list(self._aside):
+            if self._stations[number].replies_in_time:  # to a write, or to somebody else
+                self.release(number, now)
+        station = next((number for number in self._aside if number not in busy), None)
+        if station is None or now < self._probes.next:
+            return None
+        jobs = self._aside.pop(station)
+        job = jobs.popleft()
+        job.due, job.is_probe = now, True
+        if jobs:
+            self._aside[station] = jobs  # to the end: the next probe is another station's
+        return job
+
+    def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
+        """Return the next read that is due, of a station that answers and is not ``busy``."""
+        passed_over = []
+        while (job := self._due.take(now)) is not None:
+            if not self._stations[job.station].replies_in_time:
+                self._set_aside(job)
+            elif job.station in busy:
+                passed_over.append(job)
+            else:
+                job.is_probe = False
+                break
+        for other in passed_over:
+            self._due.put(other, other.due)
+        return job
+
+    def is_due(self, now: float) -> bool:
+        """Tell whether a read of a station that answers is due."""
+        while (job := self._due.first(now)) is not None:
+            if self._stations[job.station].replies_in_time:
+                return True
+            self._due.take(now)
+            self._set_aside(job)
+        return False
+
+    def next_due(self) -> float | None:
+        """Return when the next read or probe is due (clock value in s), None for never."""
+        due = self._due.next_due()
+        if not self._aside:
+            return due
+        return self._probes.next if due is None else min(due, self._probes.next)
+
+    def ended(self, job: ReadJob, now: float) -> None:
+        """Take a job back, whether it went well or not, unless it has been replaced."""
+        if job not in self._due.jobs:
+            return
+        station = self._stations[job.station]
+        if not station.replies_in_time:
+            if not self._due:
+                self._probes.wait(job.block.period, now)
+            else:
+                self._probes.spend(now - job.started if job.is_probe or station.active else 0.0,
+                                   now)
+            self._set_aside(job)
+            return
+        self.release(job.station, now)
+        if job.is_under_way or job.is_to_repeat:
+            self._due.put(job, job.due)
+        elif job.started < job.refreshed:  # it had begun before the write
+            self._due.put(job, now)
+        else:
+            self._due.put(job, max(job.due + job.block.period, job.started))
+
+    def refresh(self, write: Write, now: float) -> None:
+        """Make the reads that show what ``write`` changed due at once."""
+        self.release(write.mapping.station, now)
+        for job in self._due.jobs:
+            if job.covers(write):
+                job.is_refresh, job.refreshed = True, now
+                if job.due > now:
+                    self._due.put(job, now)
+
+    def release(self, station: int, now: float) -> None:
+        """Make the reads of a station that were set aside due at once."""
+        for job in self._aside.pop(station, ()):
+            self._due.put(job, now)
+
+    def _set_aside(self, job: ReadJob) -> None:
+        job.interrupted()
+        self._aside.setdefault(job.station, deque()).append(job)

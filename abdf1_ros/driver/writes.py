@@ -1,0 +1,153 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The writes that wait for the line.
+
+Of words the newest value waits, of bits all in their order. Those of a station keep their order,
+and two of the same words are never under way together.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container
+import itertools
+import math
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
+from abdf1_ros.driver.probes import Probes
+from abdf1_ros.messages import Message
+
+MAX_WAITING_WRITES = 1000
+
+
+def waited_too_long(seconds: float) -> str:
+    """Return why a write ends that has waited for more than so many seconds."""
+    return f'waited longer than {seconds:g} s for the line'
+
+
+class WriteQueue:
+    """
+    Keep writes until they have the line, but for ``patience`` seconds at most.
+
+    ``report`` gets the results of those that end here. A write to an inactive station is a
+    probe of it; those that follow sooner than ``probes`` allow end unsent. Another thread may
+    only ask for the length.
+    """
+
+    def __init__(self, stations: ActiveStationList, probes: Probes, patience: float,
+                 report: Callable[[WriteResult], None]) -> None:
+        self._stations = stations
+        self._probes = probes
+        self._patience = patience
+        self._report = report
+        self._waiting: deque[Write] = deque()
+        self._under_way: list[Write] = []
+        self._next_expiry = math.inf
+
+    def __len__(self) -> int:
+        """Return how many wait."""
+        return len(self._waiting)
+
+    def add(self, write: Write, now: float) -> None:
+        """
+        Let a write wait, in the place of an older value of its mapping.
+
+        At the end, a topic that never rests would wait for ever. But nothing that was asked for
+        in between of the same words is overtaken: then the older value goes out as well, or two
+        such topics would put each other off for ever.
+        """
+        self._next_expiry = min(self._next_expiry, self._expiry(write))
+        older = [] if write.is_pulse else [
+            old for old in self._waiting if old.mapping is write.mapping]
+        if not older:
+            self._waiting.append(write)
+            return
+        at = self._waiting.index(older[-1])
+        is_overlapped = any(
+            map(write.overlaps, itertools.islice(self._waiting, at + 1, None)))
+        if len(older) > 1 or not is_overlapped:
+            self._waiting.remove(older[-1])
+            self._report(older[-1].result(Outcome.SUPERSEDED, '', now))
+        self._waiting.insert(len(self._waiting) if is_overlapped else at, write)
+
+    def next(self, now: float, busy: Container[int] = ()) -> Write | None:  # noqa: A003
+        """
+        Return the next write, which ends with ``ended``.
+
+        Writes to stations in ``busy`` keep waiting, and so does one of words that are being
+        written: the packets of two must not mix.
+        """
+        self.expire(now)
+        write = self._first_free(busy) if self._waiting else None
+        if write is not None:
+            self._waiting.remove(write)
+            self._under_way.append(write)
+            station = write.mapping.station
+            write.is_probe = station != BROADCAST and not self._stations[station].active
+        return write
+
+    def _first_free(self, busy: Container[int]) -> Write | None:
+        """Return the first write that need not wait."""
+        held_up: set[int] = set()
+        for write in self._waiting:
+            station = write.mapping.station
+            if station in busy or station in held_up:
+                continue
+            if not any(write.overlaps(other) for other in self._under_way):
+                return write
+            held_up.add(station)
+        return None
+
+    def ended(self, write: Write) -> None:
+        """Take note that a write is not under way any more; the next of its words may go out."""
+        self._under_way.remove(write)
+
+    def expire(self, now: float) -> None:
+        """End the writes that are not to be sent any more."""
+        self._next_expiry = math.inf
+        for write in list(self._waiting):
+            reason = self._reject_reason(write, now)
+            if reason:
+                self._waiting.remove(write)
+                self._report(write.result(Outcome.NOT_SENT, reason, now))
+            else:
+                self._next_expiry = min(self._next_expiry, self._expiry(write))
+
+    def next_expiry(self) -> float:
+        """Return when ``expire`` has something to do (clock value in s), infinite for never."""
+        return self._next_expiry
+
+    def drop(self, reason: str, now: float) -> None:
+        """End every waiting write without sending it."""
+        while self._waiting:
+            self._report(self._waiting.popleft().result(Outcome.NOT_SENT, reason, now))
+
+    def _expiry(self, write: Write) -> float:
+        """Return the clock value (s) from which a write is too old."""
+        return write.requested + self._patience
+
+    def _reject_reason(self, write: Write, now: float) -> str:
+        """Return why a write is not to be sent any more, empty if it is."""
+        if now >= self._expiry(write):
+            return waited_too_long(self._patience)
+        station = write.mapping.station
+        # A write has just found it inactive, and others want the line.
+        if now < self._probes.next and station != BROADCAST \
+                and not self._stations[station].active:
+            return Message.ERR_INACTIVE_STATION.line(station)
+        return ''
