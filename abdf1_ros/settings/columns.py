@@ -34,7 +34,8 @@ class Column(NamedTuple):
 MAP_COLUMNS = (
     Column('Tag', None, 'unique name'),
     Column('Command', None,
-           'Read, Write, ReadWrite, or Serve: words of ours that PLCs read and write'),
+           'Read, Write, ReadWrite; Serve: words of ours that PLCs read and write; Heartbeat: a '
+           'word that counts while all is well'),
     Column('Address', None, 'PLC address of the first element'),
     Column('Station', None,
            '0-254; of a Write also 255, all stations, none of which confirms; of a Serve our own'),
@@ -47,7 +48,7 @@ MAP_COLUMNS = (
     Column('Topic', 'Tag', 'name below ~/read/ and ~/write/'),
     Column('Period', 'parameter default_period',
            'ms between reads; 0: as often as the line allows; of a Serve the longest time '
-           'between two writes of the PLC'),
+           'between two writes of the PLC; of a Heartbeat 100-60000, default 1000'),
     Column('Publish', 'Always',
            'Always: after every good read. Change: only new values, and the first after an '
            'outage'),
@@ -65,6 +66,18 @@ MAP_COLUMNS = (
     Column('Processor', '5/03',
            'of an SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
            'limits packets and files; the same in all rows of a station'),
+    Column('Fallback', 'none',
+           'of a Write or Serve: values, separated by spaces, that are written when no good '
+           'message has come for Fallback_After; of a bool 0'),
+    Column('Fallback_After', 'none', 'ms, 200-60000'),
+    Column('Requires', 'none',
+           'of a Heartbeat: write topics, separated by spaces, whose messages it vouches for'),
+    Column('Requires_Timeout', 'none', 'ms that the last good message of each may be old'),
+    Column('Publish_While', 'none',
+           'of a Read: RUN, or the tag of a counter that the program of the PLC runs; values are '
+           'published only while it holds'),
+    Column('Heartbeat_Timeout', 'none',
+           'ms that the counter of Publish_While may stand still'),
 )
 
 COLUMNS = tuple(column.name for column in MAP_COLUMNS)

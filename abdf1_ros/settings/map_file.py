@@ -16,14 +16,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.columns import COLUMNS
-from abdf1_ros.settings.csv_table import read_good_rows, shown
+from abdf1_ros.settings.csv_table import read_good_rows, Row, shown
+from abdf1_ros.settings.heartbeats import counts
 from abdf1_ros.settings.map_row import Fault, RowReader
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.mapping import Command, Mapping
+
+# Reads of a counter that its timeout has to allow for (docs/heartbeats.md, rule 14).
+_LEAST_PERIODS = 3
 
 
 def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
@@ -35,14 +41,61 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
     mappings: list[Mapping] = []
     rows, problems = read_good_rows(path, COLUMNS)
     clashes = _Clashes()
+    kept: dict[int, Row] = {}
     for row in rows:
         reader = RowReader(row)
         mapping = reader.read()
         faults = reader.faults if mapping is None else clashes.add(mapping)
         if mapping is not None and not faults:
             mappings.append(mapping)
+            kept[mapping.item] = row
         problems += [fault.in_file(row) for fault in faults]
+    while broken := list(_broken_links(mappings)):
+        for mapping, fault in broken:
+            if mapping in mappings:
+                mappings.remove(mapping)
+            problems.append(fault.in_file(kept[mapping.item]))
     return mappings, problems
+
+
+def _broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]:
+    """
+    Yield what depends on a row that is not there.
+
+    A row that was left out takes those that depend on it along (docs/heartbeats.md, rule 15).
+    """
+    tags = {mapping.tag: mapping for mapping in mappings}
+    topics = {mapping.topic for mapping in mappings if mapping.writes}
+    for mapping in mappings:
+        for topic in mapping.heartbeat.requires if mapping.heartbeat else ():
+            if topic not in topics:
+                yield mapping, Fault('Requires', f'no good Write, ReadWrite or Serve row has the '
+                                                 f'topic "{shown(topic)}"')
+        condition = mapping.publish_while
+        if condition is None or condition.tag is None:
+            continue
+        counter = tags.get(condition.tag)
+        if counter is None:
+            yield mapping, Fault('Publish_While', 'should be RUN or the tag of a good Read row; '
+                                                  f'"{shown(condition.tag)}" is neither')
+        elif text := _no_counter(mapping, counter):
+            yield mapping, Fault('Publish_While', f'"{shown(condition.tag)}" {text}')
+        elif counter.period and condition.timeout \
+                and condition.timeout < _LEAST_PERIODS * counter.period:
+            yield mapping, Fault(
+                'Heartbeat_Timeout', f'Heartbeat_Timeout {condition.timeout} is less than '
+                f'{_LEAST_PERIODS} x {counter.period} ms, the Period of {shown(counter.tag)}')
+
+
+def _no_counter(mapping: Mapping, counter: Mapping) -> str:
+    """Return why values cannot depend on ``counter``, empty if they can (rule 13)."""
+    if counter.command is not Command.READ:
+        return 'is not a Read row'
+    if counter.station != mapping.station:
+        return f'is of station {counter.station}; a counter of the same PLC is needed'
+    if not counts(counter.type, counter.length):
+        return 'is not one int16 or uint16 word'
+    return 'depends on something itself' if counter.publish_while else ''
 
 
 def _processor(mapping: Mapping) -> Processor | None:
@@ -50,6 +103,16 @@ def _processor(mapping: Mapping) -> Processor | None:
     if mapping.plc_type is not PlcType.SLC or mapping.serves or mapping.station == BROADCAST:
         return None
     return mapping.processor or USUAL
+
+
+def _changes(mapping: Mapping) -> bool:
+    """Tell whether a mapping writes, by messages or by itself."""
+    return mapping.writes or mapping.heartbeat is not None
+
+
+def _owns(mapping: Mapping) -> bool:
+    """Tell whether nobody else may write the words of a mapping (rules 1 and 12)."""
+    return mapping.heartbeat is not None or mapping.fallback is not None
 
 
 class _Clashes:
@@ -60,6 +123,7 @@ class _Clashes:
         self._readers: dict[str, Mapping] = {}
         self._writers: dict[str, Mapping] = {}
         self._slcs: dict[int, Mapping] = {}
+        self._changing: list[Mapping] = []
 
     def add(self, mapping: Mapping) -> list[Fault]:
         """Return the clashes of ``mapping``; without any, it counts for the rows after it."""
@@ -85,7 +149,14 @@ class _Clashes:
         if here and other and (there := _processor(other)) and there is not here:
             clash('Processor', other, f'Processor of station {mapping.station} is {here.value} '
                                       f'here, but {there.value} in the row')
+        for other in self._changing if _changes(mapping) else ():
+            if (_owns(mapping) or _owns(other)) and mapping.shares_words(other):
+                clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '
+                                        f'{mapping.address} shares some with the row')
+                break
         if not faults:
+            if _changes(mapping):
+                self._changing.append(mapping)
             self._names[mapping.name] = mapping
             if here:
                 self._slcs.setdefault(mapping.station, mapping)

@@ -32,6 +32,13 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row, shown
+from abdf1_ros.settings.heartbeats import (
+    DEFAULT_PERIOD,
+    heartbeat_type_fault,
+    read_fallback,
+    read_heartbeat,
+    read_publish_while,
+)
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import row_remarks
@@ -119,10 +126,40 @@ class RowReader:
             station, plc_type, length, value_type or _natural_type(address), topic,
             period, publish, minimum, maximum, word_order, scaling, access, processor)
         self._check(mapping)
+        mapping = self._with_conditions(mapping)
         if self.faults:
             return None
         remarks = tuple(row_remarks(self._row, mapping))
         return replace(mapping, remarks=remarks) if remarks else mapping
+
+    def _with_conditions(self, mapping: Mapping) -> Mapping:
+        """Return the mapping with its heartbeat, fallback and what its values depend on."""
+        row, command, fault = self._row, mapping.command, self._condition_fault
+        heartbeat = None
+        if command is Command.HEARTBEAT:
+            heartbeat = read_heartbeat(row, fault)
+            if text := heartbeat_type_fault(mapping.type, mapping.address.bit is not None):
+                fault('Type' if row.get('Type') else 'Address', text)
+            mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
+        else:
+            for column in ('Requires', 'Requires_Timeout'):
+                if row.get(column):
+                    fault(column, f'{column} is for Heartbeat rows', is_superfluous=True)
+        low, high = mapping.limits
+        limits = max(low, mapping.minimum), min(high, mapping.maximum)
+        fallback = read_fallback(row, command.value, mapping.type, mapping.length, limits, fault)
+        if fallback and mapping.station == BROADCAST:
+            fault('Fallback', 'nobody confirms what is written to station 255',
+                  is_superfluous=True)
+        publish_while = read_publish_while(
+            row, command.value, mapping.publish is Publish.ALWAYS, fault)
+        if publish_while and publish_while.tag == mapping.tag:
+            fault('Publish_While', 'a row cannot depend on itself; name the tag of a counter')
+        return replace(mapping, heartbeat=heartbeat, fallback=fallback,
+                       publish_while=publish_while)
+
+    def _condition_fault(self, column: str, text: str, *, is_superfluous: bool = False) -> None:
+        self._fault(column, text, is_superfluous=is_superfluous)
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:
@@ -236,7 +273,8 @@ class RowReader:
             return
         self._check_values(mapping)
         self._check_extent(mapping)
-        if mapping.writes and not self.faults:
+        changes = mapping.writes or mapping.command is Command.HEARTBEAT
+        if changes and not self.faults:
             self._check_write(mapping)
         for column in ('Min', 'Max'):
             if mapping.type is ValueType.STRING and self._row.get(column):

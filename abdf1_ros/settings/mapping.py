@@ -16,9 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 import math
+from typing import Any
 
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -26,8 +28,24 @@ from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, values_text
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.values import Codec, ValueType, WordOrder
+
+
+def _or_empty(value: int | None) -> str:
+    return '' if value is None else str(value)
+
+
+# By column: the part of a mapping that it stands in, and how that is written.
+_DEPENDENT_CELLS: dict[str, tuple[str, Callable[[Any], str]]] = {
+    'Requires': ('heartbeat', lambda entry: ' '.join(entry.requires)),
+    'Requires_Timeout': ('heartbeat', lambda entry: _or_empty(entry.requires_timeout)),
+    'Fallback': ('fallback', lambda entry: values_text(entry.values)),
+    'Fallback_After': ('fallback', lambda entry: str(entry.after)),
+    'Publish_While': ('publish_while', lambda entry: entry.text),
+    'Heartbeat_Timeout': ('publish_while', lambda entry: _or_empty(entry.timeout)),
+}
 
 
 class Command(Enum):
@@ -37,6 +55,7 @@ class Command(Enum):
     WRITE = 'Write'
     READ_WRITE = 'ReadWrite'
     SERVE = 'Serve'
+    HEARTBEAT = 'Heartbeat'
 
 
 class Publish(Enum):
@@ -55,6 +74,7 @@ class Mapping:
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values.
+    ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
     ``remarks`` say what is odd about the row.
     """
 
@@ -77,6 +97,9 @@ class Mapping:
     scaling: Scaling | None = None
     access: Access | None = None
     processor: Processor | None = None
+    heartbeat: Heartbeat | None = None
+    fallback: Fallback | None = None
+    publish_while: PublishWhile | None = None
     remarks: tuple[str, ...] = field(default=(), compare=False)
     # What turns words into raw values and back, and what is said to the PLC: made once, they
     # are needed at every read.
@@ -115,12 +138,28 @@ class Mapping:
     @property
     def reads(self) -> bool:
         """Tell whether values are published."""
-        return self.command is not Command.WRITE
+        return self.command not in (Command.WRITE, Command.HEARTBEAT)
 
     @property
     def writes(self) -> bool:
-        """Tell whether values are written."""
-        return self.command is not Command.READ
+        """Tell whether values of messages are written."""
+        return self.command not in (Command.READ, Command.HEARTBEAT)
+
+    def shares_words(self, other: Mapping) -> bool:
+        """Tell whether both have words of one station in common; bits only where they meet."""
+        if (self.station, self.address.area) != (other.station, other.address.area):
+            return False
+        unit = 1 if self.type is other.type is ValueType.BOOL else 16
+        first, second = self._extent(unit), other._extent(unit)
+        return first.start < second.stop and second.start < first.stop
+
+    def _extent(self, unit: int) -> range:
+        """Return its place in the area, in steps of ``unit`` bits."""
+        start = self.address.offset * 16
+        if unit == 16:
+            return range(start, start + self.codec.words * 16)
+        start += self.address.bit or 0
+        return range(start, start + self.length)
 
     def cell(self, column: str) -> str:
         """Return a column's value as text, defaults filled in."""
@@ -130,5 +169,9 @@ class Mapping:
         if column in ('Scale', 'Offset'):
             scaling = self.scaling
             return '' if scaling is None else f'{getattr(scaling, column.lower()):.15g}'
+        if column in _DEPENDENT_CELLS:
+            part, text = _DEPENDENT_CELLS[column]
+            entry = getattr(self, part)
+            return '' if entry is None else text(entry)
         value = getattr(self, column.lower())
         return '' if value is None else str(value.value if isinstance(value, Enum) else value)

@@ -41,7 +41,8 @@ def test_cells_as_text_with_defaults_filled_in() -> None:
         'Tag': 'Line speed', 'Command': 'Read', 'Address': 'N7:3', 'Station': '7',
         'PLC_Type': 'PLC5', 'Length': '1', 'Type': 'int16', 'Topic': 'Line_speed', 'Period': '',
         'Publish': 'Always', 'Min': '', 'Max': '', 'Word_Order': 'Low', 'Scale': '',
-        'Offset': '', 'Access': 'Typed', 'Processor': ''}
+        'Offset': '', 'Access': 'Typed', 'Processor': '', 'Fallback': '', 'Fallback_After': '',
+        'Requires': '', 'Requires_Timeout': '', 'Publish_While': '', 'Heartbeat_Timeout': ''}
 
 
 @pytest.mark.parametrize('text, cell', [

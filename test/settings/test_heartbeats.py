@@ -1,0 +1,183 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Heartbeat, Fallback and Publish_While in a map CSV; tests are named by the rule they show."""
+
+from __future__ import annotations
+
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.mapping import Command
+import pytest
+from support.mappings import fault, faults, load_rows, one, row
+
+BEAT = {'Tag': 'beat', 'Command': 'Heartbeat', 'Address': 'N10:0'}
+WRITE = {'Tag': 'speed', 'Command': 'Write', 'Address': 'N10:1'}
+COUNTER = {'Tag': 'counter', 'Command': 'Read', 'Address': 'N11:3', 'Period': '100'}
+DOORS = {'Tag': 'doors', 'Command': 'Read', 'Address': 'B3:0/0', 'Publish_While': 'counter',
+         'Heartbeat_Timeout': '1000'}
+
+
+def tags_of(*rows: str) -> list[str]:
+    """Return the tags of the rows that are good."""
+    return [mapping.tag for mapping in load_rows(*rows)[0]]
+
+
+def test_rule_1_heartbeat_is_one_word_without_a_topic() -> None:
+    mapping = one(**BEAT)
+    assert (mapping.command, mapping.period, mapping.heartbeat) == (
+        Command.HEARTBEAT, 1000, Heartbeat())
+    assert not mapping.reads and not mapping.writes and not mapping.polls
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Address': 'F8:0'}, 'a heartbeat is a word of type int16 or uint16'),
+    ({'Address': 'B3:0/1'}, 'a heartbeat is a word of type int16 or uint16'),
+    ({'Type': 'int32'}, 'a heartbeat is a word of type int16 or uint16'),
+    ({'Length': '2'}, 'a heartbeat is one word; leave the cell empty'),
+    ({'Topic': 'x'}, 'a Heartbeat row has no Topic; leave the cell empty'),
+    ({'Max': '9'}, 'a Heartbeat row has no Max; leave the cell empty'),
+    ({'Publish': 'Change'}, 'a Heartbeat row has no Publish; leave the cell empty'),
+    ({'Fallback': '0'}, 'a Heartbeat row has no Fallback'),
+    ({'Station': '255'}, 'must be less than 255')])
+def test_rule_1_what_a_heartbeat_cannot_be(cells: dict[str, str], text: str) -> None:
+    assert text in fault(**BEAT | cells)
+
+
+@pytest.mark.parametrize('command', ['Write', 'ReadWrite', 'Heartbeat'])
+def test_rule_1_nobody_else_writes_the_word(command: str) -> None:
+    found = faults(row(**BEAT), row(Tag='other', Command=command, Address='N10:0'))
+    assert found == ['3:3 (Address): Item: 2, a heartbeat or a Fallback has its words for itself; '
+                     'N10:0 shares some with the row of item 1 (line 2, tag "beat")']
+
+
+def test_rule_1_words_of_another_station_are_others() -> None:
+    assert tags_of(row(**BEAT), row(Tag='b', Command='Write', Address='N10:0', Station='2'),
+                   row(Tag='c', Command='Read', Address='N10:0')) == ['beat', 'b', 'c']
+
+
+def test_rule_3_requires_topics_with_a_time() -> None:
+    rows = (row(**WRITE), row(**BEAT, Requires='speed', Requires_Timeout='500'))
+    mappings, problems = load_rows(*rows)
+    assert problems == []
+    assert mappings[1].heartbeat == Heartbeat(('speed',), 500)
+    assert (mappings[1].cell('Requires'), mappings[1].cell('Requires_Timeout')) == (
+        'speed', '500')
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Requires': 'speed'}, 'Requires_Timeout is missing: ms from 100 to 3600000'),
+    ({'Requires_Timeout': '500'}, 'Requires_Timeout is for a row with Requires'),
+    ({'Requires': 'nobody', 'Requires_Timeout': '500'},
+     'no good Write, ReadWrite or Serve row has the topic "nobody"')])
+def test_rule_3_requires_without_what_it_needs(cells: dict[str, str], text: str) -> None:
+    assert text in faults(row(**WRITE), row(**BEAT | cells))[0]
+
+
+def test_rule_3_only_a_heartbeat_vouches() -> None:
+    assert 'Requires is for Heartbeat rows' in fault(Requires='a')
+
+
+@pytest.mark.parametrize('period', ['99', '60001', 'x'])
+def test_rule_4_period_of_a_heartbeat(period: str) -> None:
+    assert 'should be' in fault(**BEAT | {'Period': period})
+    assert one(**BEAT | {'Period': '100'}).period == 100
+
+
+@pytest.mark.parametrize(('cells', 'fallback'), [
+    ({'Fallback': '0', 'Fallback_After': '500'}, Fallback((0.0,), 500)),
+    ({'Fallback': '1 -2 3', 'Length': '3', 'Fallback_After': '200'},
+     Fallback((1.0, -2.0, 3.0), 200)),
+    ({'Command': 'Serve', 'Fallback': '7', 'Fallback_After': '60000'}, Fallback((7.0,), 60000)),
+    ({'Address': 'B3:0/4', 'Length': '2', 'Fallback': '0 0', 'Fallback_After': '500'},
+     Fallback((0.0, 0.0), 500)),
+    ({'Scale': '0.1', 'Fallback': '12.5', 'Fallback_After': '500'}, Fallback((12.5,), 500))])
+def test_rule_12_fallback_of_write_and_serve_rows(
+        cells: dict[str, str], fallback: Fallback) -> None:
+    mapping = one(**WRITE | cells)
+    assert mapping.fallback == fallback
+    assert mapping.cell('Fallback_After') == str(fallback.after)
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Fallback': '0'}, 'Fallback_After is missing: ms from 200 to 60000'),
+    ({'Fallback_After': '500'}, 'Fallback is missing: the values to write'),
+    ({'Fallback': '0', 'Fallback_After': '199'}, 'should be ms from 200 to 60000'),
+    ({'Fallback': '0 0', 'Fallback_After': '500'}, 'Fallback has 2 values, Length is 1'),
+    ({'Fallback': '40000', 'Fallback_After': '500'}, 'a number from -32768 to 32767'),
+    ({'Fallback': '9', 'Max': '5', 'Fallback_After': '500'}, 'a number from -32768 to 5'),
+    ({'Fallback': 'stop', 'Fallback_After': '500'}, 'Fallback "stop" should be a number'),
+    ({'Address': 'B3:0/1', 'Fallback': '1', 'Fallback_After': '500'}, 'a bool falls back to 0'),
+    ({'Command': 'ReadWrite', 'Fallback': '0', 'Fallback_After': '500'},
+     'write a Write row and a Read row'),
+    ({'Command': 'Read', 'Fallback': '0', 'Fallback_After': '500'}, 'a Read row has no Fallback'),
+    ({'Address': 'ST9:0', 'Fallback': '0', 'Fallback_After': '500'}, 'a string has no Fallback'),
+    ({'Station': '255', 'Fallback': '0', 'Fallback_After': '500'}, 'nobody confirms')])
+def test_rule_12_what_a_fallback_cannot_be(cells: dict[str, str], text: str) -> None:
+    assert text in fault(**WRITE | cells)
+
+
+def test_rule_12_a_fallback_owns_its_words() -> None:
+    own = WRITE | {'Fallback': '0', 'Fallback_After': '500'}
+    assert 'has its words for itself' in faults(
+        row(**own), row(Tag='b', Command='Write', Address='N10:0', Length='2'))[0]
+    bits = own | {'Address': 'B3:0/0', 'Length': '4', 'Fallback': '0 0 0 0'}
+    # Other bits of the word are written by a mask, so they are others.
+    assert tags_of(row(**bits), row(Tag='b', Command='Write', Address='B3:0/4')) == ['speed', 'b']
+    assert tags_of(row(**bits), row(Tag='b', Command='Write', Address='B3:0/3')) == ['speed']
+    assert tags_of(row(**bits), row(Tag='b', Command='Write', Address='B3:0')) == ['speed']
+
+
+def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
+    assert one(Command='Read', Publish_While='run').publish_while == PublishWhile(None, None)
+    mappings, problems = load_rows(row(**DOORS), row(**COUNTER))
+    assert problems == []
+    assert mappings[0].publish_while == PublishWhile('counter', 1000)
+    assert (mappings[0].cell('Publish_While'), mappings[0].cell('Heartbeat_Timeout')) == (
+        'counter', '1000')
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Command': 'ReadWrite'}, 'Publish_While is for Read rows'),
+    ({'Publish': 'Change'}, 'needs Publish Always'),
+    ({'Publish_While': 'RUN'}, 'RUN has no Heartbeat_Timeout'),
+    ({'Publish_While': 'doors'}, 'cannot depend on itself'),
+    ({'Publish_While': 'nobody'}, 'should be RUN or the tag of a good Read row'),
+    ({'Publish_While': ''}, 'Heartbeat_Timeout is for a row with Publish_While'),
+    ({'Station': '2'}, 'is of station 1; a counter of the same PLC is needed')])
+def test_rule_13_what_values_cannot_depend_on(cells: dict[str, str], text: str) -> None:
+    assert text in faults(row(**DOORS | cells), row(**COUNTER))[0]
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Command': 'Write'}, 'is not a Read row'), ({'Length': '2'}, 'is not one int16'),
+    ({'Address': 'F8:0'}, 'is not one int16'),
+    ({'Publish_While': 'RUN'}, 'depends on something itself')])
+def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
+    assert text in faults(row(**DOORS), row(**COUNTER | cells))[0]
+
+
+def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
+    assert 'Heartbeat_Timeout is missing' in faults(
+        row(**DOORS | {'Heartbeat_Timeout': ''}), row(**COUNTER))[0]
+    assert faults(row(**DOORS | {'Heartbeat_Timeout': '299'}), row(**COUNTER)) == [
+        '2:23 (Heartbeat_Timeout): Item: 1, Heartbeat_Timeout 299 is less than 3 x 100 ms, the '
+        'Period of counter']
+
+
+def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
+    assert tags_of(row(**DOORS), row(**COUNTER | {'Address': 'N11:x'}), row(**WRITE)) == ['speed']
+    bad = WRITE | {'Length': '0'}
+    rows = (row(**bad), row(**BEAT, Requires='speed', Requires_Timeout='500'))
+    assert tags_of(*rows) == []
+    assert len(faults(*rows)) == 2
