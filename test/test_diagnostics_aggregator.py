@@ -26,7 +26,7 @@ from support.simulator_process import OFTEN
 import yaml
 
 FILE = SOURCE / 'config' / 'diagnostics_aggregator.yaml'
-NODES = ['abdf1', 'press_plc', 'paint_plc', 'packing_plc']
+NODES = ['abdf1', 'press/abdf1', 'paint/abdf1', 'packing/abdf1']
 
 
 def analyzers() -> dict[str, Any]:
@@ -42,7 +42,8 @@ def takers(status: str) -> list[str]:
 
 
 def test_entries_are_complete() -> None:
-    assert list(analyzers()) == NODES
+    prefixes = [entry['find_and_remove_prefix'] for entry in analyzers().values()]
+    assert prefixes == [[f'{node}: '] for node in NODES]
     for entry in analyzers().values():
         assert entry['type'] == 'diagnostic_aggregator/GenericAnalyzer'
         assert entry['path']
@@ -54,8 +55,10 @@ def test_every_status_of_a_node_belongs_to_its_entry(node: str) -> None:
     with Observer() as observer:
         inbox = observer.listen(DiagnosticArray, '/diagnostics', EVERYTHING)
         arguments = ros_args(*EXAMPLE_FILES, 'port:=/dev/ttyS99', OFTEN)
-        with Process('node', *arguments, '-r', f'__node:={node}') as process:
+        namespace = node.rpartition('/')[0]
+        with Process('node', *arguments, '-r', f'__ns:=/{namespace}') as process:
             names = [status.name for status in inbox.first().status]
             process.end()
     assert {f'{node}: {what}' for what in ('link', 'counters', 'mappings', 'writes')} < set(names)
-    assert [takers(name) for name in names] == [[node]] * len(names)
+    entry = namespace or 'abdf1'
+    assert [takers(name) for name in names] == [[entry]] * len(names)

@@ -155,31 +155,32 @@ class Driver:
         return [job.block for job in self._reads.jobs]
 
     def write(self, mappings: Sequence[Mapping], values: Sequence[float] | str,
-              now: float) -> None:
+              now: float, request: str = '') -> None:
         """
         Ask for values to be written to all ``mappings``, or to none if one of them refuses.
 
         May be called from any thread, followed by ``LinkThread.wake``. Exactly one WriteResult
-        follows for each mapping, at once when the request is refused.
+        follows for each mapping, at once when the request is refused; ``request`` comes with it.
         """
         reason = self._why_nothing_is_written(len(mappings))
         if reason:
-            self.refuse(mappings, reason, values)
+            self.refuse(mappings, reason, values, request)
             return
         writes, reasons = [], {}
         for mapping in mappings:
             try:
-                writes.append(Write(mapping, values, now))
+                writes.append(Write(mapping, values, now, request))
             except FormatError as error:
                 reasons[mapping] = str(error)
         if reasons:
             tags = ', '.join(mapping.tag for mapping in reasons)
             for mapping in mappings:
-                self.refuse([mapping], reasons.get(mapping, f'{tags} cannot take it'), values)
+                self.refuse([mapping], reasons.get(mapping, f'{tags} cannot take it'), values,
+                            request)
             return
         for write in writes:
             if not self._inbox.put(write):
-                self.refuse([write.mapping], _NOT_OPEN, values)
+                self.refuse([write.mapping], _NOT_OPEN, values, request)
 
     def _why_nothing_is_written(self, count: int) -> str:
         """Return why no value at all can be taken for ``count`` mappings now, empty if it can."""
@@ -199,11 +200,11 @@ class Driver:
         self.health.request_counters(station)
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
-               values: Sequence[float] | str) -> None:
+               values: Sequence[float] | str, request: str = '') -> None:
         """Report that values were not taken for any of ``mappings``."""
         for mapping in mappings:
             self._listener.written(
-                WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0))
+                WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0, request))
 
     def _make_points(self, blocks: Sequence[Block]) -> dict[Mapping, ReadPoint]:
         """Return the points of all mappings that read, in their order."""

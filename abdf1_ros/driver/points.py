@@ -134,7 +134,8 @@ class WriteResult:
     The one result of one write to one mapping.
 
     ``detail`` is empty for a write that went well; ``latency`` is seconds from the request. That
-    of an unsure outcome says what a read has found afterwards, or why there was none.
+    of an unsure outcome says what a read has found afterwards, or why there was none. ``request``
+    is what the requester calls it.
     """
 
     mapping: Mapping
@@ -142,6 +143,7 @@ class WriteResult:
     detail: str
     value: str
     latency: float
+    request: str = ''
 
     def __str__(self) -> str:
         """Return outcome and detail."""
@@ -154,11 +156,14 @@ class Write:
 
     Raises FormatError, saying what is wrong, when they cannot or must not be written.
     ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that
-    it takes. ``is_probe`` tells that its station was inactive when it got the line.
+    it takes. ``is_probe`` tells that its station was inactive when it got the line, ``request``
+    is handed on to the result.
     """
 
-    def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float) -> None:
+    def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
+                 request: str = '') -> None:
         self.mapping = mapping
+        self.request = request
         self.requested = now
         self.is_probe = False
         self.value = show(values)
@@ -203,7 +208,8 @@ class Write:
 
     def result(self, outcome: Outcome, detail: str, now: float) -> WriteResult:
         """Return how this write ended."""
-        return WriteResult(self.mapping, outcome, detail, self.value, now - self.requested)
+        return WriteResult(self.mapping, outcome, detail, self.value, now - self.requested,
+                           self.request)
 
 
 def show(values: Sequence[float] | str) -> str:

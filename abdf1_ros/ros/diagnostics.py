@@ -79,6 +79,7 @@ class Diagnostics:
     """
     All statuses of one node, named ``<node>: <section>``.
 
+    ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
     faults of the rows that the map was read without, ``map_name`` is what the file is called.
     """

@@ -50,6 +50,10 @@ MESSAGES: dict[ValueType, Any] = {
     ValueType.STRING: String,
 }
 
+ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
+    label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])
+"""The layout of ~/active_stations, so that a bare echo says what it shows."""
+
 # Pulses are written one by one, so a burst of them has to fit; it costs no memory before.
 _WRITE_DEPTH = 1000
 

@@ -49,6 +49,7 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import Diagnostics, DuplicateNameWatch, speed_seen
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import (
+    ACTIVE_LAYOUT,
     encoder,
     latched_qos,
     MESSAGES,
@@ -165,7 +166,8 @@ class BridgeNode(Node):
                              configuration.driver_settings(), self)
         self._create_reads()
         self._diagnostics = Diagnostics(
-            self.get_name(), self.driver, configuration.port, configuration.map_problems,
+            self.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
+            configuration.map_problems,
             Path(configuration.parameters.map_file).name)
         self._wrong_types: list[str] = []
         self._diagnostics_period = configuration.parameters.diagnostics_period
@@ -278,7 +280,8 @@ class BridgeNode(Node):
             self._lines.warning(f'writes to {mapping.tag}',
                                 f'write to {mapping.tag} {result.value}: {result}')
         values = {'address': str(mapping.address), 'station': str(mapping.station),
-                  'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}'}
+                  'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}',
+                  'request': result.request}
         self._results.publish(DiagnosticStatus(
             level=level, name=printable(mapping.tag), message=printable(str(result)),
             hardware_id=printable(self._port),
@@ -305,7 +308,7 @@ class BridgeNode(Node):
     def _publish_active(self) -> None:
         """Publish the Active Node Table; nobody is active behind a closed port."""
         words = self.driver.stations.words() if self.link.state.is_open else [0] * 16
-        self._active.publish(UInt16MultiArray(data=words))
+        self._active.publish(UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
 
     def _port_changed(self, state: PortState) -> None:
         if state.text == self._port_text:
@@ -359,7 +362,10 @@ class BridgeNode(Node):
     def _publish_diagnostics(self, now: float) -> None:
         self._next_diagnostics = now + self._diagnostics_period
         message = DiagnosticArray(status=self._diagnostics.statuses(now))
-        message.header.stamp = self.get_clock().now().to_msg()
+        # Time that is simulated may not have begun; 0 would sort before everything.
+        now_ros = self.get_clock().now()
+        stamped = now_ros if now_ros.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
+        message.header.stamp = stamped.to_msg()
         self._diagnostics_publisher.publish(message)
 
     def _reset_counters(self, request: Trigger.Request,

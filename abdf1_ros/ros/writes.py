@@ -30,6 +30,10 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.messages import values_of
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.text import printable
+from std_msgs.msg import String
+
+_LONGEST_LABEL = 100
 
 # Publishers of one topic whose numbers are followed at a time.
 _MOST_PUBLISHERS = 16
@@ -67,6 +71,18 @@ class LossCounter:
         return number - nearest - 1
 
 
+def _request(message: Any, info: Any) -> str:
+    """
+    Return what tells a message from all others of its topic, for its result.
+
+    That is the label which its publisher has put into the layout, or else when it was published
+    (ns): rclpy does not tell who has published it.
+    """
+    if not isinstance(message, String) and message.layout.dim and message.layout.dim[0].label:
+        return printable(message.layout.dim[0].label[:_LONGEST_LABEL])
+    return str(info['source_timestamp'] or '')
+
+
 class WriteTopic:
     """
     The mappings that one topic writes to; ``take`` is the callback of its subscription.
@@ -96,13 +112,14 @@ class WriteTopic:
         stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
         waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
         requested = time.monotonic() - waited
+        request = _request(message, info)
         try:
             self._check_age(waited)
             values = values_of(message)
         except FormatError as error:
-            self._driver.refuse(self._mappings, str(error), message.data)
+            self._driver.refuse(self._mappings, str(error), message.data, request)
         else:
-            self._driver.write(self._mappings, values, requested)
+            self._driver.write(self._mappings, values, requested, request)
             self._wake()
 
     def _check_age(self, age: float) -> None:

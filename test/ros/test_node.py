@@ -22,6 +22,7 @@ import os
 from pathlib import Path
 import signal
 import threading
+import time
 from typing import Any
 
 from abdf1_ros.pccc.address import Address
@@ -31,7 +32,14 @@ from abdf1_ros.ros.node import BridgeNode, main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.node import Node
-from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt8MultiArray
+from std_msgs.msg import (
+    Float32MultiArray,
+    Int16MultiArray,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    UInt8MultiArray,
+    UInt16MultiArray,
+)
 from support.ros import (
     details,
     ERROR,
@@ -483,6 +491,34 @@ def test_plc_of_another_family_than_the_map_says_is_named_in_log_and_diagnostics
     told = [line for line in ''.join(capfd.readouterr()).splitlines() if 'PLC-5/40' in line]
     assert len(told) == 1
     assert told[0].endswith('[abdf1]: station 1 is a PLC-5/40, map.csv:2 says SLC')
+
+
+def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:
+    bench = make_bench(RECIPE)
+    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    for label, values in (('robot_1 7', [1, 2]), ('robot_2\x07', [1])):
+        layout = MultiArrayLayout(dim=[MultiArrayDimension(label=label)])
+        publisher.publish(Int16MultiArray(layout=layout, data=values))
+    before = time.time_ns()
+    publisher.publish(Int16MultiArray(data=[3, 4]))
+    requests = [details(result)['request'] for result in bench.until_results(3)]
+    number, = {*requests} - {'robot_1 7', r'robot_2\x07'}
+    assert len(requests) == 3
+    assert before <= int(number) <= time.time_ns()
+
+
+def test_simulated_time_that_has_not_begun_is_not_put_into_stamps(make_bench: Benches) -> None:
+    bench = make_bench(SPEED, parameters=('use_sim_time:=true',))
+    stamp = bench.diagnostics.next().header.stamp
+    assert abs(stamp.sec - time.time()) < 60
+
+
+def test_table_of_active_stations_says_what_it_is(make_bench: Benches) -> None:
+    bench = make_bench(SPEED)
+    dimension, = bench.observer.listen(
+        UInt16MultiArray, '/abdf1/active_stations').first().layout.dim
+    assert dimension.label == 'station n is active where bit n % 16 of word n / 16 is 1'
+    assert (dimension.size, dimension.stride) == (16, 16)
 
 
 def test_odd_settings_are_told_in_the_log_but_not_without_end(

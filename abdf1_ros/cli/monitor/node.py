@@ -138,14 +138,7 @@ class Watch:
         readings = [self._subscriptions[topic].reading for topic in sorted(self._subscriptions)]
         return Snapshot(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
-            self._active, tuple(self._results), self._remarks())
-
-    def _remarks(self) -> list[str]:
-        base = self.name.rpartition('/')[2]
-        others = [name for name in self._node.get_node_names_and_namespaces()
-                  if name[0] == base and _joined(*name) != self.name]
-        return [f'{_joined(*name)} has the same name on /diagnostics: link, stations, mappings '
-                'and counters below may be those of either' for name in others]
+            self._active, tuple(self._results))
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""
@@ -198,7 +191,7 @@ class Watch:
         return take
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
-        prefix = f'{self.name.rpartition("/")[2]}: '
+        prefix = f'{self.name.lstrip("/")}: '
         statuses = [
             Status(status.name.removeprefix(prefix), _style(status.level), status.message,
                    {pair.key: pair.value for pair in status.values})

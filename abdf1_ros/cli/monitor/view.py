@@ -124,7 +124,6 @@ class Snapshot:
     readings: Sequence[Reading]
     active: Sequence[int] | None
     results: Sequence[Result]
-    remarks: Sequence[str] = ()
 
 
 def render(snapshot: Snapshot, now: float, width: int) -> list[Line]:
@@ -157,8 +156,6 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[Line]:
         yield Line('  no diagnostics yet', Style.WARNING)
     elif now - snapshot.told > _SILENCE:
         yield Line(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
-    for remark in snapshot.remarks:
-        yield Line(f'  {printable(remark)}', Style.WARNING)
 
 
 def _link(snapshot: Snapshot, width: int) -> Iterator[Line]:

@@ -79,7 +79,7 @@ def test_columns_are_as_wide_as_the_longest_name() -> None:
 
 def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
     picture = snapshot(
-        node='/n\x1b[2J', remarks=['\x07'],
+        node='/n\x1b[2J',
         readings=[Reading('na\nme', 'Tank\x1b[31m\n4', 'N7\r', NOW, 1.0)],
         statuses=[Status('link', Style.GOOD, 'OK: \x1b]0;', {'settings': '\x9b1m'}),
                   Status('counters', Style.GOOD, '', {'A\n': '\x00'}),
@@ -139,7 +139,6 @@ def test_only_counters_that_have_counted_are_shown() -> None:
     ({'told': None}, 'no diagnostics yet', Style.WARNING),
     ({'told': NOW - 5}, 'no diagnostics for 5.0 s', Style.BAD),
     ({'readings': []}, 'no read topic found', Style.WARNING),
-    ({'remarks': ['another one']}, 'another one', Style.WARNING),
 ])
 def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: Style) -> None:
     assert line_with(text, snapshot(**changes)).style is style
@@ -170,7 +169,7 @@ def test_values_never_take_more_than_their_width(
 @given(st.integers(min_value=10, max_value=250), st.text(max_size=60), st.text(max_size=400))
 def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) -> None:
     picture = snapshot(
-        readings=[Reading(name, text, name, NOW, 1.0)], remarks=[text],
+        readings=[Reading(name, text, name, NOW, 1.0)],
         statuses=[Status('link', Style.GOOD, text, {'settings': text}),
                   Status('mappings', Style.GOOD, text, {name: text})])
     widths = [len(line) for line in lines(picture, max(width, 20))]
