@@ -47,6 +47,23 @@ class PortState:
     text: str
 
 
+RELEASED = 'the port is left to others: polling is off'
+
+# What ends whatever is under way when files are read again.
+_READ_AGAIN = 'the files have been read again'
+_EXCHANGE_LIMIT = 5.0
+
+
+class _Exchange:
+    """A machine to go on with; ``is_done`` is set when it is on the line."""
+
+    def __init__(self, machine: Machine, while_sending: Callable[[], None], reopen: bool) -> None:
+        self.machine = machine
+        self.while_sending = while_sending
+        self.reopen = reopen
+        self.is_done = threading.Event()
+
+
 class _Attempt(threading.Thread):
     """
     Open a port, in a thread that nobody has to wait for: names may take minutes to be resolved.
@@ -100,6 +117,9 @@ class LinkThread(threading.Thread):
     all there is to send has been handed to the port: nobody on the line waits for what it does.
     ``on_fault`` is called with an exception that is a bug; the machine starts afresh after it.
     Three within a minute end the thread, and ``has_failed`` tells so.
+
+    ``release`` closes the port for others until ``take``. ``exchange`` puts another machine on
+    the line.
     """
 
     def __init__(self, machine: Machine, open_port: Callable[[], Port], *,
@@ -111,6 +131,7 @@ class LinkThread(threading.Thread):
         super().__init__(name='df1 link')
         self.state = PortState(False, 'not opened yet')
         self.has_failed = False
+        self.is_released = False
         self._machine = machine
         self._open_port = open_port
         self._on_state = on_state
@@ -118,6 +139,8 @@ class LinkThread(threading.Thread):
         self._while_sending = while_sending
         self._retry_period = retry_period
         self._clock = clock
+        self._next: _Exchange | None = None
+        self._is_lost = False
         self._stopping = False
         self._is_closed = False
         self._closing = threading.Lock()
@@ -133,10 +156,14 @@ class LinkThread(threading.Thread):
                 with suppress(BlockingIOError):  # it is being woken already
                     os.write(self._wake_writer, b'w')
 
-    def stop(self) -> None:
-        """End the thread, finishing what it does with an error, and wait for its end."""
+    def ask_to_stop(self) -> None:
+        """Begin the end of the thread; ``stop`` waits for it."""
         self._stopping = True
         self.wake()
+
+    def stop(self) -> None:
+        """End the thread, finishing what it does with an error, and wait for its end."""
+        self.ask_to_stop()
         if self.is_alive():
             self.join()
         with self._closing:  # or a wake of another thread would go to another file
@@ -144,6 +171,28 @@ class LinkThread(threading.Thread):
                 self._is_closed = True
                 os.close(self._wake_reader)
                 os.close(self._wake_writer)
+
+    def release(self) -> None:
+        """Close the port, and leave it closed until ``take``; the state tells when it is so."""
+        self.is_released = True
+        self.wake()
+
+    def take(self) -> None:
+        """Open the port again."""
+        self.is_released = False
+        self.wake()
+
+    def exchange(self, machine: Machine, while_sending: Callable[[], None],
+                 reopen: bool) -> bool:
+        """
+        Go on with another machine, on the same port or one that is opened anew.
+
+        Return whether that was so within 5 s; called from one thread only.
+        """
+        exchange = _Exchange(machine, while_sending, reopen)
+        self._next = exchange
+        self.wake()
+        return exchange.is_done.wait(_EXCHANGE_LIMIT)
 
     def run(self) -> None:
         """Keep the port open and the machine running."""
@@ -154,30 +203,42 @@ class LinkThread(threading.Thread):
             self.state = PortState(False, f'internal error: {error!r}')
             self._on_fault(error)
 
+    @property
+    def _is_interrupted(self) -> bool:
+        """Tell whether the port is not wanted, or not as it is."""
+        return self._stopping or self.is_released or (
+            self._next is not None and self._next.reopen)
+
     def _keep_open(self) -> None:
         while not self._stopping and not self.has_failed:
+            self._exchange()
+            if self.is_released:
+                self._set_state(False, RELEASED)
+                self._wait()
+                continue
+            self._is_lost = False
             try:
                 port = self._opened_port()
             except OSError as error:
+                self._is_lost = True
                 self._set_state(False, f'cannot open the port: {_reason(error)}')
             else:
-                if port is None:
-                    return
-                self._set_state(True, 'open')
-                self._run_on(port)
-            if not self._stopping and not self.has_failed:
+                if port is not None:
+                    self._set_state(True, 'open')
+                    self._run_on(port)
+            if self._is_lost and not self.has_failed:
                 self._pause(self._retry_period)
         if self.state.is_open:
             self.state = PortState(False, 'closed')
 
     def _opened_port(self) -> Port | None:
-        """Return the port, None when asked to stop meanwhile; raises OSError."""
+        """Return the port, None when it is not wanted any more; raises OSError."""
         attempt = _Attempt(self._open_port, self.wake)
         attempt.start()
-        while not attempt.is_over and not self._stopping:
-            select.select([self._wake_reader], [], [])
-            self._take_wake()
-        if self._stopping:
+        while not attempt.is_over and not self._is_interrupted:
+            self._exchange()
+            self._wait()
+        if self._is_interrupted:
             attempt.abandon()
             return None
         attempt.join()  # it has nothing left to do but to wake us
@@ -186,15 +247,30 @@ class LinkThread(threading.Thread):
             raise attempt.error
         return attempt.port
 
+    def _exchange(self) -> None:
+        """Put the machine on the line that is to be there."""
+        exchange, self._next = self._next, None
+        if exchange is not None:
+            self._machine.stop(PortLost(_READ_AGAIN))
+            self._while_sending()
+            self._machine, self._while_sending = exchange.machine, exchange.while_sending
+            exchange.is_done.set()
+
     def _run_on(self, port: Port) -> None:
         end = 'the driver is stopping'
         try:
-            self._serve(port)
+            while not self._is_interrupted:
+                self._exchange()
+                self._serve(port)
+            if self.is_released:
+                end = RELEASED
         except OSError as error:
             end = _reason(error)
+            self._is_lost = True
             self._set_state(False, f'the port was lost: {end}')
         except Exception as error:  # a bug must not end the bridge at its first appearance
             end = 'internal error, see the log'
+            self._is_lost = True
             self._take_fault(error)
         finally:
             self._machine.stop(PortLost(end))
@@ -202,12 +278,13 @@ class LinkThread(threading.Thread):
             self._while_sending()  # what was put off until the next frame, which never came
 
     def _serve(self, port: Port) -> None:
+        """Run the machine until something else is wanted."""
         machine, clock = self._machine, self._clock
         machine.send_at_once, machine.unsent = port.write, port.unsent
         # Only there do bytes come at the speed of the line; others may be faster than it is set.
         is_terminal = isinstance(port, DescriptorPort) and os.isatty(port.fileno())
         machine.start(clock())
-        while not self._stopping:
+        while not (self._stopping or self.is_released or self._next):
             data = machine.data_to_send()
             if data:
                 port.write(data)
@@ -238,10 +315,15 @@ class LinkThread(threading.Thread):
         except BlockingIOError:
             return False
 
+    def _wait(self) -> None:
+        """Wait for a wake."""
+        select.select([self._wake_reader], [], [])
+        self._take_wake()
+
     def _pause(self, seconds: float) -> None:
-        """Wait, but not when asked to stop."""
+        """Wait, but not when the port is not wanted any more, or not as it is."""
         end = self._clock() + seconds
-        while not self._stopping and (left := end - self._clock()) > 0:
+        while not self._is_interrupted and (left := end - self._clock()) > 0:
             select.select([self._wake_reader], [], [], left)
             self._take_wake()
 

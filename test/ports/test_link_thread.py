@@ -554,3 +554,74 @@ def test_stop_does_not_wait_for_a_name_server() -> None:
     assert not stuck.closed.is_set()
     stuck.go_on.set()  # the port that nobody waits for any more
     assert stuck.closed.wait(PATIENCE)
+
+
+def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: Link) -> None:
+    script = Script(Step(b'', None))
+    thread = link.start(script.machine, pty.name)
+    assert link.state().is_open
+    assert pty.read(5) == READY
+    thread.release()
+    assert link.state() == PortState(False, 'the port is left to others: polling is off')
+    assert script.end() == repr(PortLost('the port is left to others: polling is off'))
+    open_port(PortSettings(str(pty.name))).close()
+    thread.wake()
+    thread.take()
+    while not link.state().is_open:
+        pass
+    assert pty.read(5) == READY
+
+
+def test_release_while_the_port_cannot_be_opened() -> None:
+    asked = threading.Event()
+
+    def refuse() -> Port:
+        asked.set()
+        raise OSError('no')
+
+    states: queue.Queue[PortState] = queue.Queue()
+    thread = LinkThread(Script().machine, refuse, retry_period=3600.0, on_state=states.put)
+    thread.start()
+    assert asked.wait(PATIENCE)
+    thread.release()
+    while 'left to others' not in states.get(timeout=PATIENCE).text:
+        pass
+    thread.stop()
+
+
+def test_other_machine_goes_on_with_the_same_port(pty: Pty, link: Link) -> None:
+    before, after = Script(Step(b'before', None)), Script(Step(b'after', None))
+    thread = link.start(before.machine, pty.name)
+    assert pty.read(11) == READY + b'before'
+    done: list[str] = []
+    assert thread.exchange(after.machine, lambda: done.append('sent'), reopen=False)
+    assert before.end() == repr(PortLost('the files have been read again'))
+    assert pty.read(10) == READY + b'after'
+    pty.write(ACK)
+    assert after.next() == Control(Code.ACK)
+    assert 'sent' in done
+    assert link.state() == PortState(True, 'open')
+    assert link.states.empty()  # the port has not been closed
+
+
+def test_other_machine_on_a_port_that_is_opened_anew(pty: Pty, link: Link) -> None:
+    before, after = Script(Step(b'', None)), Script(Step(b'', None))
+    thread = link.start(before.machine, pty.name)
+    assert pty.read(5) == READY
+    assert thread.exchange(after.machine, lambda: None, reopen=True)
+    assert before.end().startswith('PortLost(')
+    assert pty.read(5) == READY
+    assert [link.state().is_open, link.state().is_open] == [True, True]
+
+
+def test_other_machine_while_there_is_no_port(tmp_path: Path, link: Link) -> None:
+    after = Script(Step(b'', None))
+    thread = link.start(Script().machine, tmp_path / 'line')
+    assert not link.state().is_open
+    assert thread.exchange(after.machine, lambda: None, reopen=False)
+    pty = Pty(tmp_path / 'line')
+    assert pty.read(5) == READY
+    pty.write(ACK)
+    assert after.next() == Control(Code.ACK)
+    thread.stop()
+    pty.close()
