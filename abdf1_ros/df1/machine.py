@@ -52,8 +52,9 @@ class Step(NamedTuple):
     ``frame`` goes on the line (empty: only listen; None: rest until the time is up or
     ``Machine.wake``, deaf to a half-duplex line). ``timeout`` is in seconds from the moment the
     last byte has left (0: do not wait, None: no limit, KEEP: what is left of the time of the
-    last step). ``delay`` seconds pass before the frame goes out. After ``expires`` (clock value
-    in s) it does not go out any more: CommandExpired is raised at the ``yield``.
+    last step). ``delay`` seconds pass before the frame goes out, and TX_Delay at least, unless it
+    is AT_ONCE. After ``expires`` (clock value in s) it does not go out any more: CommandExpired is
+    raised at the ``yield``.
     """
 
     frame: bytes | None
@@ -78,6 +79,7 @@ _LAST_CHARACTERS = 16
 _RESPONSES = (Control(Code.ACK), Control(Code.NAK))
 
 KEEP = -1.0
+AT_ONCE = -1.0
 LISTEN_ON = Step(b'', KEEP)
 
 Procedure = Generator[Step, Symbol | None, None]
@@ -181,6 +183,11 @@ class Machine:
     def char_time(self) -> float:
         """Return the seconds that a character takes on the line."""
         return self._timing.char_time
+
+    @property
+    def tx_delay(self) -> float:
+        """Return the seconds that pass before each transmission."""
+        return self._timing.tx_delay
 
     @property
     def free_at(self) -> float:
@@ -368,7 +375,7 @@ class Machine:
             self._set_deadline(step.timeout, self.now)
             return False
         delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
-        if delay:
+        if delay and step.delay != AT_ONCE:
             self._pending, self._kept_deadline = step, self.deadline
             self.deadline = max(self.now, self._line_free) + delay
             return False

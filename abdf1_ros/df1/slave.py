@@ -23,7 +23,7 @@ tries again.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -32,11 +32,14 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol, Unknown
-from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.machine import AT_ONCE, Machine, Procedure, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.replies import wrong_message
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
 from abdf1_ros.messages import Event, Message
+
+# How often (s) a slave looks what has become overdue.
+TICK = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,12 +256,49 @@ class Station(Protocol):
         """Return the bytes to send in answer to ``symbol``."""
 
 
+def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
+           look: Callable[[], None] = lambda: None) -> Generator[Step, Symbol | None, None]:
+    """
+    Send what ``handle`` answers to ``symbol``, after TX_Delay; meanwhile ``look`` now and then.
+
+    An answer belongs to what was said last: a master that says something else waits for it no
+    more, and would take it for the answer to that. So a poll or a message behind which there is
+    something else already is passed over, as if it had not been heard.
+    """
+    heard: Symbol | None = symbol
+    while heard is not None:
+        symbol, heard = heard, None
+        if _wants_answer(symbol):
+            heard = yield from _next_within(machine, machine.tx_delay, look)
+        if heard is None and (data := handle(symbol)):
+            yield Step(data, 0, AT_ONCE)
+
+
+def _wants_answer(symbol: Symbol) -> bool:
+    """Tell whether a slave may have to say something now."""
+    return isinstance(symbol, Poll) or (
+        isinstance(symbol, Frame) and symbol.station not in (None, BROADCAST))
+
+
+def _next_within(machine: Machine, seconds: float,
+                 look: Callable[[], None]) -> Generator[Step, Symbol | None, Symbol | None]:
+    """Return what is heard next, if it has been heard already or comes within ``seconds``."""
+    end = machine.now + seconds
+    symbol = machine.decoder.next_symbol()
+    while symbol is None and (left := end - machine.now) > 0:
+        symbol = yield Step(None, min(left, TICK))
+        look()
+    return symbol
+
+
 def multidrop(stations: Sequence[Station]) -> Callable[[Machine], Procedure]:
     """Return the procedure of a machine that is all of ``stations`` on one line."""
+    def handle(symbol: Symbol) -> bytes:
+        return b''.join(station.handle(symbol) for station in stations)
+
     def listen(machine: Machine) -> Procedure:
-        answer = b''
         while True:
-            symbol = yield Step(answer, None)
-            assert symbol is not None  # there is no time limit
-            answer = b''.join(station.handle(symbol) for station in stations)
+            symbol = yield Step(None, None)
+            if symbol is not None:
+                yield from answer(machine, symbol, handle)
     return listen

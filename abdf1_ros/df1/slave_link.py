@@ -28,14 +28,11 @@ from dataclasses import dataclass
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, WrongCommandCode
 from abdf1_ros.messages import Event, Message
-
-# How often (s) a slave looks what has become overdue.
-_TICK = 0.25
 
 
 @dataclass(slots=True)
@@ -80,17 +77,16 @@ class SlaveLink:
         self._slave.reset()
         self._source, self._outstanding = source, None
         self.last_poll = self._machine.now
-        next_look = self._machine.now + _TICK
+        next_look = self._machine.now + TICK
         while True:
             # Not afresh after each symbol: the line may never be still.
             symbol = yield Step(None, max(0.0, next_look - self._machine.now))
-            if symbol is None:
+            if symbol is not None:
+                yield from answer(
+                    self._machine, symbol, self._slave.handle, lambda: self._look_after(source))
+            if self._machine.now >= next_look:
                 self._look_after(source)
-                next_look = self._machine.now + _TICK
-                continue
-            answer = self._slave.handle(symbol)
-            if answer:
-                yield Step(answer, 0)
+                next_look = self._machine.now + TICK
 
     def polled(self) -> None:
         """Take note that the master has polled us."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, EOT, message_frame, NAK, poll_frame
+from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.slave import SlaveSettings
@@ -403,6 +403,94 @@ def test_tx_delay_passes_before_each_answer() -> None:
     bench.now += 0.02
     bench.machine.handle_timeout(bench.now)
     assert bench.machine.data_to_send() == ACK
+
+
+SLOW = LineTiming(tx_delay=0.2)
+
+
+def said_within(bench: SlaveBench, seconds: float) -> list[tuple[float, bytes]]:
+    """Return what the slave says by itself, each with the time from now."""
+    start, end, said = bench.now, bench.now + seconds, []
+    while bench.machine.deadline is not None and bench.machine.deadline <= end:
+        bench.now = bench.machine.deadline
+        bench.machine.handle_timeout(bench.now)
+        if data := bench.machine.data_to_send():
+            said.append((round(bench.now - start, 6), data))
+    bench.now = end
+    return said
+
+
+@pytest.mark.parametrize('later', [poll_frame(OTHER), master_frame(
+    OTHER, FROM_MASTER.encode(), Checksum.CRC), NAK, EOT])
+def test_poll_that_has_expired_during_tx_delay_is_not_answered(later: bytes) -> None:
+    """The master has turned to another station, which is to speak now (M 3-13)."""
+    bench = SlaveBench(SETTINGS, timing=SLOW)
+    bench.poll()
+    assert said_within(bench, 0.15) == []
+    bench.hear(later)
+    assert said_within(bench, 5.0) == []
+    assert 'polls_received' not in bench.counts()
+    bench.poll()
+    assert said_within(bench, 5.0) == [(0.2, EOT)]
+
+
+def test_only_the_last_of_repeated_polls_is_answered() -> None:
+    bench = SlaveBench(SETTINGS, timing=SLOW)
+    bench.add(own())
+    for _ in range(5):
+        bench.poll()
+        assert said_within(bench, 0.1) == []
+    assert said_within(bench, 1.0) == [(0.1, bench.own(own()))]
+    assert 'nak_retries' not in bench.counts()  # what was not sent is no try
+
+
+def test_command_that_has_expired_during_tx_delay_is_executed_when_it_comes_again() -> None:
+    bench = SlaveBench(SETTINGS, timing=SLOW)
+    bench.hear(bench.frame(FROM_MASTER))
+    assert said_within(bench, 0.1) == []
+    bench.hear(bench.frame(FROM_MASTER))
+    assert bench.served == []
+    assert said_within(bench, 1.0) == [(0.2, ACK)]
+    assert bench.served == [FROM_MASTER]
+    assert 'duplicate_messages' not in bench.counts()
+
+
+def test_polls_that_lie_in_the_buffer_are_answered_once() -> None:
+    """This process stood still, and nobody has waited for it."""
+    bench = SlaveBench(SETTINGS)
+    bench.hear(bench.frame(FROM_MASTER))
+    assert bench.hear(3 * poll_frame(US)) == bench.own(FROM_MASTER.reply())
+    assert bench.hear(ACK) == b''
+    assert bench.hear(poll_frame(US) + poll_frame(OTHER)) == b''
+    assert bench.counts()['polls_received'] == 1
+
+
+def test_broadcast_is_executed_whatever_follows_it() -> None:
+    bench = SlaveBench(SETTINGS, timing=SLOW)
+    command = replace(FROM_MASTER, dst=BROADCAST)
+    bench.hear(bench.frame(command, BROADCAST) + poll_frame(US))
+    assert bench.served == [command]
+    assert said_within(bench, 1.0) == [(0.2, EOT)]
+
+
+def test_noise_during_tx_delay_does_not_take_the_answer_away() -> None:
+    bench = SlaveBench(SETTINGS, timing=SLOW)
+    bench.poll()
+    bench.hear(b'\xFF\0')  # as a two-wire driver makes when it is switched off
+    assert said_within(bench, 1.0) == [(0.2, EOT)]
+
+
+def test_what_is_overdue_ends_in_time_during_a_long_tx_delay() -> None:
+    bench = SlaveBench(SETTINGS, timing=LineTiming(tx_delay=30.0), cmd_timeout=1.0)
+    errand = bench.add(own())
+    bench.poll()
+    assert said_within(bench, 30.1) == [(30.0, bench.own(own()))]
+    bench.hear(ACK)
+    begun = bench.now
+    bench.poll()
+    assert said_within(bench, 29.0) == []
+    assert isinstance(errand.result, CommandTimeout)
+    assert errand.ended is not None and 1.0 <= errand.ended - begun <= 1.26
 
 
 def test_frame_that_breaks_off_does_not_swallow_the_next_one() -> None:
