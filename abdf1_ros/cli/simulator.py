@@ -54,12 +54,14 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
+from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
+from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 
 EXIT_FAULT = 1
@@ -75,6 +77,12 @@ examples:
   simulator --full-duplex 1 --pty /tmp/plc --at '3 msg 1 N7:50 11 22'
   simulator --pty /tmp/plc --at '5 silent 2' --at '10 normal 2'
 """
+
+
+# What is told of a ladder; the others blink.
+_LAMPS = {Lamp.ALIVE: 'ROS alive', Lamp.IN_CONTROL: 'ROS in control',
+          Lamp.STOPPED: 'ROS stopped (heartbeat 0)',
+          Lamp.LOST: 'ROS lost (heartbeat stands still)'}
 
 
 class _FaultyPort:
@@ -180,6 +188,8 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
     """Return the PLCs of the data file, or the one that has a line for itself."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic)
+    for station in options.ladder:
+        _run_ladder(station, plcs)
     if options.full_duplex is None:
         return plcs
     for plc in plcs:
@@ -187,6 +197,24 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
             return [plc]
     known = ', '.join(str(plc.station) for plc in plcs)
     raise ValueError(f'--full-duplex: name a station ({known})')
+
+
+def _run_ladder(station: str, plcs: Sequence[SimulatedPlc]) -> None:
+    """Let the program of a station run; its lamps are told when they change."""
+    plc = next((plc for plc in plcs if station == str(plc.station)), None)
+    if plc is None:
+        known = ', '.join(str(plc.station) for plc in plcs)
+        raise ValueError(f'--ladder: name a station ({known})')
+
+    def tell(at: float, lamp: Lamp, is_on: bool) -> None:
+        if lamp in _LAMPS:
+            _say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
+
+    plc.lock = threading.Lock()
+    try:
+        plc.run_ladder(Ladder(plc.table, on_lamp=tell))
+    except NoSuchFile as error:
+        raise ValueError(f'--ladder {station}: {error}; it needs N10, N11, B12 and T13') from None
 
 
 def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
@@ -230,6 +258,9 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                            'printed)')
     line.add_argument('--port', type=_name, help='a serial port, socket://host:port or rfc2217://host:port')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
+    parser.add_argument('--ladder', metavar='STATION', action='append', default=[],
+                        help='its program watches a heartbeat in N10:0 and says when ROS is in '
+                             'control (docs/tutorials/heartbeats.md); may be repeated')
     parser.add_argument('--full-duplex', metavar='STATION',
                         help='this PLC alone, on a full-duplex line')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
@@ -321,6 +352,8 @@ def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
     while not ended.is_set() and (passed := time.monotonic() - begin) < options.seconds:
         while script and script[0][0] <= passed:
             carry_out(script.pop(0)[1])
+        for plc in plcs:
+            plc.advance()
         if select.select(inputs, [], [], 0.05)[0]:
             data = os.read(inputs[0], 4096)
             *lines, rest = (rest + data).split(b'\n')

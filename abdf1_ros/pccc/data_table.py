@@ -89,6 +89,11 @@ class DataTable:
         old = int.from_bytes(self.read(address, 1), 'little')
         self.write(address, (old & ~mask | bits & mask).to_bytes(2, 'little'))
 
+    def restore(self, saved: DataTable) -> None:
+        """Take over all words of a copy of this table."""
+        for area, words in saved._words.items():
+            self._words[area][:len(words)] = words
+
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
         """Return the bytes of the area and where in them the words begin."""
         store = self._words.get(address.area)

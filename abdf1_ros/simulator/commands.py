@@ -35,7 +35,11 @@ commands, on standard input or with --at:
   error STATION STS [EXT]     every reply says this error (hexadecimal)
   normal STATION              it works again
   mode STATION MODE           its processor is in mode run, program, remote (run), test, or
-                              has a fault
+                              has a fault; outside of run nothing moves, but it answers
+  program, test, run STATION  the same as mode STATION program, test, remote
+  download STATION            a program is loaded: words are as at the start, mode program
+  power STATION               it loses power and comes back
+  reset STATION               somebody presses the reset button of its ladder (--ladder)
   counters STATION            say what its port has counted
   msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
   quit                        end the simulator
@@ -45,6 +49,20 @@ _LONGEST = 3_600_000  # ms
 
 # Where a simulated PLC sends its messages: the default Station of a net CSV.
 _BRIDGE_STATION = Network().station
+
+
+_MODES = {'program': Setting.PROGRAM, 'test': Setting.TEST, 'run': Setting.REMOTE}
+
+
+def _press_reset(plc: SimulatedPlc) -> None:
+    if plc.ladder is None:
+        raise CommandError(f'station {plc.station} has no ladder; start with --ladder '
+                           f'{plc.station}')
+    plc.ladder.press_reset()
+
+
+_ACTIONS: dict[str, Callable[[SimulatedPlc], None]] = {
+    'download': SimulatedPlc.download, 'power': SimulatedPlc.cycle_power, 'reset': _press_reset}
 
 
 class CommandError(Exception):
@@ -64,6 +82,11 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
         return _send(plc, arguments[0], arguments[1:], report)
     if verb == 'mode' and len(arguments) == 1:
         return _set_mode(plc, arguments[0])
+    if verb in _MODES and not arguments:
+        return _set_mode(plc, _MODES[verb].value)
+    if verb in _ACTIONS and not arguments:
+        _ACTIONS[verb](plc)
+        return f'station {plc.station}: {verb}'
     if verb == 'counters' and not arguments:
         counts = plc.counters.by_mnemonic().items()
         return f'station {plc.station}: {" ".join(f"{name}={count}" for name, count in counts)}'
@@ -115,7 +138,7 @@ def _byte(text: str) -> int:
 
 def _set_mode(plc: SimulatedPlc, text: str) -> str:
     try:
-        plc.processor.setting = Setting(text)
+        plc.set_mode(Setting(text))
     except ValueError:
         known = ', '.join(setting.value for setting in Setting)
         raise CommandError(f'mode {plc.station} {text}: the modes are {known}') from None

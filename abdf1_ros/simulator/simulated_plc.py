@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Container, Sequence
+from contextlib import AbstractContextManager, nullcontext
+import copy
 from dataclasses import dataclass
 from enum import Enum
 import math
@@ -35,13 +37,14 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.pccc.emulated import EmulatedProcessor
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.settings.csv_table import read_rows, Row
 from abdf1_ros.settings.values import Codec, types_of, ValueType
+from abdf1_ros.simulator.ladder import Ladder
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')
 _RAMP_TOP = 1000
@@ -140,6 +143,10 @@ class SimulatedPlc:
         self._clock = clock
         self._movers: list[_Mover] = []
         self._random = random.Random(seed + station)
+        self.ladder: Ladder | None = None
+        # Taken while the program runs on, where more than one thread lets it.
+        self.lock: AbstractContextManager[object] = nullcontext()
+        self._saved: DataTable | None = None
         self._polls_to_refuse = 0
         self._ready = -math.inf  # clock value (s) from which the last command's reply is there
 
@@ -167,6 +174,59 @@ class SimulatedPlc:
             self._polls_to_refuse = max(0, self._polls_to_refuse - 1)
             return self.damaged(frames.EOT)
         return self.damaged(self.slave.handle(symbol))
+
+    @property
+    def is_running(self) -> bool:
+        """Tell whether its program runs; in PROGRAM and TEST nothing moves or drives outputs."""
+        return bool(self.processor.mode.is_running) and not self.processor.is_faulted
+
+    def run_ladder(self, ladder: Ladder) -> None:
+        """Let a program run from now on; what is in the tables now is what a download restores."""
+        self.ladder = ladder
+        self._saved = copy.deepcopy(self.table)
+        self._set_ladder()
+
+    def set_mode(self, setting: Setting) -> None:
+        """Change the mode, as the key or the programming software does."""
+        self.advance()
+        was_running = self.is_running
+        self.processor.setting = setting
+        if self.is_running != was_running:
+            self._set_ladder()
+
+    def download(self) -> None:
+        """Take a program: its saved words come back, and it stands in PROGRAM."""
+        self.set_mode(Setting.PROGRAM)
+        if self._saved is not None:
+            self.table.restore(self._saved)
+
+    def cycle_power(self) -> None:
+        """Lose power and come back: words stay, what is held for the line does not."""
+        self.advance()
+        self.slave.reset()
+        self._set_ladder()
+
+    def _set_ladder(self) -> None:
+        now = self._clock()
+        for mover in self._movers:
+            mover.next_time = max(mover.next_time, now)
+        if self.ladder is None:
+            return
+        if self.is_running:
+            self.ladder.enter_run(now)
+        else:
+            self.ladder.stand_still()
+
+    def advance(self) -> None:
+        """Let happen what is due by now, while the program runs."""
+        if not self.is_running:
+            return
+        with self.lock:
+            now = self._clock()
+            for mover in self._movers:
+                mover.advance(self.table, now)
+            if self.ladder is not None:
+                self.ladder.advance(now)
 
     def move(self, mover: _Mover) -> None:
         """Let values change from now on."""
@@ -218,8 +278,7 @@ class SimulatedPlc:
         now = self._clock()
         self._polls_to_refuse = self.faults.slow
         self._ready = now + self.faults.delay if self.faults.delay else -math.inf
-        for mover in self._movers:
-            mover.advance(self.table, now)
+        self.advance()
         if self.faults.status:
             sts, *ext_sts = self.faults.status
             return command.reply(bytes(ext_sts), sts)

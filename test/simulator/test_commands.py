@@ -23,6 +23,7 @@ from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.commands import CommandError, execute
+from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import Faults, SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
@@ -145,3 +146,21 @@ def test_message_needs_a_full_duplex_line(plcs: list[SimulatedPlc]) -> None:
     with pytest.raises(CommandError, match='"msg 12 N7:0 5" is no command'):
         execute('msg 12 N7:0 5', plcs)
     assert not plcs[1].outbox
+
+
+@pytest.mark.parametrize(('verb', 'setting'), [
+    ('program', Setting.PROGRAM), ('test', Setting.TEST), ('run', Setting.REMOTE)])
+def test_modes_have_commands_of_their_own(verb: str, setting: Setting) -> None:
+    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 4))
+    assert execute(f'{verb} 1', [plc]) == f'station 1: mode {setting.value}'
+    assert plc.processor.setting is setting
+
+
+def test_download_power_and_reset() -> None:
+    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 4))
+    with pytest.raises(CommandError, match='no ladder; start with --ladder 1'):
+        execute('reset 1', [plc])
+    plc.run_ladder(Ladder(plc.table))
+    for verb in ('reset', 'power', 'download'):
+        assert execute(f'{verb} 1', [plc]) == f'station 1: {verb}'
+    assert plc.processor.setting is Setting.PROGRAM

@@ -26,9 +26,11 @@ from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
 import pytest
-from support.driver_bench import simulated_plc, stored
+from support.driver_bench import simulated_plc, store, stored
 
 HEADER = ','.join(COLUMNS)
 ACKNOWLEDGED = Control(Code.ACK)
@@ -367,3 +369,49 @@ def test_delay_ends_with_the_fault(plc: SimulatedPlc) -> None:
     assert master.poll() == frames.EOT  # this reply was late already
     master.deliver(READ)
     assert master.poll().startswith(frames.STX)
+
+
+def _with_ladder() -> tuple[Clock, SimulatedPlc]:
+    clock = Clock()
+    plc = simulated_plc(1, 'SLC', clock, ('S:0', 4), ('N7:0', 4))
+    plc.run_ladder(Ladder(plc.table))
+    return clock, plc
+
+
+def test_program_stands_still_outside_of_run_but_tables_answer() -> None:
+    clock, plc = _with_ladder()
+    clock.now += 2.0
+    plc.advance()
+    count = stored(plc, 'N11:3')
+    assert count != bytes(2)
+    for setting in (Setting.PROGRAM, Setting.TEST, Setting.FAULT):
+        plc.set_mode(setting)
+        clock.now += 5.0
+        plc.advance()
+        assert stored(plc, 'N11:3') == count
+    plc.set_mode(Setting.REMOTE)
+    clock.now += 1.0
+    plc.advance()
+    assert stored(plc, 'N11:3') != count
+
+
+def test_download_brings_back_the_words_of_the_start() -> None:
+    clock, plc = _with_ladder()
+    store(plc, 'N10:0', [5, 42])
+    plc.download()
+    assert stored(plc, 'N10:0', 2) == bytes(4)
+    assert not plc.is_running
+    clock.now += 3.0
+    plc.set_mode(Setting.REMOTE)
+    plc.advance()
+    assert stored(plc, 'S:1')[1] >> 7 == 1  # the first scan
+
+
+def test_power_cycle_keeps_words_and_begins_anew() -> None:
+    clock, plc = _with_ladder()
+    store(plc, 'N10:0', [5, 42])
+    clock.now += 1.0
+    plc.cycle_power()
+    plc.advance()
+    assert stored(plc, 'N10:0', 2) == bytes([5, 0, 42, 0])
+    assert stored(plc, 'S:1')[1] >> 7 == 1

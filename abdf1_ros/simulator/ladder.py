@@ -1,0 +1,201 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The PLC's side of heartbeats, as a small program on the words of a simulated PLC.
+
+It is the ladder of docs/tutorials/heartbeats.md, rung by rung, with the numbers of its rungs. N10
+is written by the bridge: word 0 its heartbeat, word 1 a command. The rest is the program's own:
+N11 (0 the snapshot, 1 the one before it, 2 the command that the machine may use, 3 the heartbeat
+of the program), T13 (0 watchdog, 1 stable, 2 the program's clock) and the lamps in B12:0.
+
+A scan takes 10 ms, which is the time base of its timers. Nothing moves between two scans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.file_types import FileType
+
+SCAN_TIME = 0.01
+"""Seconds between two scans, and the time base of the timers."""
+
+USUAL_PRESET = 300
+"""Of the watchdog, in scans: 3 s."""
+
+_STABLE = 300
+_PLC_HEARTBEAT = 10
+_LAST_COUNT = 32000
+
+# More than this is not caught up with after a pause of the simulator: the program ran on, and only
+# its last seconds still show.
+_MOST_SCANS = 6000
+
+_DONE, _TIMING, _ENABLED = 1 << 13, 1 << 14, 1 << 15
+_FIRST_PASS = 1 << 15  # S:1/15
+
+
+class Lamp(IntEnum):
+    """Bits of B12:0."""
+
+    CHANGED = 0
+    ALIVE = 1
+    IN_CONTROL = 2
+    RESET = 3
+    STOPPED = 4
+    LOST = 5
+
+
+@dataclass(slots=True)
+class _Timer:
+    """A TON: counts scans while its rung is true, and is done at its preset."""
+
+    preset: int
+    accumulated: int = 0
+    is_done: bool = False
+    is_enabled: bool = False
+
+    def scan(self, is_true: bool) -> None:
+        """Take the rung of this scan."""
+        self.is_enabled = is_true
+        self.accumulated = min(self.accumulated + 1, self.preset) if is_true else 0
+        self.is_done = is_true and self.accumulated >= self.preset
+
+    @property
+    def words(self) -> tuple[int, int, int]:
+        """Return control word, preset and accumulated value."""
+        control = _DONE * self.is_done | _ENABLED * self.is_enabled
+        return control | _TIMING * (self.is_enabled and not self.is_done), self.preset, \
+            self.accumulated
+
+
+class Ladder:
+    """
+    The program of one PLC.
+
+    ``preset`` of the watchdog is in scans. ``on_lamp`` is called with the time (s), a lamp and
+    whether it is on, at every change. Raises NoSuchFile where a file that it needs has another
+    type.
+    """
+
+    def __init__(self, table: DataTable, preset: int = USUAL_PRESET,
+                 on_lamp: Callable[[float, Lamp, bool], None] = lambda at, lamp, on: None) -> None:
+        self._table = table
+        self._on_lamp = on_lamp
+        self._watchdog = _Timer(preset)
+        self._stable = _Timer(_STABLE)
+        self._clock = _Timer(_PLC_HEARTBEAT)
+        self._lamps = 0
+        self._button = False  # is pressed
+        self._button_before = True  # OSR: a button that is stuck gives no edge
+        self._is_first_pass = True
+        self._next_scan: float | None = None
+        for kind, file, words in ((FileType.INTEGER, 10, 2), (FileType.INTEGER, 11, 4),
+                                  (FileType.BINARY, 12, 2), (FileType.TIMER, 13, 9)):
+            table.create(Address(table.plc_type, kind, file, 0), words)
+
+    def is_on(self, lamp: Lamp) -> bool:
+        """Tell whether a lamp is on."""
+        return bool(self._lamps >> lamp & 1)
+
+    def press_reset(self) -> None:
+        """Press the reset button, for one scan."""
+        self._button = True
+
+    def enter_run(self, now: float) -> None:
+        """Begin to run, after PROGRAM, a download or power-up: OTE and TON begin at rest."""
+        for timer in (self._watchdog, self._stable, self._clock):
+            timer.scan(False)
+        self._light(0, now)
+        self._button_before, self._is_first_pass = True, True
+        self._next_scan = now
+
+    def advance(self, now: float) -> None:
+        """Make the scans that are due."""
+        if self._next_scan is None:
+            self.enter_run(now)
+        assert self._next_scan is not None
+        self._next_scan = max(self._next_scan, now - _MOST_SCANS * SCAN_TIME)
+        while self._next_scan <= now:
+            self._scan(self._next_scan)
+            self._next_scan += SCAN_TIME
+
+    def stand_still(self) -> None:
+        """Make no scans until ``enter_run``."""
+        self._next_scan = None
+
+    def _scan(self, now: float) -> None:
+        self._show_first_pass()
+        before, command = self._get(11, 1), self._get(10, 1)
+        heartbeat = self._get(10, 0)
+        self._put(11, 0, heartbeat)  # 0
+        is_changed = heartbeat != before  # 1
+        self._put(11, 1, heartbeat)  # 2
+        self._watchdog.scan(not is_changed)  # 3
+        is_alive = (is_changed or self.is_on(Lamp.ALIVE)) and _signed(heartbeat) > 0 \
+            and not self._watchdog.is_done and not self._is_first_pass  # 4
+        self._stable.scan(is_alive)  # 5
+        is_reset = self._button and not self._button_before  # 6
+        in_control = is_alive and (
+            is_reset and self._stable.is_done and command == 0
+            or self.is_on(Lamp.IN_CONTROL))  # 7
+        self._put(11, 2, command if in_control else 0)  # 8, 9
+        lamps = {Lamp.CHANGED: is_changed, Lamp.ALIVE: is_alive, Lamp.IN_CONTROL: in_control,
+                 Lamp.RESET: is_reset, Lamp.STOPPED: heartbeat == 0,  # 10
+                 Lamp.LOST: self._watchdog.is_done}  # 11
+        self._clock.scan(not self._clock.is_done)  # 12
+        count = self._get(11, 3)
+        if count >= _LAST_COUNT:  # 13
+            count = 0
+        self._put(11, 3, count + self._clock.is_done)  # 14
+        self._light(sum(is_on << lamp for lamp, is_on in lamps.items()), now)
+        for number, timer in enumerate((self._watchdog, self._stable, self._clock)):
+            for word, value in enumerate(timer.words):
+                self._write(FileType.TIMER, 13, number, value, word)
+        self._button_before, self._button = self._button, False
+        self._is_first_pass = False
+
+    def _light(self, lamps: int, now: float) -> None:
+        changed, self._lamps = self._lamps ^ lamps, lamps
+        self._write(FileType.BINARY, 12, 0, lamps)
+        for lamp in Lamp:
+            if changed >> lamp & 1:
+                self._on_lamp(now, lamp, self.is_on(lamp))
+
+    def _show_first_pass(self) -> None:
+        place = Address(self._table.plc_type, FileType.STATUS, 2, 1)
+        try:
+            self._table.write_bits(place, _FIRST_PASS, _FIRST_PASS * self._is_first_pass)
+        except (NoSuchFile, OutOfRange):  # a table need not have a status file
+            return
+
+    def _get(self, file: int, element: int) -> int:
+        place = Address(self._table.plc_type, FileType.INTEGER, file, element)
+        return int.from_bytes(self._table.read(place, 1), 'little')
+
+    def _put(self, file: int, element: int, value: int) -> None:
+        self._write(FileType.INTEGER, file, element, value)
+
+    def _write(self, kind: FileType, file: int, element: int, value: int, word: int = 0) -> None:
+        place = Address(self._table.plc_type, kind, file, element, word)
+        self._table.write(place, value.to_bytes(2, 'little'))
+
+
+def _signed(word: int) -> int:
+    return word - 0x10000 if word & 0x8000 else word
