@@ -3,6 +3,7 @@
 PYTHON ?= python3
 DEMO_SECONDS ?= 20
 FUZZ_SECONDS ?= 60
+MUTANTS ?= 200
 SOAK_HOURS ?= 24
 LONG_RUN_MINUTES ?= 60
 PYTEST_ARGS ?=
@@ -34,7 +35,7 @@ help: ## List the targets
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
 	@echo 'TEST_WORKERS (4: processes of test, more than processors, as many tests wait),'
-	@echo 'FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run).'
+	@echo 'MUTANTS (of mutate), FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run).'
 
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
@@ -104,6 +105,10 @@ noise: $(INSTALLED) ## Run every mode on a noisy line
 .PHONY: long-run
 long-run: $(INSTALLED) ## Run node and simulator with faults for LONG_RUN_MINUTES (60)
 	$(PY) test/soak/long_run.py --minutes $(LONG_RUN_MINUTES)
+
+.PHONY: mutate
+mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes, tell which no test finds (hours)
+	$(PY) test/mutation/run.py --count $(MUTANTS)
 
 .PHONY: audit
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
