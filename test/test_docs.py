@@ -19,14 +19,16 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from dataclasses import fields
 from functools import cache
+from importlib import import_module
+import io
 import os
 from pathlib import Path
 import re
-import subprocess
-import sys
 
+from abdf1_ros.cli.main import COMMANDS as MAINS
 from abdf1_ros.messages import Message
 from abdf1_ros.ros.parameters import Parameters
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -52,10 +54,14 @@ VARIABLES = set(re.findall(r'^(\w+) \?=', (ROOT / 'Makefile').read_text('utf-8')
 @cache
 def help_of(*command: str) -> str:
     """Return what a command says with --help."""
-    done = subprocess.run(
-        [sys.executable, '-m', 'abdf1_ros', *command, '--help'], text=True,
-        capture_output=True, check=True, timeout=60, env=os.environ | {'COLUMNS': '200'})
-    return done.stdout
+    name, *words = command
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(said), \
+            pytest.raises(SystemExit) as ending:
+        patch.setenv('COLUMNS', '200')
+        import_module(MAINS[name]).main([*words, '--help'])
+    assert ending.value.code == 0
+    return said.getvalue()
 
 
 @cache

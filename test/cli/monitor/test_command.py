@@ -17,10 +17,9 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os
-from pathlib import Path
 import pty
 import re
 import select
@@ -30,9 +29,11 @@ import sys
 import termios
 import time
 
+from abdf1_ros.cli.monitor.command import main
 import pytest
 from std_msgs.msg import UInt16MultiArray
-from support.ros import Observer, PATIENCE, Process
+from support.commands import call
+from support.ros import Observer, OK, PATIENCE, Process, until_status
 from support.simulator_process import Files, make_files, READS, STATUSES
 
 NODE = '/cell/line_a'
@@ -48,26 +49,30 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 def simulator(files: Files) -> Iterator[Process]:
     with files.start_simulator() as simulator, \
             Process('node', *files.args(), *ARGUMENTS) as node:
+        with Observer() as observer:
+            until_status(observer.diagnostics(files.port), 'mappings', OK)
         yield simulator
         node.end()
 
 
-def test_one_picture_shows_every_topic_and_status(simulator: Process) -> None:
-    with Process('monitor', '--node', NODE, '--once') as monitor:
-        assert monitor.result() == 0, monitor.text
-    assert NODE in monitor.lines
-    assert '\x1b' not in monitor.text  # no terminal, no colours
+def test_one_picture_shows_every_topic_and_status(
+        simulator: Process, capsys: pytest.CaptureFixture[str]) -> None:
+    said = call(main, capsys, '--node', NODE, '--once')
+    assert said.status == 0, said
+    lines = said.out.splitlines()
+    assert NODE in lines
+    assert '\x1b' not in said.out  # no terminal, no colours
     for topic, (_, address, values) in READS.items():
-        (line,) = [line for line in monitor.lines if line.split()[:1] == [topic]]
+        (line,) = [line for line in lines if line.split()[:1] == [topic]]
         shown = f'"{values}"' if isinstance(values, str) else ' '.join(map(str, values))
         assert line.endswith(shown.replace('.0', '')), line
         assert address in line
         assert ('no promise' if topic == 'recipe' else 'fresh') in line
     for status in STATUSES:
-        assert any(re.match(f' *{status} +OK: ', line) for line in monitor.lines), status
-    assert re.search(r'settings 115200 baud, CRC, .*line load \d+ %', monitor.text)
-    assert 'active stations: 1, 2' in monitor.text
-    assert 'CNT_REPLY_MSGS_RCVD' in monitor.text
+        assert any(re.match(f' *{status} +OK: ', line) for line in lines), status
+    assert re.search(r'settings 115200 baud, CRC, .*line load \d+ %', said.out)
+    assert 'active stations: 1, 2' in said.out
+    assert 'CNT_REPLY_MSGS_RCVD' in said.out
 
 
 def test_pictures_follow_the_loss_of_a_station(simulator: Process) -> None:
@@ -85,12 +90,13 @@ def test_pictures_follow_the_loss_of_a_station(simulator: Process) -> None:
         monitor.end(signal.SIGTERM)
 
 
-def test_it_ends_after_the_time_it_is_given(simulator: Process) -> None:
-    with Process('monitor', '--node', NODE, '--seconds', '2', '--period', '0.1') as monitor:
-        began = time.monotonic()
-        assert monitor.result() == 0
-        assert 1.5 < time.monotonic() - began < PATIENCE
-    assert monitor.lines.count(NODE) > 1
+def test_it_ends_after_the_time_it_is_given(
+        simulator: Process, capsys: pytest.CaptureFixture[str]) -> None:
+    began = time.monotonic()
+    said = call(main, capsys, '--node', NODE, '--seconds', '2', '--period', '0.1')
+    assert said.status == 0
+    assert 1.5 < time.monotonic() - began < PATIENCE
+    assert said.out.splitlines().count(NODE) > 1
 
 
 def test_reader_that_has_seen_enough_ends_it_quietly(simulator: Process) -> None:
@@ -220,30 +226,37 @@ def test_one_picture_has_colours_on_a_terminal(
 # What is refused
 
 
-def refused(status: int, *args: str) -> str:
-    with Process('monitor', *args) as monitor:
-        assert monitor.result() == status, monitor.text
-        assert 'Traceback' not in monitor.text
-        return monitor.lines[-1]
+Refused = Callable[..., list[str]]
 
 
-def test_a_node_that_is_not_there_is_said_with_those_that_are(simulator: Process) -> None:
-    line = refused(1, '--node', '/abdf1', '--wait', '3')
-    assert line == 'monitor: there is no node /abdf1 within 3 s: --node may be one of ' + NODE
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+    """Return what runs a monitor that refuses, and returns all that it says."""
+    def run(status: int, *args: str) -> list[str]:
+        said = call(main, capsys, *args)
+        assert said.status == status, said
+        return said.err.splitlines()
+
+    return run
 
 
-def test_topics_without_a_node_that_is_heard_point_to_another_user() -> None:
+def test_a_node_that_is_not_there_is_said_with_those_that_are(
+        simulator: Process, refused: Refused) -> None:
+    assert refused(1, '--node', '/abdf1', '--wait', '3')[-1] == (
+        'monitor: there is no node /abdf1 within 3 s: --node may be one of ' + NODE)
+
+
+def test_topics_without_a_node_that_is_heard_point_to_another_user(refused: Refused) -> None:
     with Observer() as observer:
         observer.node.create_publisher(UInt16MultiArray, '/ghost/active_stations', 1)
-        assert refused(1, '--node', 'ghost', '--wait', '4') == (
+        assert refused(1, '--node', 'ghost', '--wait', '4')[-1] == (
             'monitor: /ghost is seen, but nothing is heard of it within 4 s: programs of one '
             'machine have to run as the same user')
 
 
-def test_progress_is_told_while_nothing_is_found(tmp_path: Path) -> None:
-    with Process('monitor', '--node', 'nowhere', '--wait', '2.4') as monitor:
-        monitor.wait_for('monitor: looking for /nowhere, 0 s more')
-        assert monitor.result() == 1
+def test_progress_is_told_while_nothing_is_found(refused: Refused) -> None:
+    assert 'monitor: looking for /nowhere, 0 s more' in refused(
+        1, '--node', 'nowhere', '--wait', '2.4')
 
 
 @pytest.mark.parametrize(('args', 'text'), [
@@ -253,12 +266,13 @@ def test_progress_is_told_while_nothing_is_found(tmp_path: Path) -> None:
     (('--wait', 'nan'), '"nan" should be a number of seconds above 0'),
     (('--ros-args', '-p', 'x'), "Couldn't parse"),
 ])
-def test_bad_options_are_refused_in_one_line(args: tuple[str, ...], text: str) -> None:
-    assert text in refused(2, *args)
+def test_bad_options_are_refused_in_one_line(
+        args: tuple[str, ...], text: str, refused: Refused) -> None:
+    assert text in refused(2, *args)[-1]
 
 
-def test_help_has_examples_and_exit_statuses() -> None:
-    with Process('monitor', '--help') as monitor:
-        assert monitor.result() == 0
-    assert 'exit status: 0' in monitor.text
-    assert '  monitor --node /cell/line_1' in monitor.lines
+def test_help_has_examples_and_exit_statuses(capsys: pytest.CaptureFixture[str]) -> None:
+    said = call(main, capsys, '--help')
+    assert said.status == 0
+    assert 'exit status: 0' in said.out
+    assert '  monitor --node /cell/line_1' in said.out.splitlines()
