@@ -338,6 +338,7 @@ def test_what_is_written_is_confirmed_and_comes_back(
     assert 0 < float(said.pop('latency_ms')) < 5000
     assert said == {'address': address, 'station': station, 'value': shown}
     inbox.values(values)
+    inbox.clear()  # of what it was at first
     assert bridge.write(tag, before).message == 'written'
     inbox.values(before)
     bridge.observer.forget(inbox)
@@ -415,7 +416,7 @@ def test_write_that_the_plc_refuses_has_failed(bridge: Bridge) -> None:
             r'STS 60: .+', status.message), status.message
     with bridge.fault('error 2 F0 0B'):
         result = bridge.write('setpoint', [3.0])
-        assert 'STS F0 EXT STS 0B: no access: privilege missing' in result.message
+        assert 'STS F0 EXT STS 0B: access denied' in result.message
     setpoint = bridge.listen('setpoint')
     assert values_in(setpoint.first()) == [21.5]
     bridge.observer.forget(setpoint)
