@@ -1,0 +1,160 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Have the PLC do a job once, and know whether it has.
+
+A handshake of three numbers, each an int16 word. ROS writes REQUEST, the number of the job; the
+program of the PLC copies it to BUSY when it begins and to DONE when it has finished::
+
+    NEQ request done  NEQ request busy  GRT request 0   MOV request busy, begin the job
+    (the job has finished)                              MOV busy done
+
+The race that people build without it: a bit "start" is set, and a bit "done" is waited for. Done
+is still set from the job before, so the robot drives on before this job has begun. A number that
+was never used before cannot be mistaken for an old one.
+
+Needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done. The
+request is published at a steady rate while the job runs, so the row may have a Fallback of 0: then
+the PLC also learns when this program dies.
+
+Exit status: 0 done, 1 not done and not begun, 3 unknown.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from enum import Enum
+import signal
+import sys
+import time
+
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from std_msgs.msg import Int16MultiArray
+
+DONE, NOT_BEGUN, UNKNOWN = 0, 1, 3
+
+_LAST_NUMBER = 32767
+_PERIOD = 0.2  # s between two messages of a request; the first comes at once
+
+
+class Step(Enum):
+    """Where a job is."""
+
+    WAITING = 'the PLC has not begun'
+    BUSY = 'the PLC is busy with it'
+    DONE = 'done'
+
+
+def next_number(busy: int, done: int) -> int:
+    """Return a number that neither the job under way nor the last one has."""
+    number = max(busy, done, 0) % _LAST_NUMBER + 1
+    while number in (busy, done):
+        number = number % _LAST_NUMBER + 1
+    return number
+
+
+def step_of(number: int, busy: int, done: int) -> Step:
+    """Return where job ``number`` is, from what the PLC says."""
+    if done == number:
+        return Step.DONE
+    return Step.BUSY if busy == number else Step.WAITING
+
+
+class Handshake(Node):
+    """Requests jobs over the bridge ``bridge``."""
+
+    def __init__(self, bridge: str) -> None:
+        super().__init__('handshake')
+        # The last value at once, but none that is older than the bridge's stale time.
+        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._state: tuple[int, int] | None = None
+        self.create_subscription(Int16MultiArray, f'{bridge}/read/job_state', self._take, qos)
+        self._requests = self.create_publisher(Int16MultiArray, f'{bridge}/write/job_request', 1)
+
+    def run(self, begin_within: float, done_within: float) -> int:
+        """Have one job done; times in seconds. Returns the exit status."""
+        if not self._spin(lambda: self._state is not None
+                          and self._requests.get_subscription_count() > 0, begin_within):
+            print('not begun: no job_state from the PLC, or nobody takes job_request')
+            return NOT_BEGUN
+        assert self._state is not None
+        number = next_number(*self._state)
+        print(f'job {number} requested', flush=True)
+        step = self._request(number, begin_within, lambda step: step is not Step.WAITING)
+        if step is Step.WAITING:
+            # It may still begin: take the request back, then look once more.
+            step = self._request(0, begin_within, lambda step: False, number)
+        if step is Step.BUSY:
+            print(f'job {number} has begun', flush=True)
+            step = self._request(number, done_within, lambda step: step is Step.DONE)
+        self._requests.publish(Int16MultiArray(data=[0]))
+        print(f'job {number}: {step.value}')
+        return {Step.DONE: DONE, Step.WAITING: NOT_BEGUN, Step.BUSY: UNKNOWN}[step]
+
+    def _request(self, value: int, seconds: float, is_enough: Callable[[Step], bool],
+                 number: int = 0) -> Step:
+        """Publish ``value`` at a steady rate until the step of the job is enough."""
+        end, due, step = time.monotonic() + seconds, 0.0, Step.WAITING
+        while time.monotonic() < end and not is_enough(step):
+            if time.monotonic() >= due:
+                due = time.monotonic() + _PERIOD
+                self._requests.publish(Int16MultiArray(data=[value]))
+            rclpy.spin_once(self, timeout_sec=0.05)
+            assert self._state is not None
+            step = step_of(number or value, *self._state)
+        return step
+
+    def _take(self, message: Int16MultiArray) -> None:
+        busy, done = message.data
+        self._state = busy, done
+
+    def _spin(self, condition: Callable[[], bool], seconds: float) -> bool:
+        end = time.monotonic() + seconds
+        while not condition() and time.monotonic() < end:
+            rclpy.spin_once(self, timeout_sec=0.05)
+        return condition()
+
+
+def main() -> int:
+    """Parse the arguments and have one job done."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
+    parser.add_argument('--begin-within', type=float, default=5.0, metavar='S',
+                        help='s until the PLC has to begin (default: %(default)g)')
+    parser.add_argument('--done-within', type=float, default=60.0, metavar='S',
+                        help='s until the job has to be done (default: %(default)g)')
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = Handshake(options.node)
+    try:
+        return node.run(options.begin_within, options.done_within)
+    except KeyboardInterrupt:
+        print('unknown: interrupted')
+        return UNKNOWN
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,84 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The handshake of a job, against a PLC as this test plays it on the topics of a bridge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import runpy
+
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int16MultiArray
+from support.ros import Observer, Process
+
+EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'handshake.py'
+HANDSHAKE = runpy.run_path(str(EXAMPLE))
+
+Plc = Callable[[int, list[int]], None]
+"""Is given a request and changes the words busy and done."""
+
+
+def run(plc: Plc, state: list[int], *args: str) -> tuple[int, list[str], list[int]]:
+    """Return exit status and lines of the example, and the requests that came."""
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    requests: list[int] = []
+    with Observer() as observer:
+        states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', latched)
+        states.publish(Int16MultiArray(data=state))
+
+        def take(message: Int16MultiArray) -> None:
+            requests.append(message.data[0])
+            plc(message.data[0], state)
+            states.publish(Int16MultiArray(data=state))
+
+        observer.node.create_subscription(Int16MultiArray, '/fake/write/job_request', take, 10)
+        with Process(EXAMPLE, '--node', '/fake', *args) as example:
+            observer.until(lambda: not example.is_running, 'the example to end')
+            return example.result(), example.lines, requests
+
+
+def test_job_is_done_when_the_plc_has_its_number() -> None:
+    def work(request: int, state: list[int]) -> None:
+        if request and state[0] != request:
+            state[0] = request
+        elif request:
+            state[1] = request
+
+    status, lines, requests = run(work, [4, 4], '--begin-within', '10')
+    assert (status, lines) == (
+        0, ['job 5 requested', 'job 5 has begun', 'job 5: done'])
+    assert requests[0] == 5
+
+
+def test_done_of_the_job_before_counts_for_nothing() -> None:
+    status, lines, requests = run(lambda request, state: None, [4, 4], '--begin-within', '3')
+    assert (status, lines[-1]) == (1, 'job 5: the PLC has not begun')
+    assert requests[-1] == 0  # the request has been taken back
+
+
+def test_job_that_is_not_done_in_time_is_unknown() -> None:
+    def begin(request: int, state: list[int]) -> None:
+        state[0] = request or state[0]
+
+    status, lines, _ = run(begin, [0, 0], '--begin-within', '10', '--done-within', '0.5')
+    assert (status, lines[-1]) == (3, 'job 1: the PLC is busy with it')
+
+
+@pytest.mark.parametrize(('busy', 'done', 'number'), [
+    (0, 0, 1), (4, 4, 5), (5, 4, 6), (32767, 32767, 1), (32767, 1, 2), (-5, -5, 1)])
+def test_number_is_one_that_was_not_used_last(busy: int, done: int, number: int) -> None:
+    assert HANDSHAKE['next_number'](busy, done) == number
