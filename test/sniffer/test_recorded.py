@@ -1,0 +1,36 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sniffer on what was recorded between our programs and those of others."""
+
+from __future__ import annotations
+
+from abdf1_ros.sniffer.entries import Kind
+from abdf1_ros.sniffer.session import Session
+import pytest
+from support.captures import Capture, CAPTURES, FOLDER
+
+_BAD = (Kind.DAMAGED, Kind.UNKNOWN, Kind.NOISE)
+
+
+@pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)
+def test_everything_is_understood_and_the_check_is_found(capture: Capture) -> None:
+    session = Session()
+    entries = [entry for chunk in capture.chunks for entry in session.feed(chunk)]
+    assert session.kind.checksum is capture.check
+    assert [entry for entry in entries if entry.kind in _BAD or entry.valid is False] == []
+
+
+def test_every_recorded_file_is_in_the_index() -> None:
+    assert {path.stem for path in FOLDER.glob('*.cap')} == {entry.name for entry in CAPTURES}
