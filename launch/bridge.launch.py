@@ -20,17 +20,38 @@ file says, holds. ``ros2 launch abdf1_ros bridge.launch.py --show-args`` lists t
 """
 
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, TimerAction
+from launch.events.process import ProcessExited
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
+from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
 # Parameters of the node that have an argument here; all are strings.
 PARAMETERS = ('net_file', 'map_file', 'port')
 
+# Exit status for faulty files or parameters, which do not become better by trying again.
+FAULTY = 2
+RESPAWN_DELAY = 2.0
+YES, NO = ('true', 'True'), ('false', 'False')
+
 
 def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """Return the node, with the arguments that were given."""
-    arguments = context.launch_configurations
+    # A copy: when the node ends, those of the context may be others.
+    return [bridge(dict(context.launch_configurations))]
+
+
+def bridge(arguments: dict[str, str]) -> Node:
+    """Return a bridge that starts again as ``arguments`` say, unless it has refused them."""
+    def started_again(event: ProcessExited,
+                      context: LaunchContext) -> list[LaunchDescriptionEntity]:
+        if arguments['respawn'] not in YES or context.is_shutdown:
+            return []
+        if event.returncode == FAULTY:
+            return [LogInfo(msg=f'{event.process_name}: not started again after status {FAULTY}, '
+                                'which is for faulty files or parameters')]
+        return [TimerAction(period=RESPAWN_DELAY, actions=[bridge(arguments)])]
+
     # As ParameterValue, because a bare string that reads like a number would become one.
     given = {name: ParameterValue(arguments[name], value_type=str)
              for name in PARAMETERS if arguments[name]}
@@ -40,18 +61,25 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
         parameters.append(ParameterFile(arguments['params_file'], allow_substs=True))
     if given:
         parameters.append(given)
-    return [Node(
+    return Node(
         package='abdf1_ros',
         executable='node',
         namespace=arguments['namespace'],
         name=arguments['name'],
         parameters=parameters,
-        arguments=['--ros-args', '--log-level', arguments['log_level']],
+        ros_arguments=['--log-level', f'{logger(arguments)}:={arguments["log_level"]}'],
         output='screen',
         emulate_tty=True,
-        respawn=arguments['respawn'] == 'true',
-        respawn_delay=2.0,
-    )]
+        on_exit=started_again,
+    )
+
+
+def logger(arguments: dict[str, str]) -> str:
+    """Return the name of the node's logger; a level without one is also that of rcl and rmw."""
+    namespace = make_namespace_absolute(
+        prefix_namespace(arguments.get('ros_namespace'), arguments['namespace']))
+    parts = [*(namespace or '').split('/'), arguments['name']]
+    return '.'.join(part for part in parts if part)
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -68,16 +96,18 @@ def generate_launch_description() -> LaunchDescription:
             description='serial device or pyserial URL; empty: Com_Port of the net file'),
         DeclareLaunchArgument(
             'params_file', default_value='',
-            description='YAML file of further parameters; empty: none'),
+            description='YAML file of further parameters; empty: none. Launch fills in $(...) '
+                        'everywhere in it, also in comments'),
         DeclareLaunchArgument(
             'namespace', default_value='', description='namespace of the node'),
         DeclareLaunchArgument('name', default_value='abdf1', description='name of the node'),
         DeclareLaunchArgument(
             'log_level', default_value='info',
             choices=['debug', 'info', 'warn', 'error', 'fatal'],
-            description='least severity that is logged'),
+            description='least severity that the node logs; that of rcl and rmw stays as it is'),
         DeclareLaunchArgument(
-            'respawn', default_value='false', choices=['true', 'false'],
-            description='start the node again, after 2 s, whenever it ends'),
+            'respawn', default_value='false', choices=[*YES, *NO],
+            description='start the node again, after 2 s, when it ends; not after status 2, '
+                        'faulty files or parameters'),
         OpaqueFunction(function=start_node),
     ])

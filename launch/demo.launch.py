@@ -12,22 +12,36 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Start a simulated PLC on a pseudo-terminal, and the bridge on that: no hardware needed."""
+"""
+Start a simulated PLC on a pseudo-terminal, and the bridge on that: no hardware needed.
+
+What is given beside the port, for instance log_level:=debug, is passed on to the bridge.
+"""
 
 from launch import LaunchDescription
-from launch.actions import ExecuteProcess, IncludeLaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import PathJoinSubstitution, ThisLaunchFileDir
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
 PORT = '/tmp/abdf1_demo'
 
+# Arguments of the bridge that have another default here, or the same; its port is the simulator's.
+DEFAULTS = {'params_file': '', 'namespace': '', 'name': 'abdf1', 'log_level': 'info',
+            'respawn': 'false'}
+
 
 def generate_launch_description() -> LaunchDescription:
     """Start the simulator and the bridge; the bridge waits for the port by itself."""
-    bridge = PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])
     config = PathJoinSubstitution([FindPackageShare('abdf1_ros'), 'config'])
+    files = {f'{name}_file': PathJoinSubstitution([config, f'{name}.csv'])
+             for name in ('net', 'map')}
+    defaults = files | DEFAULTS
+    passed_on = {name: LaunchConfiguration(name) for name in defaults}
     return LaunchDescription([
+        *(DeclareLaunchArgument(
+            name, default_value=default, description='passed on to bridge.launch.py')
+          for name, default in defaults.items()),
         # No Node action: that would add --ros-args, and the simulator is no ROS node.
         ExecuteProcess(
             cmd=[ExecutableInPackage('simulator', 'abdf1_ros'), '--pty', PORT],
@@ -36,10 +50,8 @@ def generate_launch_description() -> LaunchDescription:
             emulate_tty=True,
         ),
         IncludeLaunchDescription(
-            PythonLaunchDescriptionSource(bridge),
-            launch_arguments={
-                'net_file': PathJoinSubstitution([config, 'net.csv']),
-                'map_file': PathJoinSubstitution([config, 'map.csv']),
-                'port': PORT}.items(),
+            PythonLaunchDescriptionSource(
+                PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])),
+            launch_arguments={**passed_on, 'port': PORT}.items(),
         ),
     ])

@@ -15,9 +15,8 @@
 """
 Start the bridges of a cell with three serial lines, each in the namespace of its machine.
 
-What differs between them stands in config/three_lines.yaml; copy both files and change them.
-The names differ too, not only the namespaces: a status on /diagnostics has the name of its node
-alone. A bridge that ends by itself is started again.
+What differs between them stands in config/three_lines.yaml; copy both files and change them. A
+bridge that ends by itself is started again, unless its files or parameters are faulty.
 """
 
 from launch import LaunchDescription
@@ -26,14 +25,14 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
 from launch_ros.substitutions import FindPackageShare
 
-# Namespace and name of each bridge: values are on /press/press_plc/read/... and so on.
-LINES = (('press', 'press_plc'), ('paint', 'paint_plc'), ('packing', 'packing_plc'))
+# The namespaces: values are on /press/abdf1/read/... and so on.
+LINES = ('press', 'paint', 'packing')
 
 
-def line(namespace: str, name: str) -> GroupAction:
+def line(namespace: str) -> GroupAction:
     """Return one bridge, in a scope of its own so that no argument reaches the next."""
     bridge = PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])
-    arguments = {'namespace': namespace, 'name': name, 'respawn': 'true',
+    arguments = {'namespace': namespace, 'respawn': 'true',
                  'params_file': LaunchConfiguration('lines_file')}
     return GroupAction([IncludeLaunchDescription(
         PythonLaunchDescriptionSource(bridge), launch_arguments=arguments.items())])
@@ -47,5 +46,5 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'lines_file', default_value=lines_file,
             description='YAML file with the parameters of the three bridges'),
-        *(line(namespace, name) for namespace, name in LINES),
+        *map(line, LINES),
     ])

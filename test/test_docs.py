@@ -42,6 +42,9 @@ ROOT = documents.ROOT
 COMMANDS = tuple(re.findall(r"'(\w+) = \{PACKAGE\}", (ROOT / 'setup.py').read_text('utf-8')))
 OURS = re.compile(rf'(?:ros2 run abdf1_ros |python3? -m abdf1_ros\.|^(?:\$ )?)'
                   rf'({"|".join(COMMANDS)})\b(.*)')
+LAUNCH_ARGUMENTS = set(re.findall(
+    r"DeclareLaunchArgument\(\s*'(\w+)'",
+    (documents.ROOT / 'launch' / 'bridge.launch.py').read_text('utf-8')))
 PARAMETERS = {entry.name for entry in fields(Parameters)} | {
     entry.parameter for entry in FIELDS.values()}
 TOPICS = {'read', 'write', *re.findall(r"'~/(\w+)'", (
@@ -141,7 +144,7 @@ def test_commands_and_their_options_exist(name: str) -> None:
 def test_parameters_exist(name: str) -> None:
     for line in code(name):
         named = set(re.findall(r'(?:-p |^)([a-z_.]+):=', line))
-        assert named <= PARAMETERS | {'net_file', 'map_file'}, line
+        assert named <= PARAMETERS | LAUNCH_ARGUMENTS, line
 
 
 @pytest.mark.parametrize('name', documents.NAMES)

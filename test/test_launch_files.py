@@ -12,164 +12,183 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The launch files, read with stand-ins for launch; what they start is started for real."""
+"""The launch files, started by the real ``ros2 launch``."""
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+import os
 from pathlib import Path
-import py_compile
+import re
+import signal
 
-from abdf1_ros.ros.parameters import Parameters
+from abdf1_ros.paths import config_file
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from support.launch_stand_in import (
-    bridge_node,
-    DeclareLaunchArgument,
-    ExecuteProcess,
-    GroupAction,
-    IncludeLaunchDescription,
-    LAUNCH,
-    LaunchConfiguration,
-    load,
-    ParameterFile,
-    ParameterValue,
-    SOURCE,
-)
 from support.ros import EVERYTHING, get_parameters, Observer, Process
+from support.ros_tools import environment, install, needs, ros2, SOURCE
 import yaml
 
-FILES = sorted(LAUNCH.glob('*.launch.py'))
-LINES_FILE = SOURCE / 'config' / 'three_lines.yaml'
+for name in ('launch', 'launch_ros', 'ros2launch'):
+    needs(name)
+
+LAUNCH = SOURCE / 'launch'
+FILES = sorted(path.name for path in LAUNCH.glob('*.launch.py'))
+EXAMPLE = [f'{name}_file:={config_file(f"{name}.csv")}' for name in ('net', 'map')]
+# Before every line of a node stands which one it is.
+LOG_LINE = re.compile(r'\[node-\d\] \S*\[([A-Z]+)\] \[[\d.]+\] \[([^]]+)\]: ')
 
 
-def arguments(file: str) -> dict[str, DeclareLaunchArgument]:
-    return {entity.name: entity for entity in load(LAUNCH / file)
-            if isinstance(entity, DeclareLaunchArgument)}
+@pytest.fixture(autouse=True)
+def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path / 'prefix')
+    for variable, value in environment(tmp_path / 'prefix').items():
+        monkeypatch.setenv(variable, value)
 
 
-@pytest.mark.parametrize('path', FILES, ids=lambda path: path.name)
-def test_every_launch_file_compiles_and_describes_something(path: Path, tmp_path: Path) -> None:
-    py_compile.compile(str(path), str(tmp_path / 'compiled'), doraise=True)
-    assert load(path)
+Starter = Callable[..., Process]
 
 
-@pytest.mark.parametrize('path', FILES, ids=lambda path: path.name)
-def test_every_argument_is_described(path: Path) -> None:
-    assert all(argument.description for argument in arguments(path.name).values())
+@pytest.fixture
+def launch() -> Iterator[Starter]:
+    """Return what launches a file of the package."""
+    processes = []
+
+    def start(file: str, *arguments: str) -> Process:
+        processes.append(ros2('launch', 'abdf1_ros', file, *arguments))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        if process.is_running:
+            process.send(signal.SIGINT)
+        process.result()
+
+
+def ended(process: Process) -> str:
+    """End what was launched as Ctrl-C does; return all that was said."""
+    process.send(signal.SIGINT)
+    process.result()
+    assert 'process has died' not in process.text
+    # Python may tell of a Ctrl-C that it has ignored, in ros2 itself.
+    assert not [line for line in process.lines
+                if line.startswith('[node') and 'Traceback' in line]
+    return process.text
+
+
+@pytest.mark.parametrize('file', FILES)
+def test_every_argument_is_described(launch: Starter, file: str) -> None:
+    shown = launch(file, '--show-args')
+    assert shown.result() == 0
+    names = re.findall(r"^    '(\w+)':$", shown.text, re.MULTILINE)
+    assert names
+    assert 'no description given' not in shown.text
+    if file == 'bridge.launch.py':
+        assert set(names) == {'net_file', 'map_file', 'port', 'params_file', 'namespace', 'name',
+                              'log_level', 'respawn'}
 
 
 # The bridge
 
 
-def test_bridge_has_the_arguments_that_are_promised() -> None:
-    assert set(arguments('bridge.launch.py')) == {
-        'net_file', 'map_file', 'port', 'params_file', 'namespace', 'name', 'log_level',
-        'respawn'}
-
-
-def test_empty_arguments_leave_the_defaults_of_the_node() -> None:
-    node = bridge_node()
-    assert (node.package, node.executable, node.name, node.namespace) == (
-        'abdf1_ros', 'node', 'abdf1', '')
-    assert node.parameters == []
-    assert node.arguments == ['--ros-args', '--log-level', 'info']
-    assert node.respawn is False
-
-
-def test_arguments_reach_the_node_as_text_and_beat_the_parameter_file() -> None:
-    node = bridge_node(
-        net_file='/n.csv', map_file='/m.csv', port='1', params_file='/p.yaml',
-        log_level='debug', respawn='true', namespace='cell', name='line')
-    assert node.parameters == [
-        ParameterFile('/p.yaml', allow_substs=True),
-        {'net_file': ParameterValue('/n.csv', str), 'map_file': ParameterValue('/m.csv', str),
-         'port': ParameterValue('1', str)}]
-    assert node.arguments == ['--ros-args', '--log-level', 'debug']
-    assert (node.respawn, node.respawn_delay) == (True, 2.0)
-    assert (node.namespace, node.name) == ('cell', 'line')
-
-
-def test_arguments_of_the_bridge_that_are_parameters_exist_in_the_node() -> None:
-    (given,) = bridge_node(net_file='a', map_file='b', port='c').parameters
-    assert given.keys() <= set(Parameters.__dataclass_fields__)
-
-
-def test_bridge_starts_with_what_the_launch_file_says(tmp_path: Path) -> None:
+def test_arguments_reach_the_node_and_beat_the_parameter_file(
+        launch: Starter, tmp_path: Path) -> None:
     params = tmp_path / 'params.yaml'
     params.write_text('/**: {ros__parameters: {port: /dev/from_file, stale_after: 7.0}}\n')
-    config = SOURCE / 'config'
-    node = bridge_node(
-        net_file=str(config / 'net.csv'), map_file=str(config / 'map.csv'),
-        params_file=str(params), port='/dev/ttyS99', namespace='cell', name='line',
-        log_level='debug')
-    with Observer() as observer, Process('node', *node.command()) as process:
+    with Observer() as observer:
+        process = launch('bridge.launch.py', *EXAMPLE, f'params_file:={params}',
+                         'port:=/dev/ttyS99', 'namespace:=cell', 'name:=line')
         process.wait_for('/dev/ttyS99: cannot open the port')
         assert get_parameters(observer, 'port', 'stale_after', node='/cell/line') == [
             '/dev/ttyS99', 7.0]
-        process.end()
+    ended(process)
+
+
+def test_port_that_reads_like_a_number_is_text(launch: Starter) -> None:
+    process = launch('bridge.launch.py', *EXAMPLE, 'port:=99')
+    process.wait_for('/dev/ttyS98: cannot open the port')
+    ended(process)
+
+
+@pytest.mark.parametrize('namespace', ['', 'cell'])
+def test_log_level_is_that_of_the_node_alone(launch: Starter, namespace: str) -> None:
+    given = [f'namespace:={namespace}'] if namespace else []
+    process = launch('bridge.launch.py', *EXAMPLE, *given, 'port:=/dev/ttyS99', 'log_level:=debug')
+    process.wait_for('/dev/ttyS99: cannot open the port')
+    lines = [LOG_LINE.match(text) for text in ended(process).splitlines()]
+    loggers = {match[2] for match in lines if match}
+    assert loggers == {f'{namespace}.abdf1'.lstrip('.')}
+
+
+def test_log_level_reaches_a_node_below_a_pushed_namespace(
+        launch: Starter, tmp_path: Path) -> None:
+    outer = tmp_path / 'outer.launch.xml'
+    outer.write_text(
+        '<launch><push-ros-namespace namespace="hall"/>'
+        '<include file="$(find-pkg-share abdf1_ros)/launch/bridge.launch.py">'
+        + ''.join(f'<arg name="{name}" value="{value}"/>' for name, _, value in (
+            text.partition(':=') for text in (
+                *EXAMPLE, 'namespace:=cell', 'log_level:=fatal', 'port:=/dev/ttyS99')))
+        + '</include></launch>', encoding='utf-8')
+    with Observer() as observer:
+        process = ros2('launch', str(outer))
+        assert get_parameters(observer, 'port', node='/hall/cell/abdf1') == ['/dev/ttyS99']
+        assert not LOG_LINE.search(ended(process))
+
+
+@pytest.mark.parametrize('yes', ['true', 'True'])
+def test_faulty_configuration_is_not_started_again(launch: Starter, yes: str) -> None:
+    process = launch('bridge.launch.py', 'net_file:=/nowhere/net.csv', f'respawn:={yes}')
+    process.wait_for('not started again after status 2, which is for faulty files or parameters')
+    process.result()  # nothing is left to be done
+    assert process.text.count('process started with pid') == 1
+    assert 'exit code 2' in process.text
+
+
+def test_killed_bridge_is_started_again_until_the_launch_ends(launch: Starter) -> None:
+    process = launch('bridge.launch.py', *EXAMPLE, 'port:=/dev/ttyS99', 'respawn:=true')
+    for _ in range(2):
+        before = len(process.lines)
+        started = process.wait_for('process started with pid', after=before if _ else 0)
+        process.wait_for('/dev/ttyS99: cannot open the port', after=before if _ else 0)
+        match = re.search(r'pid \[(\d+)\]', started)
+        assert match
+        os.kill(int(match[1]), signal.SIGKILL)
+    process.wait_for('process has died', after=len(process.lines) - 1)
+    process.send(signal.SIGINT)
+    process.result()
+    assert process.text.count('process started with pid') == 2
 
 
 # The demo
 
 
-def test_demo_starts_a_simulator_and_a_bridge_on_its_port() -> None:
-    simulator, bridge = load(LAUNCH / 'demo.launch.py')
-    assert isinstance(simulator, ExecuteProcess)
-    assert isinstance(bridge, IncludeLaunchDescription)
-    assert Path(str(bridge.source.location)) == LAUNCH / 'bridge.launch.py'
-    given = {name: str(value) for name, value in bridge.launch_arguments}
-    assert Path(given['net_file']).samefile(SOURCE / 'config' / 'net.csv')
-    assert Path(given['map_file']).samefile(SOURCE / 'config' / 'map.csv')
-    executable, *rest = simulator.cmd
-    assert (executable.executable, executable.package) == ('simulator', 'abdf1_ros')
-    assert rest == ['--pty', given['port']]
+def test_demo_runs_the_example_on_its_simulator_and_passes_arguments_on(launch: Starter) -> None:
+    with Observer() as observer:
+        process = launch('demo.launch.py', 'namespace:=cell', 'log_level:=debug',
+                         'port:=/dev/ttyS99')
+        process.wait_for('DEBUG', '[cell.abdf1]')
+        process.wait_for('/tmp/abdf1_demo: open')
+        files = get_parameters(observer, 'net_file', 'map_file', node='/cell/abdf1')
+    assert [Path(file).samefile(config_file(name))
+            for file, name in zip(files, ('net.csv', 'map.csv'))] == [True, True]
+    ended(process)
 
 
 # Three lines
 
 
-def included() -> list[dict[str, str]]:
-    """Return the arguments of each bridge of three_lines.launch.py."""
-    declared = {name: str(argument.default_value)
-                for name, argument in arguments('three_lines.launch.py').items()}
-    found = []
-    for group in load(LAUNCH / 'three_lines.launch.py'):
-        if isinstance(group, DeclareLaunchArgument):
-            continue
-        assert isinstance(group, GroupAction)
-        assert group.scoped
-        (include,) = group.actions
-        assert Path(str(include.source.location)) == LAUNCH / 'bridge.launch.py'
-        found.append({
-            name: declared[value.name] if isinstance(value, LaunchConfiguration) else value
-            for name, value in include.launch_arguments})
-    return found
-
-
-def test_three_lines_have_namespaces_names_and_parameters_of_their_own() -> None:
-    lines = included()
-    assert len(lines) == 3
-    for key in ('namespace', 'name'):
-        assert len({line[key] for line in lines}) == 3
-    sections = yaml.safe_load(LINES_FILE.read_text(encoding='utf-8'))
-    assert set(sections) == {f'/{line["namespace"]}/{line["name"]}' for line in lines}
-    assert len({section['ros__parameters']['port'] for section in sections.values()}) == 3
-    assert {Path(line['params_file']) for line in lines} == {LINES_FILE}
-
-
-def test_three_lines_run_side_by_side() -> None:
-    nodes = [bridge_node(**line) for line in included()]
-    with Observer() as observer, ExitStack() as stack:
+def test_three_lines_run_side_by_side(launch: Starter) -> None:
+    sections = yaml.safe_load((SOURCE / 'config' / 'three_lines.yaml').read_text('utf-8'))
+    with Observer() as observer:
         diagnostics = observer.listen(DiagnosticArray, '/diagnostics', EVERYTHING)
-        processes = [stack.enter_context(Process('node', *node.command())) for node in nodes]
-        for process, port in zip(processes, ('press', 'paint', 'packing'), strict=True):
-            process.wait_for(f'/dev/abdf1-{port}: cannot open the port')
+        process = launch('three_lines.launch.py')
+        for namespace in ('press', 'paint', 'packing'):
+            process.wait_for(f'/dev/abdf1-{namespace}: cannot open the port')
         observer.until(
             lambda: {array.status[0].name for array in diagnostics} >= {
-                f'{node.name}: link' for node in nodes}, 'the diagnostics of all three')
-        assert get_parameters(observer, 'net.baud', 'read_only', node='/paint/paint_plc') == [
+                f'{node.lstrip("/")}: link' for node in sections}, 'the diagnostics of all three')
+        assert get_parameters(observer, 'net.baud', 'read_only', node='/paint/abdf1') == [
             9600, True]
-        assert get_parameters(observer, 'net.mode', node='/packing/packing_plc') == ['Peer']
-        for process in processes:
-            process.end()
+        assert get_parameters(observer, 'net.mode', node='/packing/abdf1') == ['Peer']
+    ended(process)
