@@ -106,6 +106,16 @@ def test_half_duplex_is_found(data: bytes) -> None:
     assert kind.duplex is Duplex.HALF
 
 
+def test_poll_with_a_wrong_bcc_says_nothing_of_the_line() -> None:
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    poll = frames.poll_frame(3)
+    assert symbols(decoder, poll[:-1] + bytes((poll[-1] ^ 1,))) == [Poll(3, False)]
+    assert kind.duplex is None
+    assert symbols(decoder, poll) == [Poll(3, True)]
+    assert kind.duplex is Duplex.HALF
+
+
 def test_full_duplex_is_found_by_a_message_that_nobody_has_polled_for() -> None:
     kind = LineKind()
     decoder = ListeningDecoder(kind)

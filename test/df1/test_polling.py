@@ -640,6 +640,14 @@ def test_station_that_always_has_a_message_does_not_keep_the_line() -> None:
     assert all(isinstance(errand.result, Packet) for errand in errands)
 
 
+def test_one_visit_takes_no_more_messages_than_may_be_queued_before_a_reply() -> None:
+    rig = bench(PollingSettings((1, 2), multiple=True))
+    for _ in range(MOST_QUEUED + 3):
+        rig.message(1, 5)
+    rig.start()
+    assert polls(rig, MOST_QUEUED + 6) == [*[1] * MOST_QUEUED, 2, 1, 1, 1, 1, 2]
+
+
 def test_multiple_messages_stop_when_no_more_can_be_kept() -> None:
     rig = bench(PollingSettings((1, 2), multiple=True))
     for _ in range(40):

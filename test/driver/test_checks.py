@@ -426,3 +426,18 @@ def test_lost_port_ends_the_request() -> None:
     assert bench.driver.health.counters_wanted == set()
     bench.driver.request_counters(1)
     assert bench.driver.health.counters_wanted == set()
+
+
+def test_lost_port_ends_a_request_that_waits_for_its_turn() -> None:
+    bench, _, (ears,) = make_bench(word())
+    bench.open()
+    bench.run(1.0)
+    health = bench.driver.health
+    bench.driver.request_counters(1)
+    assert health.is_due(bench.clock())  # it is among the checks now, and not on the line yet
+    bench.lose_port()
+    assert health.known(1).no_counters == 'port lost: unplugged'
+    assert health.counters_wanted == set()
+    bench.open()
+    bench.run(2.0)
+    assert ears.times(COUNTERS) == []  # nobody waits for them any more

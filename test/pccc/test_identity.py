@@ -90,6 +90,13 @@ def test_slc_that_has_halted() -> None:
     assert identity.remarks == ()
 
 
+def test_other_bits_of_byte_20_do_not_halt_an_slc() -> None:
+    identity = changed(SLC, byte17=0x34, byte20=0xDF)
+    assert identity.faults == ()
+    assert identity.remarks == (
+        'last major error 0x0034 (negative timer preset or accumulator)',)
+
+
 def test_slc_remarks_are_no_faults() -> None:
     identity = changed(SLC, byte1=0xC0, byte17=0x20, byte19=0x66, byte24=0xFD)
     assert identity.faults == ()
@@ -150,9 +157,11 @@ def test_unknown_processor_is_named_and_not_interpreted() -> None:
     assert str(decode_identity(bytes(data))) == 'processor 0x95 series B revision 3'
 
 
-@pytest.mark.parametrize(('byte3', 'model'), [
-    (0x15, 'PLC-5/40'), (0x4A, 'PLC-5/20E'), (0x55, 'PLC-5/80'), (0x14, 'PLC-5/25'),
-    (0x77, 'PLC-5 of type 0x77')])
+@pytest.mark.parametrize(('byte3', 'model'), [  # M 10-20; 0x55 as its L80B
+    (0x15, 'PLC-5/40'), (0x22, 'PLC-5/10'), (0x23, 'PLC-5/60'), (0x28, 'PLC-5/40L'),
+    (0x29, 'PLC-5/60L'), (0x31, 'PLC-5/11'), (0x32, 'PLC-5/20'), (0x33, 'PLC-5/30'),
+    (0x4A, 'PLC-5/20E'), (0x4B, 'PLC-5/40E'), (0x55, 'PLC-5/80'), (0x59, 'PLC-5/80E'),
+    (0x13, 'PLC-5/12'), (0x14, 'PLC-5/25'), (0x77, 'PLC-5 of type 0x77')])
 def test_plc5_models(byte3: int, model: str) -> None:
     assert changed(PLC5, byte3=byte3).model == model
 

@@ -25,6 +25,7 @@ import threading
 import time
 from typing import Any
 
+from abdf1_ros.driver.driver import Driver
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
@@ -44,6 +45,7 @@ from support.ros import (
     details,
     ERROR,
     EXAMPLE_FILES,
+    find_status,
     Inbox,
     Observer,
     OK,
@@ -308,6 +310,9 @@ def test_write_that_waits_too_long_for_the_line_is_not_sent(make_bench: Benches)
     assert messages(others) == {'not written: not sent: waited longer than 1 s for the line': 2}
     assert float(details(others[0])['latency_ms']) > 1000
     assert bench.words('B3:1') == [1]
+    bench.observer.until(lambda: bench.diagnostics and details(find_status(
+        bench.diagnostics[-1], 'station 1'))['last event'].startswith(
+            '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'), 'the event in the diagnostics')
 
 
 def test_loss_of_the_port_leaves_no_write_without_a_result(make_bench: Benches) -> None:
@@ -445,13 +450,29 @@ def refusal(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., list[st
         signal.signal(number, handler)
 
 
-@pytest.mark.parametrize('arguments', [['net.csv', 'map.csv'], ['-p', 'net_file:=net.csv']])
+@pytest.mark.parametrize('arguments', [
+    ['net.csv'], ['net.csv', 'map.csv'], ['-p', 'net_file:=net.csv']])
 def test_argument_outside_of_ros_arguments(
         arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['node', *arguments])
     assert ending.value.code == 2
     assert 'parameters follow --ros-args' in capsys.readouterr().err
+
+
+def test_third_internal_error_ends_the_node_with_status_1(
+        tmp_path: Path, plcs: Plcs, refusal: Callable[..., list[str]],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(driver: Driver, now: float) -> None:
+        raise KeyError('a bug')
+
+    monkeypatch.setattr(Driver, 'next_task', fail)
+    net = write_csv(tmp_path / 'net.csv', *NET)
+    map_file = write_csv(tmp_path / 'map.csv', MAP_HEADER, [SPEED])
+    told = refusal(*ros_args(f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}'),
+                   status=1)  # systemd starts it again
+    assert sum("internal error: KeyError('a bug'); please report it" in line
+               for line in told) == 3
 
 
 def test_duplicate_name_is_told_and_forgotten(
