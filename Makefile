@@ -15,6 +15,9 @@ INSTALLED := $(VENV)/.installed
 NODE := install/abdf1_ros/lib/abdf1_ros/node
 SHARE := install/abdf1_ros/share/abdf1_ros
 
+# What people see of pip: the name of each package as it is fetched, on one line.
+SHOW_PROGRESS := awk '/^Collecting/ {printf "%s ", $$2; fflush()} /^Installing/ {print ""} END {print ""}'
+
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -51,10 +54,11 @@ $(INSTALLED): setup.py requirements/ros.txt requirements/test.txt requirements/t
 	    $(PY) -m pip install --quiet -r requirements/tools.txt; \
 	    $(PY) -m pip install --quiet --no-build-isolation --editable '.[test]'; \
 	else \
-	    echo 'no ROS 2 sourced: installing the wheels of ROS Jazzy'; \
+	    echo 'no ROS 2 sourced: installing the wheels of ROS Jazzy into $(VENV), which takes about a minute'; \
 	    $(PYTHON) -m venv $(VENV); \
-	    $(PY) -m pip install --quiet \
-	        -r requirements/ros.txt -r requirements/test.txt -r requirements/tools.txt; \
+	    set -o pipefail; \
+	    $(PY) -m pip install --disable-pip-version-check -r requirements/ros.txt \
+	        -r requirements/test.txt -r requirements/tools.txt | $(SHOW_PROGRESS); \
 	    $(PY) -m pip install --quiet --no-build-isolation --no-deps --editable .; \
 	fi; \
 	touch $@

@@ -26,6 +26,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,8 +144,9 @@ class Demo:
         self._bridge = self._start('node', *self._bridge_args)
         self._title(self._scene.title)
         domain = os.environ['ROS_DOMAIN_ID']
-        self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} '
-                  'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor')
+        look_on = 'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor' \
+            if shutil.which('ros2') else f'{Path(sys.executable).parent / "monitor"}'
+        self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} {look_on}')
         self._show_reads()
         self._show_writes()
         if self._scene.push:

@@ -346,6 +346,7 @@ def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
     ended = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: ended.set())
     signal.signal(signal.SIGTERM, lambda *_: ended.set())
+    signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # in the background input is nothing to stop for
     begin = time.monotonic()
     inputs = [sys.stdin.fileno()] if sys.stdin else []
     rest = b''
@@ -355,12 +356,20 @@ def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
         for plc in plcs:
             plc.advance()
         if select.select(inputs, [], [], 0.05)[0]:
-            data = os.read(inputs[0], 4096)
+            data = _input(inputs[0])
             *lines, rest = (rest + data).split(b'\n')
             if not data:
                 lines, inputs = [rest], []  # closed; signals and --seconds still end us
             for line in lines:
                 carry_out(line.decode(errors='replace'))
+
+
+def _input(descriptor: int) -> bytes:
+    """Return what was typed; nothing from a terminal that is another job's at the moment."""
+    try:
+        return os.read(descriptor, 4096)
+    except OSError:  # EIO: we are in the background
+        return b''
 
 
 def _say(text: str) -> None:

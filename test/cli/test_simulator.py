@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import errno
 import os
 from pathlib import Path
 import select
@@ -26,6 +27,7 @@ import subprocess
 import sys
 import termios
 
+from abdf1_ros.cli import simulator
 from abdf1_ros.cli.simulator import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -395,3 +397,12 @@ def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(start: Start)
     simulator.close_output()
     simulator.type('silent 1\nnormal 1\nquit\n')
     assert simulator.end() == (0, '')
+
+
+def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal that belongs to another job gives EIO once SIGTTIN is ignored."""
+    def refuse(descriptor: int, size: int) -> bytes:
+        raise OSError(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr(os, 'read', refuse)
+    assert simulator._input(0) == b''
