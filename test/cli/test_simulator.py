@@ -27,8 +27,7 @@ import subprocess
 import sys
 import termios
 
-from abdf1_ros.cli import simulator
-from abdf1_ros.cli.simulator import main
+from abdf1_ros.cli.simulator import _input, main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
@@ -405,4 +404,4 @@ def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatc
         raise OSError(errno.EIO, 'Input/output error')
 
     monkeypatch.setattr(os, 'read', refuse)
-    assert simulator._input(0) == b''
+    assert _input(0) == b''
