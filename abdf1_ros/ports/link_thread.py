@@ -132,6 +132,7 @@ class LinkThread(threading.Thread):
         self.state = PortState(False, 'not opened yet')
         self.has_failed = False
         self.is_released = False
+        self._is_free = threading.Event()
         self._machine = machine
         self._open_port = open_port
         self._on_state = on_state
@@ -172,10 +173,12 @@ class LinkThread(threading.Thread):
                 os.close(self._wake_reader)
                 os.close(self._wake_writer)
 
-    def release(self) -> None:
-        """Close the port, and leave it closed until ``take``; the state tells when it is so."""
+    def release(self) -> bool:
+        """Close the port, and leave it closed until ``take``; tell whether it is so within 5 s."""
+        self._is_free.clear()
         self.is_released = True
         self.wake()
+        return self._is_free.wait(_EXCHANGE_LIMIT)
 
     def take(self) -> None:
         """Open the port again."""
@@ -214,6 +217,7 @@ class LinkThread(threading.Thread):
             self._exchange()
             if self.is_released:
                 self._set_state(False, RELEASED)
+                self._is_free.set()
                 self._wait()
                 continue
             self._is_lost = False

@@ -113,6 +113,11 @@ class PortOpener:
         self._trace: Trace | None = None
         self._begun = 0.0
 
+    def use(self, settings: PortSettings) -> bool:
+        """Open with these settings from now on; return whether they are others."""
+        before, self._settings = self._settings, settings
+        return settings != before
+
     def errors(self) -> dict[str, int]:
         """Return what the UART has counted since the port was opened; from any thread."""
         return self._port.errors() if isinstance(self._port, SerialDevice) else {}

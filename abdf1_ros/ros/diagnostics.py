@@ -30,7 +30,7 @@ from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.link_thread import LinkThread, RELEASED
 from abdf1_ros.ros.station_health import health_values, trouble, wrong_type
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
@@ -82,10 +82,13 @@ class Diagnostics:
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
     faults of the rows that the map was read without, ``map_name`` is what the file is called.
+    ``writes`` is what has become of writes so far. ``changed_files`` are the names of files that
+    are not any more as they were read.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
-                 left_out: Sequence[Problem] = (), map_name: str = 'map') -> None:
+                 left_out: Sequence[Problem] = (), map_name: str = 'map',
+                 writes: WriteLog | None = None) -> None:
         self.has_duplicate_name = False
         self._left_out = left_out
         self._map_name = map_name
@@ -96,7 +99,8 @@ class Diagnostics:
         self._port_errors: Callable[[], dict[str, int]] = dict
         self._last_error: _Moment | None = None
         self._last_events: dict[int | None, _Moment] = {}
-        self._writes = WriteLog()
+        self.writes = writes or WriteLog()
+        self.changed_files: list[str] = []
         self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
         self._rate = _Rate()
         self._sections = [
@@ -104,7 +108,7 @@ class Diagnostics:
             Section('counters', port, self._judge_counters, lambda now: self._counters()),
             *(self._station_section(station, port) for station in driver.stations),
             Section('mappings', port, self._judge_mappings, self._mapping_values),
-            Section('writes', port, self._writes.judge, self._writes.values),
+            Section('writes', port, self.writes.judge, self.writes.values),
         ]
         self._node_name = node_name
 
@@ -125,11 +129,11 @@ class Diagnostics:
 
     def written(self, result: WriteResult, now: float) -> None:
         """Count a write."""
-        self._writes.add(result, now)
+        self.writes.add(result, now)
 
     def lost(self, topic: str, count: int, now: float) -> None:
         """Count messages to a write topic that never came."""
-        self._writes.lost(topic, count, now)
+        self.writes.lost(topic, count, now)
 
     def reset_counters(self) -> None:
         """Show every counter from zero again."""
@@ -162,6 +166,8 @@ class Diagnostics:
 
     def _judge_line(self, now: float) -> Verdict:
         state = self._link.state if self._link else None
+        if self._link and self._link.is_released:
+            return WARN, RELEASED
         if state is None or not state.is_open:
             return ERROR, state.text if state else 'not started yet'
         link = self._driver.link
@@ -191,6 +197,7 @@ class Diagnostics:
             **_periods(self._driver.points.values()),
             **_poll_scans(self._driver),
             **{name: str(count) for name, count in self._port_errors().items()},
+            'files': changed_text(self.changed_files) or 'as read',
             'last error': _with_age(self._last_error, now),
         }
         return values
@@ -293,6 +300,11 @@ def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mappin
         if not mapping.serves:
             rows[mapping.station].setdefault(mapping.plc_type, mapping)
     return rows
+
+
+def changed_text(names: Sequence[str]) -> str:
+    """Return what there is to say of files that have changed, empty where none has."""
+    return f'{", ".join(names)} changed since read; ~/reload takes it' if names else ''
 
 
 _Moment = tuple[Event | str, float]

@@ -23,9 +23,8 @@ starts and destroyed after it has ended.
 from __future__ import annotations
 
 import argparse
-from collections import defaultdict, deque
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import re
@@ -46,19 +45,16 @@ from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import Diagnostics, DuplicateNameWatch, speed_seen
+from abdf1_ros.ros.diagnostics import changed_text, Diagnostics, DuplicateNameWatch, speed_seen
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import (
     ACTIVE_LAYOUT,
-    encoder,
     latched_qos,
-    MESSAGES,
-    read_qos,
-    write_qos,
 )
-from abdf1_ros.ros.parameters import Configuration, configure
+from abdf1_ros.ros.parameters import Configuration, configure, configure_again
+from abdf1_ros.ros.reads import ReadTopics
 from abdf1_ros.ros.station_health import LinkCounterService
-from abdf1_ros.ros.writes import LossCounter, WriteTopic
+from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
@@ -67,7 +63,6 @@ import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -76,7 +71,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import UInt16MultiArray
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 NODE_NAME = 'abdf1'
 
@@ -99,12 +94,11 @@ exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty files or parameters
 1 after internal errors, and where ROS does not start (log directory, network)
 """
 
-# So many values of a reply are published while its ACK is on the line (two characters), the
-# others together with the next command: a hundred would keep the line waiting for 3 ms.
-_VALUES_AT_ONCE = 4
-
 # How often (s) levels are compared, so that a change of one is published at once.
-_LEVEL_CHECK_PERIOD = 0.1
+LEVEL_CHECK_PERIOD = 0.1
+
+# How often (s) the node looks whether its files have changed.
+_FILE_PERIOD = 2.0
 
 # How long the end waits for its last diagnostics to arrive, where a subscriber is stuck.
 _LAST_WORDS = Duration(seconds=0.5)
@@ -128,21 +122,110 @@ _RESULT_LEVELS = {
     Outcome.SUPERSEDED: DiagnosticStatus.WARN}
 
 
+@dataclass(frozen=True, slots=True)
+class _Listener:
+    """What a driver calls; values go to the topics that were made for its map."""
+
+    read: Callable[[Mapping, Values], None]
+    unreadable: Callable[[Mapping, str], None]
+    written: Callable[[WriteResult], None]
+    happened: Callable[[Event], None]
+    station_changed: Callable[[Station], None]
+
+
 class BridgeNode(Node):
     """
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
-    It implements ``Listener``: the driver calls ``read``, ``unreadable``, ``written``,
-    ``happened`` and ``station_changed``.
+    ``check`` is to be called every 0.1 s, in any one thread; with ``has_timer`` the executor
+    does it.
     """
 
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(NODE_NAME, **kwargs)
+    def __init__(self, name: str = NODE_NAME, *, has_timer: bool = True, **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
         try:
             configuration = configure(self)
         except ConfigurationError:
             self.destroy_node()
             raise
+        self._tell(configuration)
+        self._log = EventLog(self.get_logger(), time.monotonic)
+        self._lines = LineLog(self.get_logger(), time.monotonic)
+        self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
+        self._active = self.create_publisher(
+            UInt16MultiArray, '~/active_stations', latched_qos())
+        self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        parameters, network = configuration.parameters, configuration.network
+        self._configuration = configuration
+        self._wrong_types: list[str] = []
+        # Every node has this service, and nobody gives it another name.
+        service = f'{self.get_fully_qualified_name()}/get_parameters'
+        self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
+        self._next_diagnostics = self._next_look = 0.0
+        self._levels: list[bytes] = []
+        self._port_text = ''
+        self._told_speed: float | None = None
+        self._opener = PortOpener(
+            self._port_settings(),
+            lambda text: self.get_logger().debug(f'{printable(self._port)}: {text}'))
+        if parameters.trace_file:
+            self._opener.trace(
+                parameters.trace_file, parameters.trace_limit * 1e6,
+                {'check': network.checksum.value, 'duplex': network.duplex.name.lower()},
+                lambda text: self._lines.error('trace_file', f'trace_file: {text}'))
+        self.driver, self._reads = self._make_driver(None)
+        self.link = LinkThread(
+            self.driver.machine, self._opener.open, on_state=self._port_changed,
+            on_fault=self._fault, while_sending=self._reads.publish_later_values)
+        self._diagnostics = self._make_diagnostics(None)
+        self._writes = WriteTopics(self, parameters.write_timeout, self._lost, self.link.wake)
+        self._writes.use(self.driver)
+        self._link_counters = LinkCounterService(self.driver, self.link)
+        self._create_services()
+        if has_timer:
+            # Not the node's clock: that may be a simulation's, which need not run.
+            self.create_timer(LEVEL_CHECK_PERIOD, self.check,
+                              clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def _port(self) -> str:
+        return self._configuration.port
+
+    def _port_settings(self) -> PortSettings:
+        parameters = self._configuration.parameters
+        return PortSettings.of(
+            self._configuration.network, self._port, low_latency=parameters.low_latency,
+            rs485=parameters.rs485)
+
+    def _make_driver(self, before: ReadTopics | None) -> tuple[Driver, ReadTopics]:
+        """Return a driver for the files, and the topics that it publishes to."""
+        reads = ReadTopics(self)
+        listener = _Listener(
+            reads.read, self.unreadable, self.written, self.happened, self.station_changed)
+        configuration = self._configuration
+        driver = Driver(configuration.network, configuration.mappings,
+                        configuration.driver_settings(), listener)
+        reads.open(driver.points, before)
+        return driver, reads
+
+    def _make_diagnostics(self, before: Diagnostics | None) -> Diagnostics:
+        configuration = self._configuration
+        diagnostics = Diagnostics(
+            self.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
+            configuration.map_problems, Path(configuration.parameters.map_file).name,
+            before.writes if before else None)
+        diagnostics.attach(self.link, self._opener.errors)
+        return diagnostics
+
+    def _create_services(self) -> None:
+        self.create_service(Trigger, '~/reset_counters', self._reset_counters)
+        self.create_service(Trigger, '~/reload', self._reload)
+        self.create_service(SetBool, '~/polling', self._set_polling)
+        self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
+                            callback_group=MutuallyExclusiveCallbackGroup())
+
+    def _tell(self, configuration: Configuration) -> None:
+        """Log what both files come to."""
         self.get_logger().info(str(configuration))
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
@@ -153,54 +236,6 @@ class BridgeNode(Node):
             self.get_logger().warning(
                 'parameters without effect, as the map comes from its file alone: '
                 + _few(configuration.ignored))
-        self._log = EventLog(self.get_logger(), time.monotonic)
-        self._lines = LineLog(self.get_logger(), time.monotonic)
-        self._read_publishers: dict[str, Any] = {}
-        self._values_at_once = _VALUES_AT_ONCE
-        self._values_later: deque[tuple[Any, Any]] = deque()
-        self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
-        self._active = self.create_publisher(
-            UInt16MultiArray, '~/active_stations', latched_qos())
-        self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self.driver = Driver(configuration.network, configuration.mappings,
-                             configuration.driver_settings(), self)
-        self._create_reads()
-        self._diagnostics = Diagnostics(
-            self.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
-            configuration.map_problems,
-            Path(configuration.parameters.map_file).name)
-        self._wrong_types: list[str] = []
-        self._diagnostics_period = configuration.parameters.diagnostics_period
-        # Every node has this service, and nobody gives it another name.
-        service = f'{self.get_fully_qualified_name()}/get_parameters'
-        self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
-        self._next_diagnostics = 0.0
-        self._levels: list[bytes] = []
-        self.create_service(Trigger, '~/reset_counters', self._reset_counters)
-        # Not the node's clock: that may be a simulation's, which need not run.
-        self.create_timer(_LEVEL_CHECK_PERIOD, self._check_diagnostics,
-                          clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._port = configuration.port
-        self._port_text = ''
-        self._told_speed: float | None = None
-        parameters, network = configuration.parameters, configuration.network
-        self._opener = PortOpener(
-            PortSettings.of(network, configuration.port, low_latency=parameters.low_latency,
-                            rs485=parameters.rs485),
-            lambda text: self.get_logger().debug(f'{printable(self._port)}: {text}'))
-        if parameters.trace_file:
-            self._opener.trace(
-                parameters.trace_file, parameters.trace_limit * 1e6,
-                {'check': network.checksum.value, 'duplex': network.duplex.name.lower()},
-                lambda text: self._lines.error('trace_file', f'trace_file: {text}'))
-        self.link = LinkThread(
-            self.driver.machine, self._opener.open, on_state=self._port_changed,
-            on_fault=self._fault, while_sending=self._publish_later_values)
-        self._create_writes(configuration.parameters.write_timeout)
-        self._diagnostics.attach(self.link, self._opener.errors)
-        self._link_counters = LinkCounterService(self.driver, self.link)
-        self.create_service(Trigger, '~/read_link_counters', self._link_counters.answer,
-                            callback_group=MutuallyExclusiveCallbackGroup())
 
     def _tell_remarks(self, configuration: Configuration) -> None:
         remarks = [*setting_remarks(configuration.network, configuration.mappings)]
@@ -222,49 +257,11 @@ class BridgeNode(Node):
         # Without a publisher, what is still under way would not arrive.
         self._diagnostics_publisher.wait_for_all_acked(_LAST_WORDS)
 
-    def _create_reads(self) -> None:
-        # The default callbacks make every publisher a burden on every turn of the executor.
-        quiet = PublisherEventCallbacks(use_default_callbacks=False)
-        for mapping, point in self.driver.points.items():
-            publisher = self.create_publisher(
-                MESSAGES[mapping.message_type], f'~/read/{mapping.topic}',
-                read_qos(mapping, point.stale_time), event_callbacks=quiet)
-            self._read_publishers[mapping.topic] = publisher, encoder(mapping)
-
-    def _create_writes(self, patience: float) -> None:
-        topics = defaultdict(list)
-        for mapping in self.driver.mappings:
-            if mapping.writes:
-                topics[mapping.topic].append(mapping)
-        for topic, mappings in topics.items():
-            name = f'~/write/{topic}'
-            writer: Any = WriteTopic(
-                topic, mappings, self.driver, patience, on_loss=self._lost,
-                losses=LossCounter(partial(self.count_publishers, name)),
-                wake=self.link.wake)
-            self.create_subscription(
-                MESSAGES[mappings[0].message_type], name, writer.take, write_qos())
-
     def _lost(self, topic: str, count: int) -> None:
         self._diagnostics.lost(topic, count, time.monotonic())
         self._lines.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
                             'lost on their way here, and have no result: they come faster than '
                             'they can be taken')
-
-    def read(self, mapping: Mapping, values: Values) -> None:
-        """Publish the values of a good read, at once or as soon as the line is busy again."""
-        publisher, encode = self._read_publishers[mapping.topic]
-        if self._values_at_once:
-            self._values_at_once -= 1
-            publisher.publish(encode(values))
-        else:
-            self._values_later.append((publisher, encode(values)))
-
-    def _publish_later_values(self) -> None:
-        self._values_at_once = _VALUES_AT_ONCE
-        while self._values_later:
-            publisher, values = self._values_later.popleft()
-            publisher.publish(values)
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Log why a station that answers gives no value."""
@@ -315,14 +312,17 @@ class BridgeNode(Node):
             return  # one more attempt that failed as the one before it
         self._port_text = state.text
         self._publish_active()
-        tell = self._lines.info if state.is_open else self._lines.error
+        is_meant = state.is_open or self.link.is_released
+        tell = self._lines.info if is_meant else self._lines.error
         tell('the port', f'{self._port}: {state.text}')
 
     def _fault(self, error: Exception) -> None:
         self.get_logger().error(f'internal error: {error!r}; please report it')
 
-    def _check_diagnostics(self) -> None:
+    def check(self) -> None:
+        """Publish diagnostics when they are due or a level has changed; end what waits."""
         now = time.monotonic()
+        self._look_at_files(now)
         self._link_counters.check(now)
         if self._duplicate_names.look(now):
             self._duplicate_name_came_or_went(self._duplicate_names.has_found)
@@ -336,6 +336,16 @@ class BridgeNode(Node):
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self._publish_diagnostics(now)
+
+    def _look_at_files(self, now: float) -> None:
+        """Tell once that a file is not any more as it was read."""
+        if now < self._next_look:
+            return
+        self._next_look = now + _FILE_PERIOD
+        names = self._configuration.files.changed()
+        if names and not self._diagnostics.changed_files:
+            self._lines.warning('the files', changed_text(names))
+        self._diagnostics.changed_files = names
 
     def _tell_speed(self, seen: float | None) -> None:
         """Log once that the line is faster, or slower, than it is set."""
@@ -360,13 +370,60 @@ class BridgeNode(Node):
             self._lines.info('the name', f'no other node is called {name} any more')
 
     def _publish_diagnostics(self, now: float) -> None:
-        self._next_diagnostics = now + self._diagnostics_period
+        self._next_diagnostics = now + self._configuration.parameters.diagnostics_period
         message = DiagnosticArray(status=self._diagnostics.statuses(now))
         # Time that is simulated may not have begun; 0 would sort before everything.
         now_ros = self.get_clock().now()
         stamped = now_ros if now_ros.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
         self._diagnostics_publisher.publish(message)
+
+    def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go on with the files as they are now, or as before where these have faults."""
+        try:
+            configuration = configure_again(self, self._configuration.parameters)
+        except ConfigurationError as error:
+            for problem in error.problems:
+                self.get_logger().error(f'{problem} (goes on as before)')
+            texts = [printable(str(problem)) for problem in error.problems]
+            response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_REMARKS])
+            return response
+        self._tell(configuration)
+        response.success = self._go_on_with(configuration)
+        left_out = len(configuration.map_problems)
+        response.message = printable(str(configuration)) + (
+            f'; {left_out} rows left out, see the log' if left_out else '')
+        return response
+
+    def _go_on_with(self, configuration: Configuration) -> bool:
+        """Put new files to work; return False where the link does not take them."""
+        self._configuration = configuration
+        before, old_reads = self.driver, self._reads
+        driver, reads = self._make_driver(old_reads)
+        reopen = self._opener.use(self._port_settings())
+        if not self.link.exchange(driver.machine, reads.publish_later_values, reopen):
+            self.get_logger().error('the link has not taken the new files')
+            return False
+        self.driver, self._reads = driver, reads
+        self._diagnostics = self._make_diagnostics(self._diagnostics)
+        self._link_counters.use(driver)
+        self._writes.use(driver)
+        old_reads.end(reads)
+        self._log.forget_all()
+        if before.stations.words() != driver.stations.words():
+            self._publish_active()
+        return True
+
+    def _set_polling(self, request: SetBool.Request,
+                     response: SetBool.Response) -> SetBool.Response:
+        """Leave the port to others, or take it again."""
+        if request.data:
+            self.link.take()
+            response.success, response.message = True, f'{self._port} is being opened'
+        else:
+            response.success = self.link.release()
+            response.message = f'{self._port}: {self.link.state.text}'
+        return response
 
     def _reset_counters(self, request: Trigger.Request,
                         response: Trigger.Response) -> Trigger.Response:

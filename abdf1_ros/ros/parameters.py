@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 import difflib
 from pathlib import Path
@@ -28,6 +29,7 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.served import line_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
+from abdf1_ros.ros.files import FileWatch
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
@@ -125,6 +127,7 @@ class Configuration:
     map_problems: list[Problem]
     polling: PollingSettings | None = None
     ignored: list[str] = field(default_factory=list)
+    files: FileWatch = field(default_factory=FileWatch)
 
     def driver_settings(self) -> DriverSettings:
         """Return parameters of the same names, and what follows from others."""
@@ -154,12 +157,27 @@ def configure(node: Node) -> Configuration:
     """
     problems = _unknown_overrides(node)
     parameters = _declare_own(node, problems)
-    network = Network()
+    return _from_files(node, parameters, problems, _declare_network)
+
+
+def configure_again(node: Node, parameters: Parameters) -> Configuration:
+    """
+    Read both files again, and declare anew what comes from them.
+
+    Raises ConfigurationError with every fault; nothing has changed then.
+    """
+    return _from_files(node, parameters, [], _overridden_network)
+
+
+def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
+                overridden: Callable[[Node, Network], Network]) -> Configuration:
+    from_file = network = Network()
     mappings: list[Mapping] = []
     map_problems: list[Problem] = []
+    files = FileWatch((parameters.net_file, parameters.map_file))
     try:
         from_file = load_network(_needed('net_file', parameters.net_file, problems))
-        network = _declare_network(node, from_file)
+        network = overridden(node, from_file)
     except ConfigurationError as error:
         problems += error.problems
     try:
@@ -181,11 +199,31 @@ def configure(node: Node) -> Configuration:
             problems += error.problems
     if problems:
         raise ConfigurationError(problems)
+    if overridden is not _declare_network:
+        _forget(node, 'net.')
+        _declare_network(node, from_file)
     cells = _map_cells(mappings)
+    _forget(node, 'map.')
     if parameters.expose_map_parameters:
         _declare_map(node, cells)
     return Configuration(parameters, network, port, mappings, map_problems, polling,
-                         _ignored_overrides(node, cells))
+                         _ignored_overrides(node, cells), files)
+
+
+def _forget(node: Node, prefix: str) -> None:
+    """Undeclare parameters; rclpy itself has no way for those that are read-only."""
+    for name in [name for name in node._parameters if name.startswith(prefix)]:
+        del node._parameters[name], node._descriptors[name]
+
+
+def _overridden_network(node: Node, network: Network) -> Network:
+    """Return the network with what overrides it; nothing is declared."""
+    given = {}
+    for name, entry in FIELDS.items():
+        override = _overrides(node).get(entry.parameter)
+        if override is not None and _text(override.value) != str(getattr(network, name)):
+            given[name] = _text(override.value), f'parameter {entry.parameter}'
+    return make_network(given, network)
 
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:

@@ -87,6 +87,10 @@ class LinkCounterService:
         self._give_up = 0.0
         self._done: Future | None = None
 
+    def use(self, driver: Driver) -> None:
+        """Ask the stations of another driver from now on."""
+        self._driver = driver
+
     async def answer(self, request: Trigger.Request,
                      response: Trigger.Response) -> Trigger.Response:
         """Ask, wait, and tell."""

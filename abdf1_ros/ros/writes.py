@@ -22,15 +22,18 @@ either end was full. Nobody else tells: Fast DDS 2.14 has no message-lost event 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
+from functools import partial
 import time
 from typing import Any
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.errors import FormatError
-from abdf1_ros.ros.messages import values_of
+from abdf1_ros.ros.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
+from rclpy.node import Node
 from std_msgs.msg import String
 
 _LONGEST_LABEL = 100
@@ -103,6 +106,10 @@ class WriteTopic:
         self._on_loss = on_loss
         self._wake = wake
 
+    def use(self, mappings: Sequence[Mapping], driver: Driver) -> None:
+        """Write to these mappings of this driver from now on."""
+        self._mappings, self._driver = mappings, driver
+
     def take(self, message: Any, info: Any) -> None:
         """Write a message to every mapping of the topic."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
@@ -127,3 +134,46 @@ class WriteTopic:
             raise FormatError(
                 f'it came {age:.1f} s after it was published, write_timeout is '
                 f'{self._patience:g} s; or the clocks of the two hosts differ')
+
+
+class WriteTopics:
+    """
+    The write topics of a node; ``use`` may be called again, in the thread of the executor.
+
+    ``on_loss``, ``wake`` and ``patience`` are those of ``WriteTopic``.
+    """
+
+    def __init__(self, node: Node, patience: float, on_loss: Callable[[str, int], None],
+                 wake: Callable[[], None]) -> None:
+        self._node = node
+        self._patience = patience
+        self._on_loss = on_loss
+        self._wake = wake
+        self._topics: dict[str, tuple[Any, WriteTopic, Any]] = {}
+
+    def use(self, driver: Driver) -> None:
+        """Have a subscription for each topic of a driver; those that there are stay."""
+        wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
+        for mapping in driver.mappings:
+            if mapping.writes:
+                wanted[mapping.topic].append(mapping)
+        kinds = {topic: MESSAGES[mappings[0].message_type]
+                 for topic, mappings in wanted.items()}
+        for topic, (kind, _, subscription) in [*self._topics.items()]:
+            if kinds.get(topic) is not kind:
+                self._node.destroy_subscription(subscription)
+                del self._topics[topic]
+        for topic, mappings in wanted.items():
+            if topic in self._topics:
+                self._topics[topic][1].use(mappings, driver)
+            else:
+                self._topics[topic] = self._create(topic, kinds[topic], mappings, driver)
+
+    def _create(self, topic: str, kind: Any, mappings: Sequence[Mapping],
+                driver: Driver) -> tuple[Any, WriteTopic, Any]:
+        name = f'~/write/{topic}'
+        writer = WriteTopic(
+            topic, mappings, driver, self._patience, on_loss=self._on_loss, wake=self._wake,
+            losses=LossCounter(partial(self._node.count_publishers, name)))
+        callback: Any = writer.take
+        return kind, writer, self._node.create_subscription(kind, name, callback, write_qos())

@@ -561,7 +561,7 @@ def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: L
     thread = link.start(script.machine, pty.name)
     assert link.state().is_open
     assert pty.read(5) == READY
-    thread.release()
+    assert thread.release()
     assert link.state() == PortState(False, 'the port is left to others: polling is off')
     assert script.end() == repr(PortLost('the port is left to others: polling is off'))
     open_port(PortSettings(str(pty.name))).close()
@@ -583,7 +583,7 @@ def test_release_while_the_port_cannot_be_opened() -> None:
     thread = LinkThread(Script().machine, refuse, retry_period=3600.0, on_state=states.put)
     thread.start()
     assert asked.wait(PATIENCE)
-    thread.release()
+    assert thread.release()
     while 'left to others' not in states.get(timeout=PATIENCE).text:
         pass
     thread.stop()

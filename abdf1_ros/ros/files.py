@@ -1,0 +1,41 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Find out that a file has changed since it was read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+_Stamp = tuple[int, int, int]
+
+
+class FileWatch:
+    """Files as they are now; to be made before they are read."""
+
+    def __init__(self, paths: Iterable[str] = ()) -> None:
+        self._stamps = {path: _stamp(path) for path in paths}
+
+    def changed(self) -> list[str]:
+        """Return the names of the files that are different by now, or gone."""
+        return [Path(path).name for path, stamp in self._stamps.items() if _stamp(path) != stamp]
+
+
+def _stamp(path: str) -> _Stamp | None:
+    try:
+        status = Path(path).stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino

@@ -1,0 +1,115 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The read topics of one map: a publisher each, kept where the next map has the same row."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from abdf1_ros.driver.points import ReadPoint
+from abdf1_ros.ros.messages import encoder, MESSAGES, read_qos
+from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.values import Values
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+
+# So many values of a reply are published while its ACK is on the line (two characters), the
+# others together with the next command: a hundred would keep the line waiting for 3 ms.
+_VALUES_AT_ONCE = 4
+
+# What a publisher has promised may be so much shorter than the time that values are late by now:
+# a late joiner and a deadline are to notice nothing, and half as long is no false alarm yet.
+_MARGIN = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class _ReadTopic:
+    """
+    A publisher, and what it was made for.
+
+    ``promise`` is the time (s) after which values count as stopped, infinite where there is none.
+    """
+
+    publisher: Any
+    encode: Callable[[Values], Any]
+    shape: tuple[object, ...]
+    promise: float
+
+    def is_fit_for(self, shape: tuple[object, ...], promise: float) -> bool:
+        """Tell whether subscribers of a row notice no difference."""
+        return shape == self.shape and promise <= _MARGIN * self.promise and \
+            math.isinf(promise) is math.isinf(self.promise)
+
+
+class ReadTopics:
+    """
+    Publish values, in the thread of the link; made and ended in that of the executor.
+
+    ``open`` has to come before the driver runs; what ``before`` has is used again where it fits.
+    ``end`` closes the rest of that.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._at_once = _VALUES_AT_ONCE
+        self._later: deque[tuple[Any, Any]] = deque()
+        self._topics: dict[str, _ReadTopic] = {}
+
+    def open(self, points: MappingType[Mapping, ReadPoint],  # noqa: A003
+             before: ReadTopics | None = None) -> None:
+        """Have a publisher for each mapping that is read."""
+        old = {} if before is None else before._topics
+        for mapping, point in points.items():
+            self._topics[mapping.topic] = self._topic(mapping, point, old.get(mapping.topic))
+
+    def _topic(self, mapping: Mapping, point: ReadPoint, old: _ReadTopic | None) -> _ReadTopic:
+        shape = mapping.message_type, str(mapping.address), mapping.length
+        promise = point.stale_time if mapping.publish is Publish.ALWAYS else math.inf
+        if old is not None and old.is_fit_for(shape, promise):
+            return old
+        # The default callbacks make every publisher a burden on every turn of the executor.
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        publisher = self._node.create_publisher(
+            MESSAGES[mapping.message_type], f'~/read/{mapping.topic}',
+            read_qos(mapping, point.stale_time), event_callbacks=quiet)
+        return _ReadTopic(publisher, encoder(mapping), shape, promise)
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Publish the values of a good read, at once or as soon as the line is busy again."""
+        topic = self._topics[mapping.topic]
+        if self._at_once:
+            self._at_once -= 1
+            topic.publisher.publish(topic.encode(values))
+        else:
+            self._later.append((topic.publisher, topic.encode(values)))
+
+    def publish_later_values(self) -> None:
+        """Publish what has been put off; the line is busy."""
+        self._at_once = _VALUES_AT_ONCE
+        while self._later:
+            publisher, values = self._later.popleft()
+            publisher.publish(values)
+
+    def end(self, after: ReadTopics) -> None:
+        """Close what ``after`` does not use; nothing is read for these any more."""
+        kept = {id(topic) for topic in after._topics.values()}
+        for topic in self._topics.values():
+            if id(topic) not in kept:
+                self._node.destroy_publisher(topic.publisher)

@@ -1,0 +1,247 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A running bridge whose files are read again, and whose port is given away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+from typing import Any
+
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ros.files import FileWatch
+from abdf1_ros.ros.node import BridgeNode
+import pytest
+from rcl_interfaces.srv import GetParameters
+from rclpy.parameter import parameter_value_to_python
+from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_srvs.srv import SetBool, Trigger
+from support.ros import (
+    details,
+    EVERYTHING,
+    Observer,
+    OK,
+    Plcs,
+    ros_args,
+    until_status,
+    values_in,
+    WARN,
+    write_csv,
+)
+
+HEADER = 'Tag,Command,Address,Station,PLC_Type,Length'
+SPEED = 'speed,Read,N7:0,1,PLC5,2'
+LEVEL = 'level,ReadWrite,F8:0,1,PLC5,1'
+RECIPE = 'recipe,Write,N7:4,1,PLC5,2'
+
+
+class Bench:
+    """A bridge on simulated PLCs, whose files can be written anew."""
+
+    def __init__(self, folder: Path, observer: Observer, plcs: Plcs) -> None:
+        self.observer = observer
+        self.net, self.map = folder / 'net.csv', folder / 'map.csv'
+        self.write_net(100)
+        self.write_map(SPEED, RECIPE)
+        self.diagnostics = observer.diagnostics(plcs.port)
+        self.port = plcs.port
+        self.node = BridgeNode(context=observer.context, use_global_arguments=False,
+                               cli_args=ros_args(
+            f'net_file:={self.net}', f'map_file:={self.map}', f'port:={plcs.port}'))
+        observer.executor.add_node(self.node)
+        self.node.start()
+        observer.until(lambda: self.node.driver.is_online, 'the port')
+
+    def write_net(self, timeout: int, baud: int = 115200) -> None:
+        """Write the net file."""
+        write_csv(self.net, 'Baud,Timeout', [f'{baud},{timeout}'])
+
+    def write_map(self, *rows: str) -> None:
+        """Write the map file."""
+        write_csv(self.map, HEADER, rows)
+
+    def reload(self) -> tuple[bool, str]:
+        """Ask for it; return what the service says."""
+        response = self.observer.call(Trigger, '/abdf1/reload', Trigger.Request())
+        return response.success, response.message
+
+    def polling(self, wanted: bool) -> tuple[bool, str]:
+        """Ask for it; return what the service says."""
+        response = self.observer.call(SetBool, '/abdf1/polling', SetBool.Request(data=wanted))
+        return response.success, response.message
+
+    def parameter(self, name: str) -> Any:
+        """Return the value of a parameter, None where there is none."""
+        values = self.observer.call(
+            GetParameters, '/abdf1/get_parameters', GetParameters.Request(names=[name])).values
+        return parameter_value_to_python(values[0]) if values else None
+
+    def stop(self) -> None:
+        """End the bridge."""
+        self.observer.executor.remove_node(self.node)
+        self.node.stop()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    rows = ['1,PLC5,N7:0,16,7 8', '1,PLC5,F8:0,4,1.5']
+    data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
+    with Observer() as observer, Plcs(data) as plcs:
+        bench = Bench(tmp_path, observer, plcs)
+        yield bench
+        bench.stop()
+
+
+def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) -> None:
+    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    speeds.values([7, 8])
+    publisher = bench.node._reads._topics['speed'].publisher
+    bench.write_map(SPEED, LEVEL)
+    assert bench.reload() == (True, str(bench.node._configuration))
+    levels = bench.observer.listen(Float32MultiArray, '/abdf1/read/level')
+    assert values_in(levels.first()) == [1.5]
+    assert values_in(speeds.next()) == [7, 8]
+    assert bench.node._reads._topics['speed'].publisher is publisher
+    topics = dict(bench.node.get_publisher_names_and_types_by_node('abdf1', '/'))
+    assert '/abdf1/read/level' in topics
+    written = dict(bench.node.get_subscriber_names_and_types_by_node('abdf1', '/'))
+    assert '/abdf1/write/level' in written
+    assert '/abdf1/write/recipe' not in written
+    bench.write_map(LEVEL)
+    assert bench.reload()[0]
+    bench.observer.until(
+        lambda: '/abdf1/read/speed' not in dict(
+            bench.node.get_publisher_names_and_types_by_node('abdf1', '/')), 'the end of a topic')
+
+
+def test_writes_go_to_the_new_map(bench: Bench) -> None:
+    results = bench.observer.results()
+    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    publisher.publish(Int16MultiArray(data=[1, 2]))
+    assert results.next().message == 'written'
+    bench.write_map(SPEED, 'recipe,Write,N7:8,1,PLC5,2')
+    assert bench.reload()[0]
+    publisher.publish(Int16MultiArray(data=[3, 4]))
+    result = results.next()
+    assert (result.message, details(result)['address']) == ('written', 'N7:8')
+    writes = until_status(bench.diagnostics, 'writes', OK,
+                          lambda status: details(status)['confirmed'] == '2')
+    assert writes.message == 'OK: 2 of 2 writes confirmed'  # of both maps
+
+
+def test_row_of_another_type_has_a_new_topic(bench: Bench) -> None:
+    bench.observer.listen(Int16MultiArray, '/abdf1/read/speed').values([7, 8])
+    bench.write_map('speed,Read,N7:1,1,PLC5,1')
+    assert bench.reload()[0]
+    assert bench.observer.listen(Int16MultiArray, '/abdf1/read/speed').values([8])
+
+
+def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+    bench.write_map(SPEED)
+    bench.write_net(100, 9601)
+    driver = bench.node.driver
+    success, message = bench.reload()
+    assert not success
+    assert message.startswith(f'goes on as before: {bench.net}:2:1 (Baud): Baud = "9601" should')
+    assert bench.node.driver is driver
+    assert bench.parameter('net.baud') == 115200
+    assert bench.parameter('map.recipe.address') == 'N7:4'
+    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    assert values_in(speeds.first()) == [7, 8]
+    assert f'{bench.net}:2:1 (Baud): Baud = "9601"' in capfd.readouterr().err
+
+
+def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
+    bench.write_net(250)
+    bench.write_map(LEVEL)
+    assert bench.reload()[0]
+    assert bench.parameter('net.timeout') == 250
+    assert bench.parameter('map.level.address') == 'F8:0'
+    assert bench.parameter('map.speed.address') is None
+    assert bench.node.driver.network.timeout == 250
+
+
+def test_other_speed_opens_the_port_anew(
+        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+    bench.write_net(100, 19200)
+    assert bench.reload()[0]
+    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    assert values_in(speeds.first()) == [7, 8]
+    assert bench.node._opener._settings.baud == 19200
+
+
+def test_file_that_has_changed_is_told_once(
+        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+    link = until_status(bench.diagnostics, 'link', OK)
+    assert details(link)['files'] == 'as read'
+    bench.write_map(SPEED)
+    text = 'map.csv changed since read; ~/reload takes it'
+    until_status(bench.diagnostics, 'link', OK, lambda status: details(status)['files'] == text)
+    bench.diagnostics.clear()
+    for _ in range(5):
+        bench.diagnostics.next()
+    assert capfd.readouterr().err.count(text) == 1
+    assert bench.reload()[0]
+    until_status(bench.diagnostics, 'link', OK,
+                 lambda status: details(status)['files'] == 'as read')
+
+
+def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
+    text = 'the port is left to others: polling is off'
+    until_status(bench.diagnostics, 'link', OK)
+    assert bench.polling(False) == (True, f'{bench.port}: {text}')
+    open_port(PortSettings(bench.port)).close()  # which is exclusive
+    assert until_status(bench.diagnostics, 'link', WARN).message == f'WARN: {text}'
+    results = bench.observer.results()
+    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    publisher.publish(Int16MultiArray(data=[1, 2]))
+    assert results.next().message == 'not written: refused: the port is not open'
+    assert bench.polling(True) == (True, f'{bench.port} is being opened')
+    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    assert values_in(speeds.first()) == [7, 8]
+    until_status(bench.diagnostics, 'link', OK)
+
+
+# Files
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / 'map.csv'
+    path.write_text('a')
+    os.utime(path, ns=(1, 1))
+    return path
+
+
+def _written(path: Path) -> None:
+    path.write_text('b')
+
+
+def _replaced(path: Path) -> None:
+    other = path.with_suffix('.new')
+    other.write_text('b')
+    os.utime(other, ns=(1, 1))
+    other.replace(path)
+
+
+@pytest.mark.parametrize('change', [_written, _replaced, Path.unlink])
+def test_change_is_seen(file: Path, change: Callable[[Path], None]) -> None:
+    watch = FileWatch([str(file), '/nowhere'])
+    assert watch.changed() == []
+    change(file)
+    assert watch.changed() == ['map.csv']
