@@ -19,7 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 import importlib.util
+import os
 from pathlib import Path
+import re
+import subprocess
 from typing import Any
 from xml.etree import ElementTree
 
@@ -28,39 +31,11 @@ import pytest
 from rclpy.node import Node
 import rclpy.utilities
 from support.ros import EXAMPLE_FILES, Observer, ros_args
+from support.ros_tools import needs
 
 ROOT = Path(__file__).resolve().parent.parent
 POLICY = ROOT / 'config' / 'sros2' / 'policy.xml'
-
-# Which elements may stand in which, and the attributes that each has to have or may have.
-CHILDREN = {
-    'policy': {'contexts'}, 'contexts': {'context'}, 'context': {'profiles'},
-    'profiles': {'profile'}, 'profile': {'topics', 'services', 'actions'}, 'topics': {'topic'},
-    'services': {'service'}, 'actions': {'action'}, 'topic': set(), 'service': set(),
-    'action': set()}
-NEEDED = {'policy': {'version'}, 'context': {'path'}, 'profile': {'ns', 'node'}}
-QUALIFIERS = {'topics': {'publish', 'subscribe'}, 'services': {'request', 'reply'},
-              'actions': {'call', 'execute'}}
-
-
-def faults(element: ElementTree.Element) -> list[str]:
-    """Return what is wrong with the structure of a policy."""
-    tag, given = element.tag, element.attrib
-    found = [f'{tag} has no {name}' for name in NEEDED.get(tag, set()) - given.keys()]
-    qualifiers = QUALIFIERS.get(tag, set())
-    found += [f'{tag} has {name}' for name in given.keys() - NEEDED.get(tag, set()) - qualifiers]
-    found += [f'{name} of {tag} is {given[name]}' for name in qualifiers & given.keys()
-              if given[name] not in ('ALLOW', 'DENY')]
-    if not CHILDREN[tag] and not (element.text or '').strip():
-        found.append(f'{tag} is empty')
-    if CHILDREN[tag] and len(element) == 0:
-        found.append(f'{tag} holds nothing')
-    for child in element:
-        if child.tag in CHILDREN[tag]:
-            found += faults(child)
-        else:
-            found.append(f'{tag} holds {child.tag}')
-    return found
+SECURITY = ROOT / 'docs' / 'security.md'
 
 
 def allowed(node: str, kind: str, qualifier: str) -> set[str]:
@@ -106,23 +81,55 @@ def _names(node: Node, what: str) -> set[str]:
     return {name for name, _ in ask(node.get_name(), node.get_namespace())}
 
 
-def test_policy_is_well_formed() -> None:
+def test_enclaves_are_those_of_the_documentation() -> None:
     root = ElementTree.parse(POLICY).getroot()
-    assert root.tag == 'policy' and faults(root) == []
-    contexts = [context.attrib['path'] for context in root.iter('context')]
-    assert contexts == ['/abdf1', '/interlock_consumer']
+    assert [enclave.attrib['path'] for enclave in root.findall('enclaves/enclave')] == [
+        '/abdf1', '/interlock_consumer']
 
 
-@pytest.mark.parametrize(('text', 'fault'), [
-    ('<policy><contexts/></policy>', 'policy has no version'),
-    ('<policy version="0.2.0"><contexts/></policy>', 'contexts holds nothing'),
-    ('<policy version="0.2.0"><topics/></policy>', 'policy holds topics'),
-    ('<topics publish="allow"><topic>a</topic></topics>', 'publish of topics is allow'),
-    ('<topics reply="ALLOW"><topic>a</topic></topics>', 'topics has reply'),
-    ('<topics publish="ALLOW"><topic> </topic></topics>', 'topic is empty'),
-    ('<profile ns="/"><topics><topic>a</topic></topics></profile>', 'profile has no node')])
-def test_malformed_policy_is_found(text: str, fault: str) -> None:
-    assert fault in faults(ElementTree.fromstring(text))
+def keys_of(folder: Path, policy: Path) -> subprocess.CompletedProcess[str]:
+    """Make a keystore in ``folder`` with the commands that the documentation shows."""
+    blocks = re.findall(r'^```\n(.*?)^```$', SECURITY.read_text('utf-8'), re.DOTALL | re.MULTILINE)
+    block, = [block for block in blocks if 'create_keystore' in block]
+    lines = [line for line in block.splitlines() if not line.startswith(('sudo ', 'POLICY='))]
+    return subprocess.run(
+        ['bash', '-c', '\n'.join(lines)], cwd=folder, env=os.environ | {'POLICY': str(policy)},
+        capture_output=True, text=True, timeout=60, check=False)
+
+
+def topics_of(permissions: Path, what: str) -> set[str]:
+    """Return the DDS topics that an enclave may publish or subscribe to."""
+    rule = ElementTree.parse(permissions).getroot().findall('.//allow_rule')[0]
+    return {topic.text or '' for topic in rule.findall(f'{what}/topics/topic')}
+
+
+def test_commands_of_the_documentation_make_keys_that_allow_what_the_policy_says(
+        tmp_path: Path) -> None:
+    needs('sros2')
+    made = keys_of(tmp_path, POLICY)
+    assert made.returncode == 0, made.stderr
+    assert {'abdf1', 'interlock_consumer'} <= set(made.stdout.split())
+    folder = tmp_path / 'keystore' / 'enclaves'
+    ours = folder / 'abdf1' / 'permissions.xml'
+    assert topics_of(ours, 'publish') == {
+        *(f'rt{name}' for name in allowed('abdf1', 'topics', 'publish')),
+        *(f'rr{name}Reply' for name in allowed('abdf1', 'services', 'reply'))}
+    assert topics_of(ours, 'subscribe') == {
+        *(f'rt{name}' for name in allowed('abdf1', 'topics', 'subscribe')),
+        *(f'rq{name}Request' for name in allowed('abdf1', 'services', 'reply'))}
+    theirs = folder / 'interlock_consumer' / 'permissions.xml'
+    assert not [topic for topic in topics_of(theirs, 'publish') if '/write/' in topic]
+    assert ElementTree.parse(ours).getroot().findtext('.//default') == 'DENY'
+    assert (folder / 'abdf1' / 'permissions.p7s').stat().st_size > 0
+
+
+def test_policy_that_is_refused_leaves_no_keys_that_allow_everything(tmp_path: Path) -> None:
+    needs('sros2')
+    bad = tmp_path / 'policy.xml'
+    bad.write_text(POLICY.read_text('utf-8').replace('enclave', 'context'), encoding='utf-8')
+    made = keys_of(tmp_path, bad)
+    assert "Element 'contexts': This element is not expected" in made.stderr
+    assert not list((tmp_path / 'keystore' / 'enclaves').glob('*/permissions.p7s'))
 
 
 @pytest.mark.parametrize(('what', 'kind', 'qualifier'), [
