@@ -24,11 +24,10 @@ from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
 from abdf1_ros.messages import Message, Severity
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.describe import command_codes
 from abdf1_ros.pccc.dialect import Dialect
-from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcType
+from abdf1_ros.pccc.families import dialect_of, file_types_of, layout_of, parse_address
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import status_text
@@ -129,7 +128,7 @@ def addresses() -> str:
     from abdf1_ros.ros.messages import MESSAGES as TOPIC_TYPES
     rows = []
     for label, examples in PLACES:
-        parsed = [Address.parse(text, plc_type) for plc_type, text in examples.items()]
+        parsed = [parse_address(text, plc_type) for plc_type, text in examples.items()]
         kinds = types_of(parsed[0])
         assert all(types_of(address) == kinds for address in parsed), label
         rows.append((

@@ -25,6 +25,7 @@ from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.plc5 import identity as plc5
@@ -63,7 +64,7 @@ def read_packet(block: Block, number: int,
     """
     request = block.requests[number]
     try:
-        reply = check_status((yield command), block.mappings[0].plc_type)
+        reply = check_status((yield command), family_of(block.start.plc_type).meanings)
     except RemoteError as error:
         if error.sts == STS_ILLEGAL_COMMAND and \
                 request.words > block.dialect.sure_read(request.start.file_type):
@@ -101,7 +102,8 @@ def carry_out(write: Write) -> Generator[Request, Packet, Ending]:
 def _send(write: Write, packet: int) -> Generator[Request, Packet, str]:
     """Send one packet; return what has to be said of the way it was done, if anything."""
     try:
-        check_status((yield write.commands[packet]), write.mapping.plc_type)
+        check_status((yield write.commands[packet]),
+                     family_of(write.mapping.plc_type).meanings)
     except RemoteError as error:
         if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
             raise

@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from enum import Enum
 
-from abdf1_ros.pccc.file_types import PlcType
-
 
 class Access(Enum):
     """
@@ -39,16 +37,3 @@ class Access(Enum):
     UNPROTECTED = 'Unprotected'
     PROTECTED = 'Protected'
     CIF = 'CIF'
-
-
-_WAYS = {
-    PlcType.PLC2: (Access.UNPROTECTED, Access.PROTECTED, Access.CIF),
-    PlcType.PLC3: (Access.WORD_RANGE,),
-    PlcType.PLC5: (Access.TYPED, Access.WORD_RANGE),
-    PlcType.SLC: (Access.SLOT, Access.FLAT),
-}
-
-
-def accesses_of(plc_type: PlcType) -> tuple[Access, ...]:
-    """Return the ways to the words of a family, the usual one first."""
-    return _WAYS[plc_type]

@@ -42,13 +42,7 @@ _FUNCTION_FILES = re.compile(
 
 
 def advice(text: str, plc_type: PlcType) -> str | None:
-    """
-    Return what is wrong with an address in capital letters, None where nothing like this is.
-
-    Addresses of a PLC-2 and a PLC-3 are not looked at.
-    """
-    if plc_type not in (PlcType.PLC5, PlcType.SLC):
-        return None
+    """Return what is wrong with an address in capital letters, None where nothing like this is."""
     if match := _RANGE.fullmatch(text):
         return _of_range(match)
     if plc_type is PlcType.SLC and (match := _FUNCTION_FILES.fullmatch(text)):

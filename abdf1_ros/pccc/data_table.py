@@ -44,11 +44,6 @@ class DataTable:
         self._words: dict[Area, bytearray] = {}
         self._types: dict[int, FileType] = {}
 
-    @property
-    def _has_sections(self) -> bool:
-        """Tell whether each type has file numbers of its own."""
-        return self.plc_type is PlcType.PLC3
-
     def __iter__(self) -> Iterator[Area]:
         """Iterate over the files (for SLC I/O, the slots)."""
         return iter(self._words)
@@ -56,7 +51,7 @@ class DataTable:
     def create(self, address: Address, words: int) -> None:
         """Make the file of ``address`` long enough for ``words`` words from there on."""
         known = self._types.setdefault(address.file, address.file_type)
-        if known is not address.file_type and not self._has_sections:
+        if known is not address.file_type and not address.addressing.has_sections:
             raise NoSuchFile(f'file {address.file} is of type {known.value} already')
         store = self._words.setdefault(address.area, bytearray())
         per_element = address.layout.words

@@ -18,13 +18,10 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import gateways
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.pccc.plc2 import identity as plc2
-from abdf1_ros.pccc.plc3 import identity as plc3
-from abdf1_ros.pccc.plc5 import identity as plc5
-from abdf1_ros.pccc.slc import identity as slc
 
-_LAYOUTS = (slc.decode, plc5.decode, plc3.decode, plc2.decode, gateways.decode)
+_LAYOUTS = (*(family.decode_identity for family in FAMILIES.values()), gateways.decode)
 
 
 def decode_identity(data: bytes) -> Identity:

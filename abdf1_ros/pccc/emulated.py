@@ -19,12 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
-from abdf1_ros.pccc.plc2 import identity as plc2
-from abdf1_ros.pccc.plc3 import identity as plc3
-from abdf1_ros.pccc.plc5 import identity as plc5
-from abdf1_ros.pccc.slc import identity as slc
 
 
 class Setting(Enum):
@@ -58,7 +55,8 @@ class EmulatedProcessor:
 
     def encode(self) -> bytes:
         """Return the data of the reply to 06/03: SLC 24 bytes, PLC-5 36, PLC-3 18, PLC-2 10."""
-        return _ENCODERS[self.plc_type](self.mode, self.is_faulted, self.is_full_duplex)
+        return family_of(self.plc_type).encode_identity(
+            self.mode, self.is_faulted, self.is_full_duplex)
 
     @property
     def mode(self) -> Mode:
@@ -69,7 +67,3 @@ class EmulatedProcessor:
     def is_faulted(self) -> bool:
         """Tell whether there is a major fault."""
         return self.setting is Setting.FAULT
-
-
-_ENCODERS = {PlcType.SLC: slc.encode, PlcType.PLC5: plc5.encode, PlcType.PLC3: plc3.encode,
-             PlcType.PLC2: plc2.encode}

@@ -12,47 +12,44 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the server needs of a PLC family: its commands, and how it refuses bad ones."""
+"""What makes a PLC family."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
-from abdf1_ros.pccc import status
-from abdf1_ros.pccc.fields import Reader
-
-Commands = dict[tuple[int, int], Callable[[Reader], bytes]]
-"""By CMD and FNC: what takes the parameters off a reader and returns the reply's data."""
-
-BasicCommand = Callable[[Reader, int], bytes]
-"""The same for a command without FNC; the second argument is the command's SRC."""
-
-BasicCommands = dict[int, BasicCommand]
-"""By CMD."""
-
-Codes = tuple[int, int | None]
-"""STS and EXT STS."""
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Addressing
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.serving import ServedFamily
+from abdf1_ros.pccc.status import Meanings, USUAL_MEANINGS
 
 
-class Refusal(Exception):
-    """A command is answered with this STS (and EXT STS) instead of data."""
+@dataclass(frozen=True, slots=True)
+class Family:
+    """
+    A PLC family: how its places are written, how it is spoken to, and how we play one.
 
-    def __init__(self, sts: int, ext_sts: int | None = None) -> None:
-        super().__init__(status.status_text(sts, ext_sts))
-        self.sts = sts
-        self.ext_sts = ext_sts
+    ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
+    another family to 06/03; ``encode_identity`` makes one for a mode, a fault and full duplex.
+    ``meanings`` are those of its own error codes. ``by_processor`` is for a family whose
+    processors take packets of different lengths.
+    """
 
+    addressing: Addressing
+    dialects: Mapping[Access, Dialect]
+    commands: Callable[[DataTable], ServedFamily]
+    decode_identity: Callable[[bytes], Identity | None]
+    encode_identity: Callable[[Mode, bool, bool], bytes]
+    meanings: Meanings = USUAL_MEANINGS
+    by_processor: Mapping[Processor, Dialect] = field(default_factory=dict)
 
-def extended(ext_sts: int) -> Refusal:
-    """Return the refusal with this EXT STS."""
-    return Refusal(status.EXTENDED, ext_sts)
-
-
-class Family(Protocol):
-    """The commands of a family, and what it answers to addresses that are not there."""
-
-    commands: Commands
-    basic_commands: BasicCommands
-    no_such_file: Codes
-    out_of_range: Codes
+    @property
+    def plc_type(self) -> PlcType:
+        """Return what the CSV files call it."""
+        return self.addressing.plc_type

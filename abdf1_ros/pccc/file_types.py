@@ -19,7 +19,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from abdf1_ros.pccc import members
 from abdf1_ros.pccc.members import Members
 
 
@@ -117,58 +116,3 @@ class Layout:
         parts = [member for member in self.members.values() if member.writable
                  and member.word <= word < member.word + member.words]
         return not self.members or any(part.bit in (None, bit) for part in parts)
-
-
-# Data types of a PLC-5 (M 7-29). A file's own type has to be named when it is written.
-_CHARACTERS, _INTEGER, _BCD = 3, 4, 16
-_LAYOUTS: dict[PlcType, dict[FileType, Layout]] = {
-    PlcType.PLC2: {FileType.BINARY: Layout()},
-    PlcType.PLC3: {kind: Layout() for kind in (
-        FileType.OUTPUT, FileType.INPUT, FileType.INTEGER, FileType.BCD, FileType.BINARY,
-        FileType.ASCII, FileType.STATUS)} | {
-        FileType.TIMER: Layout(3, members=members.PLC3_TIMER),
-        FileType.COUNTER: Layout(3, members=members.PLC3_COUNTER)},
-    PlcType.PLC5: {kind: Layout(code=_INTEGER) for kind in (
-        FileType.OUTPUT, FileType.INPUT, FileType.STATUS, FileType.BINARY, FileType.INTEGER)} | {
-        FileType.ASCII: Layout(code=_CHARACTERS),
-        FileType.BCD: Layout(code=_BCD),
-        # The two words behind ACC are internal and have no address.
-        FileType.TIMER: Layout(3, 5, members.TIMER, typed_words=5),
-        FileType.COUNTER: Layout(3, 6, members.COUNTER),
-        FileType.CONTROL: Layout(3, 7, members.CONTROL),
-        FileType.FLOAT: Layout(2, 8),
-        FileType.STRING: Layout(42, _CHARACTERS),
-        FileType.PID: Layout(82, 0x15, members.PLC5_PID),
-        FileType.MESSAGE: Layout(56, 0x16, members.PLC5_MESSAGE),
-        FileType.SFC_STATUS: Layout(3, 0x1D, members.PLC5_SFC),
-        FileType.BLOCK_TRANSFER: Layout(6, 0x20, members.PLC5_BLOCK_TRANSFER)},
-    PlcType.SLC: {
-        FileType.OUTPUT: Layout(code=0x8B),
-        FileType.INPUT: Layout(code=0x8C),
-        FileType.STATUS: Layout(code=0x84),
-        FileType.BINARY: Layout(code=0x85),
-        FileType.TIMER: Layout(3, 0x86, members.TIMER),
-        FileType.COUNTER: Layout(3, 0x87, members.COUNTER),
-        FileType.CONTROL: Layout(3, 0x88, members.CONTROL),
-        FileType.INTEGER: Layout(code=0x89),
-        FileType.FLOAT: Layout(2, 0x8A),
-        FileType.STRING: Layout(42, 0x8D),
-        FileType.ASCII: Layout(code=0x8E),
-        FileType.BCD: Layout(code=0x8F),
-        FileType.LONG: Layout(2, 0x91),
-        FileType.MESSAGE: Layout(25, 0x92, members.SLC_MESSAGE),
-        FileType.PID: Layout(23, 0x93, members.SLC_PID)},
-}
-
-
-def file_types_of(plc_type: PlcType) -> tuple[FileType, ...]:
-    """Return the file types that a family can have."""
-    return tuple(kind for kind in FileType if kind in _LAYOUTS[plc_type])
-
-
-def layout_of(file_type: FileType, plc_type: PlcType) -> Layout:
-    """Return how elements of such a file are built; KeyError where the family has none."""
-    return _LAYOUTS[plc_type][file_type]
-
-
-BY_SLC_CODE = {layout.code: kind for kind, layout in _LAYOUTS[PlcType.SLC].items()}

@@ -17,28 +17,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 import struct
 from typing import Any
 
 from abdf1_ros.pccc import typed_data
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.file_types import BY_SLC_CODE, file_types_of, FileType, layout_of, PlcType
-from abdf1_ros.pccc.plc2 import address as plc2_address
-from abdf1_ros.pccc.plc3 import address as plc3_address
+from abdf1_ros.pccc.address import Address, Addressing
+from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.plc2.address import show_word
 from abdf1_ros.pccc.plc3 import commands as plc3
+from abdf1_ros.pccc.plc3.address import ADDRESSING as PLC3
+from abdf1_ros.pccc.plc3.address import BY_SECTION
 from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.plc5.address import ADDRESSING as PLC5
 from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.address import ADDRESSING as SLC
+from abdf1_ros.pccc.slc.files import BY_CODE
 from abdf1_ros.pccc.typed_data import TypedData
 
 _BY_PLC5_FILE = {
-    kind.default_file: kind for kind in file_types_of(PlcType.PLC5)
-    if kind.default_file is not None}
+    kind.default_file: kind for kind in FileType
+    if kind in PLC5.files and kind.default_file is not None}
 # Types that a typed command names, with their size; 4 may be N, B, S, I or O (M 7-29).
 _INTEGERS = (FileType.INTEGER, FileType.BINARY, FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
 _BY_PLC5_TYPE = {
     (element.type_id, element.wire_size // element.parts): kind
-    for kind in file_types_of(PlcType.PLC5) if kind not in _INTEGERS
-    for element in (plc5.element_of(Address(PlcType.PLC5, kind, 0, 0), is_value=False),)}
+    for kind in PLC5.files if kind not in _INTEGERS
+    for element in (plc5.element_of(Address(PLC5, kind, 0, 0), is_value=False),)}
 
 
 def count_of(number: int, name: str) -> str:
@@ -67,52 +72,51 @@ def system_address(address: plc5.SystemAddress, values: TypedData | None = None)
     if kind is None and values is not None:
         kind = _BY_PLC5_TYPE.get((values.type_id, values.element_size))
     if kind is not None:
-        return _place(PlcType.PLC5, kind, address.file, address.element,
-                      address.sub_element or 0)
+        return _place(PLC5, kind, address.file, address.element, address.sub_element or 0)
     text = f'file {address.file}:{address.element}'
     return text if address.sub_element is None else f'{text}.{address.sub_element}'
 
 
 def extended_address(address: plc3.ExtendedAddress) -> str:
     """Return a PLC-3 address, by its levels where its section has no letter (M 13-5)."""
-    kind = plc3_address.BY_SECTION.get(address.section)
+    kind = BY_SECTION.get(address.section)
     if kind is not None and not kind.is_structure and not address.structure:
-        return plc3_address.show(kind, address.file, address.word, 0, None)
+        return str(Address(PLC3, kind, address.file, address.word))
     if kind is not None and kind.is_structure and address.word < 3:
-        return plc3_address.show(kind, address.file, address.structure, address.word, None)
+        return str(Address(PLC3, kind, address.file, address.structure, address.word))
     return (f'E{plc3.DATA_TABLE}.{plc3.CONTEXT}.{address.section}.{address.file}.'
             f'{address.structure}.{address.word}')
 
 
 def byte_address(address: int) -> str:
     """Return the octal word of a PLC-2 address, which an SLC may take for a word's number."""
-    return f'{plc2_address.show(address // 2, None)} (ADDR {address})'
+    return f'{show_word(address // 2)} (ADDR {address})'
 
 
 def logical_address(address: slc.LogicalAddress) -> str:
     """Return an SLC address, by its fields where its type is not known."""
-    kind, word = BY_SLC_CODE.get(address.type_code), address.sub_element or 0
+    kind, word = BY_CODE.get(address.type_code), address.sub_element or 0
     if kind is not None:
-        return _place(PlcType.SLC, kind, address.file, address.element, word)
+        return _place(SLC, kind, address.file, address.element, word)
     text = f'file {address.file} type {address.type_code:02X} element {address.element}'
     return text + _beyond(word)
 
 
 def logical_size(address: slc.LogicalAddress, size: int) -> str:
     """Return ``size`` bytes as elements where they are whole ones, as words, or as bytes."""
-    kind = BY_SLC_CODE.get(address.type_code)
-    words = layout_of(kind, PlcType.SLC).words if kind else 1
+    kind = BY_CODE.get(address.type_code)
+    words = SLC.files[kind].words if kind else 1
     if words > 1 and size and size % (2 * words) == 0 and not address.sub_element:
         return count_of(size // 2 // words, 'element')
     return count_of(size, 'byte') if size % 2 else count_of(size // 2, 'word')
 
 
-def _place(plc_type: PlcType, kind: FileType, file: int, element: int, word: int) -> str:
+def _place(addressing: Addressing, kind: FileType, file: int, element: int, word: int) -> str:
     """Return an address; a word that its element does not have is counted from there on."""
-    is_slot = kind.is_io and plc_type is PlcType.SLC
-    is_inside = kind.is_structure and word < layout_of(kind, plc_type).words
-    beyond = 0 if is_slot or is_inside else word
-    return str(Address(plc_type, kind, file, element, word - beyond)) + _beyond(beyond)
+    start = Address(addressing, kind, file, element)
+    is_inside = kind.is_structure and word < start.layout.words
+    beyond = 0 if addressing.slot_of(start) is not None or is_inside else word
+    return str(replace(start, word=word - beyond)) + _beyond(beyond)
 
 
 def _beyond(words: int) -> str:
@@ -150,7 +154,7 @@ _NUMBERS: dict[FileType, Callable[[bytes], str]] = {
 
 def logical_values(address: slc.LogicalAddress, data: bytes) -> str:
     """Return the data of an SLC command or reply as its file type says."""
-    kind = BY_SLC_CODE.get(address.type_code)
+    kind = BY_CODE.get(address.type_code)
     if kind is None or kind.is_structure and not address.sub_element:
         return words_text(data)  # a structure begins with a word of flags
     return _NUMBERS.get(kind, words_text)(data)

@@ -29,10 +29,10 @@ from abdf1_ros.pccc.diagnostics import (
     STATUS,
 )
 from abdf1_ros.pccc.emulated import EmulatedProcessor
-from abdf1_ros.pccc.family import Commands
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
+from abdf1_ros.pccc.serving import Commands
 
 
 def served_diagnostics(processor: EmulatedProcessor,

@@ -21,23 +21,17 @@ those that drivers in the field report.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address_errors import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.emulated import EmulatedProcessor
-from abdf1_ros.pccc.family import Commands, extended, Family, Refusal
+from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
-from abdf1_ros.pccc.plc2.server import Plc2Commands
-from abdf1_ros.pccc.plc3.server import Plc3Commands
-from abdf1_ros.pccc.plc5.server import Plc5Commands
 from abdf1_ros.pccc.served_diagnostics import served_diagnostics
-from abdf1_ros.pccc.slc.server import SlcCommands
+from abdf1_ros.pccc.serving import Commands, extended, Refusal
 
 
 class Server:
@@ -45,7 +39,7 @@ class Server:
 
     def __init__(self, table: DataTable, processor: EmulatedProcessor | None = None,
                  counters: ServedCounters | None = None) -> None:
-        self._family = _FAMILIES[table.plc_type](table)
+        self._family = family_of(table.plc_type).commands(table)
         processor = processor or EmulatedProcessor(table.plc_type)
         self._commands: Commands = self._family.commands | served_diagnostics(
             processor, counters)
@@ -79,8 +73,3 @@ class Server:
             raise extended(error.ext_sts) from None
         except FormatError:
             raise Refusal(status.STS_ILLEGAL_COMMAND) from None
-
-
-_FAMILIES: dict[PlcType, Callable[[DataTable], Family]] = {
-    PlcType.PLC2: Plc2Commands, PlcType.PLC3: Plc3Commands, PlcType.PLC5: Plc5Commands,
-    PlcType.SLC: SlcCommands}

@@ -16,9 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
-from abdf1_ros.pccc.file_types import PlcType
 
 EXTENDED = 0xF0
 
@@ -109,55 +111,36 @@ _EXTENDED = {
 }
 
 
-# What a family means by a code, where that is more or something else (M 8-5..8-10).
-_OF_FAMILY: dict[PlcType | None, dict[int, str]] = {
-    PlcType.PLC2: {
-        0x20: 'the PLC has found errors when it verified a command',
-        0x30: 'somebody has to look after the PLC: switch, cable or fault',
-        0x40: 'error between module and PLC',
-        0x50: 'address outside the data table or the window, or no compatibility file',
-        0x60: 'function disabled by a switch of the module',
-        0x80: 'protected commands are inhibited'},
-    PlcType.PLC3: {
-        0x30: 'a shutdown was requested',
-        0x40: 'backplane error',
-        0x50: 'file or word not there, or file above 65535 words',
-        0x60: 'keyswitch does not allow this'},
-}
-_EXTENDED_OF_FAMILY: dict[PlcType | None, dict[int, str]] = {
-    # SLC and MicroLogix report as on DH-485.
-    PlcType.SLC: {
-        0x07: 'memory module is too small',
-        0x0B: 'access denied',
-        0x0C: 'resource not available',
-        0x12: 'bad parameter',
-        0x14: 'failed while it was carried out'},
-    PlcType.PLC3: {
-        0x06: 'file or word not there, or address does not lead to a word',
-        0x07: 'words of the transaction are not there',
-        0x09: 'past the end of the file',
-        0x0A: 'total and word address are above 65535 together'},
-}
+@dataclass(frozen=True, slots=True)
+class Meanings:
+    """What a family means by codes, where that is more or something else than in M 8-2..8-4."""
+
+    sts: Mapping[int, str] = field(default_factory=dict)
+    ext_sts: Mapping[int, str] = field(default_factory=dict)
 
 
-def status_text(sts: int, ext_sts: int | None = None, family: PlcType | None = None) -> str:
+USUAL_MEANINGS = Meanings()
+
+
+def status_text(sts: int, ext_sts: int | None = None,
+                meanings: Meanings = USUAL_MEANINGS) -> str:
     """
     Return codes and meaning, e.g. "STS 50: address not there, or memory protected".
 
-    ``family`` is that of the station that has answered, None where it is unknown.
+    ``meanings`` are those of the family of the station that has answered.
     """
     if sts & EXTENDED == EXTENDED and ext_sts is not None:
-        known = _EXTENDED | _EXTENDED_OF_FAMILY.get(family, {})
+        known = {**_EXTENDED, **meanings.ext_sts}
         return f'STS {sts:02X} EXT STS {ext_sts:02X}: {known.get(ext_sts, "unknown code")}'
-    remote = _REMOTE | _OF_FAMILY.get(family, {})
+    remote = {**_REMOTE, **meanings.sts}
     parts = [remote.get(sts & 0xF0), _LOCAL.get(sts & 0x0F)]
     meaning = '; '.join(part for part in parts if part) or 'unknown code'
     return f'STS {sts:02X}: {meaning}'
 
 
-def check_status(reply: Packet, family: PlcType | None = None) -> bytes:
+def check_status(reply: Packet, meanings: Meanings = USUAL_MEANINGS) -> bytes:
     """
-    Return the data of a reply that reports success, of a station of ``family``.
+    Return the data of a reply that reports success.
 
     Raises RemoteError for any other; a reply that breaks off before its EXT STS counts too.
     """
@@ -165,7 +148,7 @@ def check_status(reply: Packet, family: PlcType | None = None) -> bytes:
         return reply.data
     extended = reply.sts & EXTENDED == EXTENDED and len(reply.data) > 0
     ext_sts = reply.data[0] if extended else None
-    text = status_text(reply.sts, ext_sts, family)
+    text = status_text(reply.sts, ext_sts, meanings)
     if ext_sts in _WITH_OWNER and len(reply.data) > 1:
         text += f' ({reply.data[1]})'
     raise RemoteError(reply.sts, ext_sts, text)

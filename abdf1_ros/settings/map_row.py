@@ -25,9 +25,10 @@ from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
-from abdf1_ros.pccc.access import Access, accesses_of
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.families import accesses_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -258,7 +259,7 @@ class RowReader:
     def _address(self, plc_type: PlcType, access: Access | None) -> Address | None:
         text = self._row.get('Address')
         try:
-            return Address.parse(text, plc_type, access)
+            return parse_address(text, plc_type, access)
         except AddressSyntaxError as error:
             self._fault('Address', str(error), Message.ERR_ADDRESS_SYNTAX, shown(text))
         except AddressRangeError as error:

@@ -25,7 +25,7 @@ from typing import Any
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, values_text

@@ -29,6 +29,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.csv_table import read_rows, shown
 from abdf1_ros.settings.station_lists import octal_remarks
 
@@ -39,7 +40,7 @@ _MODE_WORDS = {
     'halfduplex': 'Master, or Slave where another is the master', 'df1halfduplexmaster': 'Master',
     'halfduplexmaster': 'Master', 'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave'}
 POLLING_MODES = ('Message', 'Standard')
-PLC_TYPES = ('PLC2', 'PLC3', 'PLC5', 'SLC')
+PLC_TYPES = tuple(entry.value for entry in PlcType)
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 _DEVICE_SERVERS = ('socket', 'rfc2217')
 

@@ -20,8 +20,8 @@ from collections.abc import Callable, Sequence
 import re
 
 from abdf1_ros.numbers import decimal_number, whole_number
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import Faults, numbers, SimulatedPlc
 
@@ -148,7 +148,7 @@ def _set_mode(plc: SimulatedPlc, text: str) -> str:
 def _send(plc: SimulatedPlc, address: str, values: Sequence[str],
           report: Callable[[str], None]) -> str:
     try:
-        place = Address.parse(address, plc.table.plc_type)
+        place = parse_address(address, plc.table.plc_type)
         plc.send(place, numbers(values), _BRIDGE_STATION,
                  lambda outcome: report(f'station {plc.station}: msg {place} {outcome}'))
     except ValueError as error:

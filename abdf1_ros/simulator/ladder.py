@@ -31,6 +31,7 @@ from enum import IntEnum
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.file_types import FileType
 
 SCAN_TIME = 0.01
@@ -97,6 +98,7 @@ class Ladder:
     def __init__(self, table: DataTable, preset: int = USUAL_PRESET,
                  on_lamp: Callable[[float, Lamp, bool], None] = lambda at, lamp, on: None) -> None:
         self._table = table
+        self._addressing = family_of(table.plc_type).addressing
         self._on_lamp = on_lamp
         self._watchdog = _Timer(preset)
         self._stable = _Timer(_STABLE)
@@ -108,7 +110,7 @@ class Ladder:
         self._next_scan: float | None = None
         for kind, file, words in ((FileType.INTEGER, 10, 2), (FileType.INTEGER, 11, 4),
                                   (FileType.BINARY, 12, 2), (FileType.TIMER, 13, 9)):
-            table.create(Address(table.plc_type, kind, file, 0), words)
+            table.create(Address(self._addressing, kind, file, 0), words)
 
     def is_on(self, lamp: Lamp) -> bool:
         """Tell whether a lamp is on."""
@@ -179,21 +181,21 @@ class Ladder:
                 self._on_lamp(now, lamp, self.is_on(lamp))
 
     def _show_first_pass(self) -> None:
-        place = Address(self._table.plc_type, FileType.STATUS, 2, 1)
+        place = Address(self._addressing, FileType.STATUS, 2, 1)
         try:
             self._table.write_bits(place, _FIRST_PASS, _FIRST_PASS * self._is_first_pass)
         except (NoSuchFile, OutOfRange):  # a table need not have a status file
             return
 
     def _get(self, file: int, element: int) -> int:
-        place = Address(self._table.plc_type, FileType.INTEGER, file, element)
+        place = Address(self._addressing, FileType.INTEGER, file, element)
         return int.from_bytes(self._table.read(place, 1), 'little')
 
     def _put(self, file: int, element: int, value: int) -> None:
         self._write(FileType.INTEGER, file, element, value)
 
     def _write(self, kind: FileType, file: int, element: int, value: int, word: int = 0) -> None:
-        place = Address(self._table.plc_type, kind, file, element, word)
+        place = Address(self._addressing, kind, file, element, word)
         self._table.write(place, value.to_bytes(2, 'little'))
 
 

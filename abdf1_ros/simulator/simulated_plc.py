@@ -36,8 +36,8 @@ from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
-from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
@@ -312,7 +312,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
         raise Problem(row.where('PLC_Type'),
                       f'station {station} is a {plc.table.plc_type.value} already')
     try:
-        address = Address.parse(row.get('Address'), plc_type)
+        address = parse_address(row.get('Address'), plc_type)
         codec = _natural_codec(address, length)
         _check_extent(row, address, codec)
         plc.table.create(address, codec.words)

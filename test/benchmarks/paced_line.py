@@ -46,8 +46,8 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.messages import Event, Severity
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.link_thread import LinkThread
@@ -112,14 +112,14 @@ def block_of(station: int) -> Mapping:
     """Return the row that reads ten words of a station, as often as the line allows."""
     return Mapping(
         station, station, f's{station}', f's{station}', Command.READ,
-        Address.parse('N7:0', PlcType.SLC), station, PlcType.SLC, WORDS, ValueType.INT16,
+        parse_address('N7:0', PlcType.SLC), station, PlcType.SLC, WORDS, ValueType.INT16,
         f's{station}', 0)
 
 
 def simulated(station: int, network: Network, delay: float = 0.0) -> SimulatedPlc:
     """Return a PLC whose replies are ready ``delay`` s after the command."""
     table = DataTable(PlcType.SLC)
-    table.create(Address.parse('N7:0', PlcType.SLC), WORDS)
+    table.create(parse_address('N7:0', PlcType.SLC), WORDS)
     plc = SimulatedPlc(station, table, network.checksum, time.monotonic)
     plc.faults.delay = delay
     return plc

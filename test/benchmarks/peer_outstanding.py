@@ -46,8 +46,8 @@ from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings  # noqa: E402
 from abdf1_ros.df1.stations import ActiveStationList  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.pccc.address import Address  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
+from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.ports.link_thread import Port  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
@@ -112,7 +112,7 @@ def mappings() -> list[Mapping]:
     """Return ten rows that no command can read together."""
     return [Mapping(
         number, number, f'n{number}', f'n{number}', Command.READ,
-        Address.parse(f'N{number}:0', PlcType.PLC5), 1, PlcType.PLC5, WORDS, ValueType.INT16,
+        parse_address(f'N{number}:0', PlcType.PLC5), 1, PlcType.PLC5, WORDS, ValueType.INT16,
         f'n{number}', 0) for number in BLOCKS]
 
 

@@ -46,7 +46,7 @@ import time
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
-from abdf1_ros.pccc.address import Address  # noqa: E402
+from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import line_model  # noqa: E402
 from abdf1_ros.plan.line_model import Request  # noqa: E402
@@ -69,7 +69,7 @@ PLACES = (
 def row(number: int, text: str, station: int, plc_type: PlcType, length: int,
         period: int) -> Mapping:
     """Return a row that reads."""
-    address = Address.parse(text, plc_type)
+    address = parse_address(text, plc_type)
     kind = FILES[text[0]] if address.bit is None else ValueType.BOOL
     return Mapping(
         number, number, f't{number}', f't{number}', Command.READ, address, station, plc_type,

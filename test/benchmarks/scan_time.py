@@ -39,7 +39,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.pccc.address import Address  # noqa: E402
+from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import scan_time  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
@@ -71,7 +71,7 @@ def mappings() -> list[Mapping]:
     """Return the map."""
     return [Mapping(
         number, number, text, f'row{number}', Command.READ,
-        Address.parse(text, PlcType.PLC5), STATION, PlcType.PLC5, length, kind, f'row{number}', 0)
+        parse_address(text, PlcType.PLC5), STATION, PlcType.PLC5, length, kind, f'row{number}', 0)
         for number, (text, length, kind) in enumerate(ROWS)]
 
 

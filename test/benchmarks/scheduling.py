@@ -50,7 +50,7 @@ sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.driver.points import WriteResult  # noqa: E402
-from abdf1_ros.pccc.address import Address  # noqa: E402
+from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import block_time, intervals, line_model, load  # noqa: E402
 from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
@@ -69,7 +69,7 @@ FIRST_FILE = 9
 def row(file: int, period: int | None, command: Command, words: int) -> Mapping:
     """Return a row with a file of its own."""
     return Mapping(
-        file, file, f'n{file}', f'n{file}', command, Address.parse(f'N{file}:0', PlcType.SLC),
+        file, file, f'n{file}', f'n{file}', command, parse_address(f'N{file}:0', PlcType.SLC),
         STATION, PlcType.SLC, words, ValueType.INT16, f'n{file}', period)
 
 

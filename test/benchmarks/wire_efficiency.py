@@ -45,7 +45,7 @@ from abdf1_ros.df1 import frames  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.pccc.address import Address  # noqa: E402
+from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
@@ -75,7 +75,7 @@ def measure(mode: str, baud: int, words: int, count: int) -> tuple[float, list[f
     """Return byte time and times of transactions (s), and troubles."""
     network = Network(mode=mode, baud=baud, timeout=2000)
     mapping = Mapping(
-        1, 1, 'n', 'n', Command.READ, Address.parse('N7:0', PlcType.SLC), STATION, PlcType.SLC,
+        1, 1, 'n', 'n', Command.READ, parse_address('N7:0', PlcType.SLC), STATION, PlcType.SLC,
         words, ValueType.INT16, 'n', 0)
     watch = Watch()
     driver = Driver(network, [mapping], DriverSettings(processor_period=0.0), watch)
@@ -91,7 +91,7 @@ def measure(mode: str, baud: int, words: int, count: int) -> tuple[float, list[f
 def measure_bare(mode: str, baud: int, words: int, count: int) -> list[float]:
     """Return the times (s) that the same bytes take without a driver."""
     network = Network(mode=mode, baud=baud, timeout=2000)
-    address = Address.parse('N7:0', PlcType.SLC)
+    address = parse_address('N7:0', PlcType.SLC)
     mapping = Mapping(
         1, 1, 'n', 'n', Command.READ, address, STATION, PlcType.SLC, words, ValueType.INT16,
         'n', 0)

@@ -29,10 +29,9 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -52,7 +51,7 @@ class Plc:
     def __init__(self, number: int, checksum: Checksum) -> None:
         family = FAMILIES[number]
         self.table = DataTable(family)
-        self.table.create(Address.parse('N7:0', family), WORDS)
+        self.table.create(parse_address('N7:0', family), WORDS)
         self.executed: Counter[int] = Counter()
         self.commands: dict[int, Packet] = {}
         self.replies: dict[int, Packet] = {}
@@ -137,7 +136,7 @@ class Rig:
         number = self.random.choice(list(FAMILIES))
         family = FAMILIES[number]
         dialect = dialect_of(family)
-        address = Address.parse(f'N7:{self.random.randrange(WORDS - 20)}', family)
+        address = parse_address(f'N7:{self.random.randrange(WORDS - 20)}', family)
         words = self.random.randint(1, 20)
         kind = self.random.randrange(3)
         if kind == 0:
@@ -178,7 +177,7 @@ def assert_recovers(rig: Rig) -> None:
     rig.line.noise = QUIET
     for number, family in FAMILIES.items():
         was_active = rig.stations[number].active
-        address = Address.parse('N7:0', family)
+        address = parse_address('N7:0', family)
         outcome = rig.exchange(number, dialect_of(family).read(address, 20))
         assert isinstance(outcome.result, Packet), f'station {number}, active: {was_active}'
         data = dialect_of(family).read_data(address, 20, outcome.result.data)
@@ -219,7 +218,7 @@ def test_counters_of_both_ends_agree_on_a_clean_line(checksum: Checksum, chunk: 
 
 def test_clean_exchange_takes_the_time_of_its_characters() -> None:
     rig = Rig(propagation=0.0)
-    command = dialect_of(PlcType.SLC).read(Address.parse('N7:0', PlcType.SLC), 1)
+    command = dialect_of(PlcType.SLC).read(parse_address('N7:0', PlcType.SLC), 1)
     outcome = rig.exchange(2, command)
     # Command 21 characters, ACK 2, poll 4, reply 14; the TNS is 0F01, nothing is stuffed.
     assert rig.machine.counters.chars_sent == 21 + 4 + 2
@@ -228,14 +227,14 @@ def test_clean_exchange_takes_the_time_of_its_characters() -> None:
 
 def test_tx_delay_passes_before_command_poll_and_ack() -> None:
     rig = Rig(propagation=0.0, timing=LineTiming(char_time(BAUD), tx_delay=0.05))
-    command = dialect_of(PlcType.SLC).read(Address.parse('N7:0', PlcType.SLC), 1)
+    command = dialect_of(PlcType.SLC).read(parse_address('N7:0', PlcType.SLC), 1)
     outcome = rig.exchange(2, command)
     assert outcome.seconds == pytest.approx((21 + 2 + 4 + 14) * char_time(BAUD) + 3 * 0.05)
 
 
 def test_refused_command_counts_as_error_message_at_both_ends() -> None:
     rig = Rig()
-    command = dialect_of(PlcType.SLC).read(Address.parse('N99:0', PlcType.SLC), 1)
+    command = dialect_of(PlcType.SLC).read(parse_address('N99:0', PlcType.SLC), 1)
     result = rig.exchange(2, command).result
     assert isinstance(result, Packet)
     assert result.sts == 0x10

@@ -26,9 +26,8 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.errors import CommandTimeout, LineReset, NeverTaken, StationInactive
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -57,7 +56,7 @@ class Rig:
         self.random = Random(seed)
         self.tables = {number: DataTable(FAMILY) for number in (MASTER, *SLAVES)}
         for table in self.tables.values():
-            table.create(Address.parse('N7:0', FAMILY), WORDS)
+            table.create(parse_address('N7:0', FAMILY), WORDS)
         self.executed: Counter[tuple[int, int, int]] = Counter()
         self.replies: dict[tuple[int, int, int], Packet] = {}
         self.commands: dict[tuple[int, int, int], Packet] = {}
@@ -91,7 +90,7 @@ class Rig:
 
     def ask(self, src: int, dst: int) -> Errand:
         """Queue a random read or write from one node to another."""
-        address = Address.parse(f'N7:{self.random.randrange(WORDS - 12)}', FAMILY)
+        address = parse_address(f'N7:{self.random.randrange(WORDS - 12)}', FAMILY)
         words = self.random.randint(1, 12)
         cmd, body = DIALECT.read(address, words)
         if self.random.random() < 0.5:

@@ -27,7 +27,7 @@ from abdf1_ros.df1.peer import PeerSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -61,7 +61,7 @@ class End(PeerNode):
 
     def place(self, offset: int) -> Address:
         """Return the address of a word of ours."""
-        return Address.parse(f'N7:{offset}', STATIONS[self.number])
+        return parse_address(f'N7:{offset}', STATIONS[self.number])
 
     def _answer(self, command: Packet) -> Packet:
         reply = self._server.serve(command)

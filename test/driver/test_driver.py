@@ -27,7 +27,7 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.forecast import block_time, longest_wait
 from abdf1_ros.settings.mapping import Mapping
@@ -521,7 +521,7 @@ def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> No
     plc = bench.plc(1, 'SLC', ('N9:0', 6))
     bench.run(2.0)
     assert len(bench.driver.blocks) == 3
-    plc.table.create(Address.parse('N9:0', PlcType.SLC), 8)
+    plc.table.create(parse_address('N9:0', PlcType.SLC), 8)
     bench.run(2.0)
     assert len(bench.driver.blocks) == 1
     assert all(point.error is None for point in bench.driver.points.values())

@@ -26,9 +26,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.settings.mapping import Mapping
@@ -91,13 +90,13 @@ class Bench:
 
     def message(self, text: str, *values: float) -> None:
         """Let the PLC's own program write to us."""
-        self.plc.send(Address.parse(text, self._family), list(values), US, self.said.append)
+        self.plc.send(parse_address(text, self._family), list(values), US, self.said.append)
         self.line.wake(self.far)
 
     def plc_reads(self, text: str, words: int) -> tuple[int, bytes]:
         """Return STS and the words that the PLC's own program reads from us."""
         dialect = dialect_of(self._family)
-        place = Address.parse(text, self._family)
+        place = parse_address(text, self._family)
         self._tns += 1
         cmd, body = dialect.read(place, words)
         errand = Errand(Packet(US, PLC, cmd, 0, self._tns, body), self.clock)
@@ -370,7 +369,7 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
     bench.driver.write([words], [7], 0.2)
     machine.wake(0.2)
     dialect = dialect_of(PlcType.PLC5)
-    place = Address.parse('N7:50', PlcType.PLC5)
+    place = parse_address('N7:50', PlcType.PLC5)
     cmd, body = dialect.read(place, 1)
     command = Packet(US, PLC, cmd, 0, 1, body)
     machine.receive_data(message_frame(command.encode(), bench.network.checksum), 0.3)

@@ -26,10 +26,9 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -87,7 +86,7 @@ class Bench:
 
     def master_reads(self, text: str, words: int) -> bytes:
         """Return words that the master reads from us."""
-        place = Address.parse(text, SLC)
+        place = parse_address(text, SLC)
         errand = self.ask(DIALECT.read(place, words))
         self.line.run(lambda: errand.result is not None, 5.0)
         assert isinstance(errand.result, Packet)
@@ -108,7 +107,7 @@ def test_words_are_served_in_both_directions(check: str) -> None:
     bench.run(0.1)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.master_reads('N7:50', 3) == b'\1\0\xfe\xff\x10\x10'
-    bench.ask(DIALECT.write(Address.parse('N7:51', SLC), b'\7\0'))
+    bench.ask(DIALECT.write(parse_address('N7:51', SLC), b'\7\0'))
     bench.run(0.2)
     assert bench.listener.values(words)[-1] == [1, 7, 0x1010]
     assert bench.driver.counters.commands_received == 2

@@ -23,8 +23,8 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.served import line_problems, Served
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import EmulatedProcessor
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -61,7 +61,7 @@ class Bench:
         self._tns = 0
 
     def _place(self, text: str) -> Address:
-        return Address.parse(text, self.plc)
+        return parse_address(text, self.plc)
 
     def ask(self, cmd: int, data: bytes) -> tuple[int, bytes]:
         """Return STS and data of the reply to any command."""
@@ -195,7 +195,7 @@ def test_other_commands_are_illegal(plc: str, cmd: int, data: bytes) -> None:
 
 def test_each_family_refuses_the_commands_of_the_other() -> None:
     for ours, theirs in (FAMILIES, reversed(FAMILIES)):
-        place = Address.parse('N7:0', PlcType(theirs))
+        place = parse_address('N7:0', PlcType(theirs))
         bench = Bench(ours, row('N7:0', ours, 2))
         dialect = dialect_of(PlcType(theirs))
         assert bench.ask(*dialect.read(place, 1)) == ILLEGAL
@@ -242,7 +242,7 @@ def test_word_range_of_several_words_is_published_once_and_all_or_nothing() -> N
     mapping = row('N7:0', length=4)
     bench = Bench('PLC5', mapping)
     words = dialect_of(PlcType.PLC5, Access.WORD_RANGE)
-    place = Address.parse('N7:0', PlcType.PLC5)
+    place = parse_address('N7:0', PlcType.PLC5)
     assert bench.ask(*words.write(place, b'\1\0\2\0\3\0')) == (0, b'')
     assert bench.heard() == [(mapping.name, [1, 2, 3, 0])]
     assert bench.ask(*words.write(place, bytes(10))) == (0xF0, b'\x0A')

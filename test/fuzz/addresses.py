@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.address import Address, BITS
+from abdf1_ros.pccc.address import BITS
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 
 
@@ -26,12 +27,12 @@ def one_input(data: bytes) -> None:
     text = data.decode(errors='replace')
     for plc_type in PlcType:
         try:
-            address = Address.parse(text, plc_type)
+            address = parse_address(text, plc_type)
         except (AddressSyntaxError, AddressRangeError) as error:
             assert str(error)
             continue
         shown = str(address)
         assert shown.isascii() and shown.isprintable()
-        assert Address.parse(shown, plc_type) == address
+        assert parse_address(shown, plc_type) == address
         assert 0 <= address.offset < address.area_size
         assert address.bit is None or 0 <= address.bit < BITS

@@ -19,8 +19,8 @@ from __future__ import annotations
 from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.driver.served import Served
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import EXTENDED
@@ -38,7 +38,7 @@ def _table(plc_type: PlcType) -> DataTable:
         is_fixed = kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS)
         text = f'{kind.value}:0' if is_fixed else f'{kind.value}{number + 20}:0'
         try:
-            table.create(Address.parse(text, plc_type), _WORDS)
+            table.create(parse_address(text, plc_type), _WORDS)
         except ValueError:
             continue  # the family has no such files
     return table

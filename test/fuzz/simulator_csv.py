@@ -21,8 +21,8 @@ import re
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import ConfigurationError
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.csv_table import read_rows
 from abdf1_ros.simulator.simulated_plc import COLUMNS, load_plcs
 from fuzz.files import path_of
@@ -49,7 +49,7 @@ def one_input(data: bytes) -> None:
     assert len(tables) == len(plcs) and all(0 <= station <= 254 for station in tables)
     for row in read_rows(path, COLUMNS):
         table = tables[int(row.get('Station'))]
-        address = Address.parse(row.get('Address'), table.plc_type)
+        address = parse_address(row.get('Address'), table.plc_type)
         assert address.offset < table.length(address.area) <= address.area_size
     for plc in plcs:
         sizes = _sizes(plc.table)

@@ -30,6 +30,7 @@ from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.endpoints import SerialLine
 from abdf1_ros.ports.link_thread import LinkThread
@@ -77,7 +78,7 @@ class End(Protocol):
 
 def codec_of(case: Case, family: PlcType) -> tuple[Address, Codec]:
     """Return the address of a case and what makes its values of words."""
-    address = Address.parse(case.address, family)
+    address = parse_address(case.address, family)
     return address, Codec(types_of(address)[0], case.count, address.bit or 0)
 
 

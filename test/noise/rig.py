@@ -35,8 +35,8 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, show, WriteResult
 from abdf1_ros.errors import LinkError
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -306,7 +306,7 @@ class Rig:
         values = self.unique_values()
         content = _CODEC.encode(values)
         self.judge.asked(content)
-        plc.send(Address.parse('N20:0', PlcType.SLC), [*values], US,
+        plc.send(parse_address('N20:0', PlcType.SLC), [*values], US,
                  lambda end: self.judge.resulted(
                      content, Outcome.WRITTEN if end == 'confirmed' else Outcome.UNKNOWN))
         self.line.wake(far)

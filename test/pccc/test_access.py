@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.access import Access, accesses_of
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.families import accesses_of
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 

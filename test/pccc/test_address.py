@@ -20,7 +20,8 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.file_types import file_types_of, FileType, layout_of, PlcType
+from abdf1_ros.pccc.families import family_of, file_types_of, layout_of, parse_address
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -47,15 +48,15 @@ FAMILIES = st.sampled_from(BOTH)
 ])
 def test_parse(family: PlcType, text: str, kind: str, file: int, element: int, word: int,
                bit: int | None) -> None:
-    assert Address.parse(text, family) == Address(
-        family, FileType(kind), file, element, word, bit)
+    assert parse_address(text, family) == Address(
+        family_of(family).addressing, FileType(kind), file, element, word, bit)
 
 
 @pytest.mark.parametrize(('text', 'file', 'element', 'bit'), [
     ('I:017/12', 1, 0o17, 0o12), ('O:0', 0, 0, None), ('I:277/17', 1, 0o277, 15),
     ('O0:012', 0, 0o12, None), ('I1:007/07', 1, 7, 7)])
 def test_plc5_io_is_octal(text: str, file: int, element: int, bit: int | None) -> None:
-    address = Address.parse(text, PLC5)
+    address = parse_address(text, PLC5)
     assert (address.file, address.element, address.word, address.bit) == (file, element, 0, bit)
 
 
@@ -64,56 +65,58 @@ def test_plc5_io_is_octal(text: str, file: int, element: int, bit: int | None) -
     ('I1:8.2', 1, 8, 2, None), ('O:2', 0, 2, 0, None)])
 def test_slc_io_is_slot_word_bit(text: str, file: int, slot: int, word: int,
                                  bit: int | None) -> None:
-    address = Address.parse(text, SLC)
+    address = parse_address(text, SLC)
     assert (address.file, address.element, address.word, address.bit) == (file, slot, word, bit)
     assert address.area == Area(SLC, address.file_type, file, slot)
     assert address.offset == word
 
 
 def test_long_files_are_of_the_slc_family_only() -> None:
-    assert Address.parse('L10:3', SLC).file_type is FileType.LONG
+    assert parse_address('L10:3', SLC).file_type is FileType.LONG
     with pytest.raises(AddressSyntaxError, match='has no L files'):
-        Address.parse('L10:3', PLC5)
+        parse_address('L10:3', PLC5)
 
 
 @pytest.mark.parametrize('family', BOTH)
 @pytest.mark.parametrize('text', [
     '', ' ', 'N', 'N7', 'N7:', ':0', '7:0', 'X7:0', 'NN7:0', 'N7:0:1', 'N7:0/', 'N7:0.', 'N7:-1',
-    'N7:0 /1', 'N7:0.1', 'N7:0.ACC', 'N7:0/DN', 'N7/3', 'T4/3', 'B3/DN', 'F8:0/1', 'L:0', 'ST:0',
-    'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN', 'T4:0.LEN',
-    'R6:0.ACC', 'N7:123456', 'N1234:0', 'ST9:0.1', 'X9:0', '%N7:0', 'N7:0\n1', '##N7:0',
+    'N7:0 /1', 'N7:0.1', 'N7:0.ACC', 'N7:0/DN', 'S/3', 'F8/3', 'T4/3', 'B3/DN', 'F8:0/1', 'L:0',
+    'ST:0', 'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN',
+    'T4:0.LEN', 'R6:0.ACC', 'ST9:0.1', 'X9:0', '%N7:0', 'N7:0\n1', '##N7:0',
 ])
 def test_what_is_no_address(family: PlcType, text: str) -> None:
     with pytest.raises(AddressSyntaxError):
-        Address.parse(text, family)
+        parse_address(text, family)
 
 
 @pytest.mark.parametrize('text', [
     'T4:0.2/DN', 'T4:0.1/PRE', 'T4:0.2/PRE', 'C5:0.1/CU', 'R6:0.2/EN', 'T4:0.PRE/ACC'])
 def test_named_member_belongs_to_no_other_word(text: str) -> None:
     with pytest.raises(AddressSyntaxError):
-        Address.parse(text, PLC5)
+        parse_address(text, PLC5)
 
 
 @pytest.mark.parametrize('text', ['I:8', 'I:019', 'I:017/8', 'O:0/9'])
 def test_plc5_io_takes_octal_digits_only(text: str) -> None:
     with pytest.raises(AddressSyntaxError, match='octal'):
-        Address.parse(text, PLC5)
+        parse_address(text, PLC5)
 
 
 @pytest.mark.parametrize('text', ['N7:\u0663', 'I:\u0668', 'I:1/\u0668', 'N\u0667:0'])
 @pytest.mark.parametrize('family', BOTH)
 def test_digits_are_ascii(text: str, family: PlcType) -> None:
     with pytest.raises(AddressSyntaxError):
-        Address.parse(text, family)
+        parse_address(text, family)
 
 
 @pytest.mark.parametrize('text', [
-    'N7:0/16', 'B3:0/16', 'N2:0', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255', 'ST9:99999'])
+    'N7:0/16', 'B3:0/16', 'N2:0', 'N7:123456', 'N7:100000',
+    'N1000:0', 'N1234567:0', 'N7/16000', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255',
+    'ST9:99999'])
 @pytest.mark.parametrize('family', BOTH)
 def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
     with pytest.raises(AddressRangeError):
-        Address.parse(text, family)
+        parse_address(text, family)
 
 
 @pytest.mark.parametrize(('family', 'last', 'beyond'), [
@@ -128,9 +131,9 @@ def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
     (SLC, 'I1:0', 'I2:0'), (PLC5, 'O0:0', 'O1:0'), (PLC5, 'N3:0', 'N2:0'),
     (SLC, 'T255:255.ACC', 'T256:0.ACC')])
 def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
-    Address.parse(last, family)
+    parse_address(last, family)
     with pytest.raises(AddressRangeError):
-        Address.parse(beyond, family)
+        parse_address(beyond, family)
 
 
 @pytest.mark.parametrize(('family', 'text', 'last'), [
@@ -138,7 +141,7 @@ def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
 def test_bits_counted_through_a_file_have_limits_of_their_own(
         family: PlcType, text: str, last: str) -> None:
     with pytest.raises(AddressRangeError, match=f'^bits of {last}$'):
-        Address.parse(text, family)
+        parse_address(text, family)
 
 
 def test_errors_are_format_errors() -> None:
@@ -150,10 +153,11 @@ def test_errors_are_format_errors() -> None:
 @pytest.mark.parametrize(('text', 'family', 'shown'), [
     ('b/17', SLC, 'B3:1/1'), ('i:17/2', PLC5, 'I:017/02'), ('o:3', SLC, 'O:3.0'),
     ('I:3/3', SLC, 'I:3.0/3'), ('T4:1.2', SLC, 'T4:1.ACC'), ('T4:1/13', SLC, 'T4:1/DN'),
-    ('T4:1/2', SLC, 'T4:1/2'), ('T4:1.con', SLC, 'T4:1'), ('T4:1.1/3', SLC, 'T4:1.1/3'),
+    ('T4:1.0/2', SLC, 'T4:1.0/2'), ('T4:1/13', SLC, 'T4:1/DN'), ('N7/20', SLC, 'N7:1/4'),
+    ('A10/20', PLC5, 'A10:1/4'), ('T4:1.con', SLC, 'T4:1'), ('T4:1.1/3', SLC, 'T4:1.1/3'),
     ('#N7;3', PLC5, 'N7:3'), ('S:1', PLC5, 'S2:1')])
 def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
-    assert str(Address.parse(text, family)) == shown
+    assert str(parse_address(text, family)) == shown
 
 
 texts = st.builds(
@@ -172,11 +176,11 @@ texts = st.builds(
 @given(texts, FAMILIES)
 def test_parse_and_str_are_inverse(text: str, family: PlcType) -> None:
     try:
-        address = Address.parse(text, family)
+        address = parse_address(text, family)
     except FormatError:
         return
-    assert Address.parse(str(address), family) == address
-    assert Address.parse(str(address).lower(), family) == address
+    assert parse_address(str(address), family) == address
+    assert parse_address(str(address).lower(), family) == address
 
 
 @st.composite
@@ -193,12 +197,13 @@ def addresses(draw: st.DrawFn) -> Address:
     bits = st.one_of(st.none(), st.integers(0, 15))
     bit = draw(bits) if kind.has_bits and layout.value_words(word) == 1 else None
     assert file is not None
-    return Address(family, kind, file, draw(st.integers(0, 30 if slot else 127)), word, bit)
+    element = draw(st.integers(0, 30 if slot else 127))
+    return Address(family_of(family).addressing, kind, file, element, word, bit)
 
 
 @given(addresses())
 def test_every_address_is_read_back(address: Address) -> None:
-    assert Address.parse(str(address), address.plc_type) == address
+    assert parse_address(str(address), address.plc_type) == address
 
 
 @pytest.mark.parametrize('family', BOTH)
@@ -208,10 +213,10 @@ def test_every_member_has_its_name_in_text(family: PlcType) -> None:
             if name == 'CON':
                 continue  # T4:1 is that already
             sign = '.' if member.bit is None else '/'
-            address = Address.parse(f'{kind.value}10:1.{name}', family)
+            address = parse_address(f'{kind.value}10:1.{name}', family)
             assert (address.word, address.bit) == (member.word, member.bit)
             assert str(address) == f'{kind.value}10:1{sign}{name}'
-            assert Address.parse(str(address), family) == address
+            assert parse_address(str(address), family) == address
 
 
 @pytest.mark.parametrize(('family', 'text', 'word', 'bit', 'shown'), [
@@ -229,7 +234,7 @@ def test_every_member_has_its_name_in_text(family: PlcType) -> None:
     (SLC, 'MG11:0.16/15', 16, 15, 'MG11:0.16/15')])
 def test_members_of_large_structures(family: PlcType, text: str, word: int, bit: int | None,
                                      shown: str) -> None:
-    address = Address.parse(text, family)
+    address = parse_address(text, family)
     assert (address.word, address.bit, str(address)) == (word, bit, shown)
 
 
@@ -243,7 +248,7 @@ def test_members_of_large_structures(family: PlcType, text: str, word: int, bit:
     ('SC:0', 'give the file number')])
 def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
     with pytest.raises(AddressSyntaxError, match=f'^{reason}'):
-        Address.parse(text, PLC5)
+        parse_address(text, PLC5)
 
 
 @pytest.mark.parametrize(('letters', 'family'), [
@@ -252,7 +257,7 @@ def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None
     known = ', '.join(kind.value for kind in file_types_of(family))
     with pytest.raises(AddressSyntaxError, match=(
             f'^{family.value} has no {letters} files; file types: {known}$')):
-        Address.parse(f'{letters}9:0', family)
+        parse_address(f'{letters}9:0', family)
 
 
 @pytest.mark.parametrize(('text', 'element', 'bit', 'shown'), [
@@ -260,33 +265,33 @@ def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None
     ('I:7935', 7935, None, 'I:7935')])
 def test_flat_io_counts_the_words_of_the_image(text: str, element: int, bit: int | None,
                                                shown: str) -> None:
-    address = Address.parse(text, SLC, Access.FLAT)
+    address = parse_address(text, SLC, Access.FLAT)
     assert (address.element, address.word, address.bit) == (element, 0, bit)
     assert address.is_flat
     assert (address.offset, address.area_size) == (element, 7936)
     assert str(address) == shown
-    assert Address.parse(shown, SLC, Access.FLAT) == address
-    assert address.area != Address.parse('I:0', SLC).area
+    assert parse_address(shown, SLC, Access.FLAT) == address
+    assert address.area != parse_address('I:0', SLC).area
     assert address.at_offset(9).offset == 9
 
 
 def test_access_flat_changes_no_other_address() -> None:
     for text in ('N7:3', 'T4:0/DN', 'PD9:0.4'):
-        assert Address.parse(text, SLC, Access.FLAT) == Address.parse(text, SLC)
+        assert parse_address(text, SLC, Access.FLAT) == parse_address(text, SLC)
 
 
 def test_flat_io_has_no_words_of_slots() -> None:
     with pytest.raises(AddressSyntaxError, match='^with access Flat write the word'):
-        Address.parse('I:1.0', SLC, Access.FLAT)
+        parse_address('I:1.0', SLC, Access.FLAT)
     with pytest.raises(AddressRangeError, match='^elements of I run from 0 to 7935$'):
-        Address.parse('I:7936', SLC, Access.FLAT)
+        parse_address('I:7936', SLC, Access.FLAT)
 
 
 @given(st.one_of(
     st.text(max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), FAMILIES)
 def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) -> None:
     try:
-        address = Address.parse(text, family)
+        address = parse_address(text, family)
     except FormatError as error:
         assert str(error)
     else:
@@ -296,7 +301,7 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
 @given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS', 'PD9:3', 'MG9:1']),
        FAMILIES, st.integers(0, 255))
 def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: int) -> None:
-    address = Address.parse(text, family)
+    address = parse_address(text, family)
     assert address.at_offset(address.offset) == address
     moved = address.at_offset(offset)
     assert moved.offset == offset
@@ -310,18 +315,47 @@ def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: in
     ('PD9:2.SP', PLC5, 166, 399 * 82), ('PD9:2.SPS', SLC, 48, 256 * 23),
     ('BT9:1.RGS', PLC5, 11, 6000), ('MG9:1/TO', PLC5, 56, 585 * 56)])
 def test_offset_counts_words(text: str, family: PlcType, offset: int, size: int) -> None:
-    address = Address.parse(text, family)
+    address = parse_address(text, family)
     assert (address.offset, address.area_size) == (offset, size)
 
 
 def test_at_offset_names_a_word_and_no_bit() -> None:
-    assert Address.parse('B3:0/5', SLC).at_offset(2) == Address.parse('B3:2', SLC)
-    assert Address.parse('T4:0/DN', SLC).at_offset(4) == Address.parse('T4:1.PRE', SLC)
-    assert Address.parse('O:2.0/5', SLC).at_offset(1) == Address.parse('O:2.1', SLC)
+    assert parse_address('B3:0/5', SLC).at_offset(2) == parse_address('B3:2', SLC)
+    assert parse_address('T4:0/DN', SLC).at_offset(4) == parse_address('T4:1.PRE', SLC)
+    assert parse_address('O:2.0/5', SLC).at_offset(1) == parse_address('O:2.1', SLC)
 
 
 def test_area_is_a_file_or_a_slot() -> None:
-    assert Address.parse('N7:1', SLC).area == Address.parse('N7:99/3', SLC).area
-    assert Address.parse('I:1.0', SLC).area != Address.parse('I:2.0', SLC).area
-    assert Address.parse('I:001', PLC5).area == Address.parse('I:002', PLC5).area
-    assert Address.parse('N7:0', SLC).area != Address.parse('N7:0', PLC5).area
+    assert parse_address('N7:1', SLC).area == parse_address('N7:99/3', SLC).area
+    assert parse_address('I:1.0', SLC).area != parse_address('I:2.0', SLC).area
+    assert parse_address('I:001', PLC5).area == parse_address('I:002', PLC5).area
+    assert parse_address('N7:0', SLC).area != parse_address('N7:0', PLC5).area
+
+
+@pytest.mark.parametrize('family', BOTH)
+@pytest.mark.parametrize(('text', 'right'), [
+    ('T4;0/2', 'bit 2 of a T element has no name; word 2 is T4:0.ACC; bits: EN, TT, DN'),
+    ('C5:3/1', 'bit 1 of a C element has no name; word 1 is C5:3.PRE; '
+               'bits: CU, CD, DN, OV, UN, UA'),
+    ('R6:0/7', 'bit 7 of a R element has no name; bits: EN, EU, DN, EM, ER, UL, IN, FD')])
+def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(family: PlcType, text: str,
+                                                            right: str) -> None:
+    """The specification's own form of a sub-element, T4;0/2, means word 2."""
+    with pytest.raises(AddressSyntaxError) as caught:
+        parse_address(text, family)
+    assert str(caught.value) == right
+
+
+@pytest.mark.parametrize(('text', 'family', 'right'), [
+    ('ST9:0.LEN', SLC, 'the length is part of the string; read ST9:0, which is as long as that'),
+    ('L10:0/5', SLC, 'bits of an L file have no address; read L10:0 as int32 and take bit 5 '
+                     'from it'),
+    ('CT20:0', PLC5, 'CT files (ControlNet transfer) cannot be read or written here; file types '
+                     'of PLC5: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
+    ('PLS9:0', SLC, 'PLS files (programmable limit switch) cannot be read or written here; file '
+                    'types of SLC: O, I, S, B, T, C, R, N, F, ST, A, D, L, PD, MG')])
+def test_what_is_not_supported_is_refused_with_what_would_be_right(
+        text: str, family: PlcType, right: str) -> None:
+    with pytest.raises(AddressSyntaxError) as caught:
+        parse_address(text, family)
+    assert str(caught.value) == right

@@ -20,6 +20,7 @@ from collections.abc import Callable
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 import pytest
 
@@ -28,7 +29,7 @@ SLC, PLC5 = PlcType.SLC, PlcType.PLC5
 
 def at(text: str, family: PlcType = SLC) -> Address:
     """Return an address."""
-    return Address.parse(text, family)
+    return parse_address(text, family)
 
 
 def table(*files: tuple[str, int], family: PlcType = SLC) -> DataTable:

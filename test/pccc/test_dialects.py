@@ -17,12 +17,19 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.access import Access, accesses_of
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Dialect, Transfer
-from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.pccc.file_types import file_types_of, layout_of, PlcType
+from abdf1_ros.pccc.families import (
+    accesses_of,
+    dialect_of,
+    family_of,
+    file_types_of,
+    layout_of,
+    parse_address,
+)
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from hypothesis import given
 from hypothesis import strategies as st
@@ -50,7 +57,7 @@ FLOATS = [(PlcType.PLC5, Access.TYPED), (PlcType.PLC5, Access.WORD_RANGE),
 def bench(family: PlcType, access: Access, text: str,
           words: int = 300) -> tuple[Address, Dialect, DataTable]:
     """Return a place, how to get there, and a table that has words from there on."""
-    address = Address.parse(text, family)
+    address = parse_address(text, family)
     table = DataTable(family)
     table.create(address, words)
     return address, dialect_of(family, access), table
@@ -88,7 +95,7 @@ def test_write_read_and_write_bits_come_back(place: tuple[PlcType, Access, str],
 
 @pytest.mark.parametrize('place', list(PLACES), ids=str)
 def test_bits_outside_of_the_mask_do_not_count(place: tuple[PlcType, Access]) -> None:
-    address = Address.parse(PLACES[place][0], place[0])
+    address = parse_address(PLACES[place][0], place[0])
     dialect = dialect_of(*place)
     assert dialect.write_bits(address, 0x0108, 0xFF00) == dialect.write_bits(
         address, 0x0108, 0x0100)
@@ -114,7 +121,7 @@ def test_every_value_of_every_file_type_goes_there_and_back(
     for kind in file_types_of(family):
         file = kind.default_file if kind.default_file is not None else 9
         layout = layout_of(kind, family)
-        start = Address(family, kind, file, 1)
+        start = Address(family_of(family).addressing, kind, file, 1)
         table = DataTable(family)
         table.create(start, 2 * layout.words)
         stored = bytearray(4 * layout.words)
@@ -140,7 +147,7 @@ def test_every_named_bit_is_set_alone(place: tuple[PlcType, Access]) -> None:
         for name, member in layout_of(kind, family).members.items():
             if member.bit is None:
                 continue
-            address = Address.parse(f'{kind.value}9:1/{name}', family)
+            address = parse_address(f'{kind.value}9:1/{name}', family)
             table = DataTable(family)
             table.create(address, 1)
             mask = 1 << member.bit
@@ -184,6 +191,6 @@ def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], 
 @pytest.mark.parametrize('place', [key for key in PLACES if key[1] is not Access.TYPED], ids=str)
 @pytest.mark.parametrize('size', [0, 2, 5, 8])
 def test_reply_of_another_length(place: tuple[PlcType, Access], size: int) -> None:
-    address = Address.parse(PLACES[place][0], place[0])
+    address = parse_address(PLACES[place][0], place[0])
     with pytest.raises(FormatError, match=f'^the reply holds {size} bytes, asked were 4$'):
         dialect_of(*place).read_data(address, 2, bytes(size))

@@ -26,12 +26,12 @@ from typing import Any
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc.access import Access, accesses_of
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import accesses_of, dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
@@ -89,7 +89,7 @@ def _packet(text: str) -> Packet:
 
 def _call(plc_type: str, access: str, method: str, arguments: list[Any]) -> Call:
     family, way = PlcType(plc_type), Access(access)
-    address = Address.parse(arguments[0], family, way)
+    address = parse_address(arguments[0], family, way)
     rest = tuple(bytes.fromhex(value) if isinstance(value, str) else value
                  for value in arguments[1:])
     return Call(family, way, method, address, rest)
@@ -108,7 +108,7 @@ def plc(family: PlcType, files: dict[str, str]) -> tuple[DataTable, Server]:
     """Return a PLC with these words in its files, and with counters that are all 0."""
     words = DataTable(family)
     for place, text in files.items():
-        address, data = Address.parse(place, family), bytes.fromhex(text)
+        address, data = parse_address(place, family), bytes.fromhex(text)
         words.create(address, len(data) // 2)
         words.write(address, data)
     return words, Server(
@@ -145,7 +145,7 @@ def test_the_other_end_executes_the_command_and_replies(entry: Exchange) -> None
     words, server = plc(entry.family, entry.before)
     assert server.serve(entry.command) == entry.reply
     for place, text in entry.after.items():
-        address = Address.parse(place, entry.family)
+        address = parse_address(place, entry.family)
         assert words.read(address, len(bytes.fromhex(text)) // 2) == bytes.fromhex(text)
 
 

@@ -16,14 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.file_types import (
-    BY_SLC_CODE,
-    file_types_of,
-    FileType,
-    Layout,
-    layout_of,
-    PlcType,
-)
+from abdf1_ros.pccc.families import file_types_of, layout_of
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+from abdf1_ros.pccc.slc.files import BY_CODE
 import pytest
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
@@ -45,11 +40,11 @@ def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
     kind = FileType(letters)
     layout = layout_of(kind, SLC)
     assert (layout.code, layout.words, layout.wire_words) == (code, words, words)
-    assert BY_SLC_CODE[code] is kind
+    assert BY_CODE[code] is kind
 
 
 def test_every_file_type_of_an_slc_has_its_own_code() -> None:
-    assert len(BY_SLC_CODE) == len(file_types_of(SLC)) == 15
+    assert len(BY_CODE) == len(file_types_of(SLC)) == 15
 
 
 @pytest.mark.parametrize(('family', 'missing'), [

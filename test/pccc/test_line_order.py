@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.line_order import in_line_order, word_on_line
 from hypothesis import given
@@ -26,7 +27,7 @@ import pytest
 
 def at(text: str) -> Address:
     """Return an address of a PLC-5."""
-    return Address.parse(text, PlcType.PLC5)
+    return parse_address(text, PlcType.PLC5)
 
 
 def test_the_high_word_of_a_float_comes_first() -> None:

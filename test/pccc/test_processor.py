@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.pccc.file_types import file_types_of, FileType, PlcType
+from abdf1_ros.pccc.families import dialect_of, file_types_of
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 import pytest
 

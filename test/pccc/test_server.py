@@ -19,9 +19,8 @@ from __future__ import annotations
 import traceback
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, OutOfRange
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Refusal, Server
 from hypothesis import given
@@ -63,7 +62,7 @@ def test_reply_of_the_vectors(name: str, words: DataTable) -> None:
 
 def test_element_beyond_255_of_the_vectors() -> None:
     words = DataTable(SLC)
-    place = Address.parse('N10:0', SLC).at_offset(300)
+    place = parse_address('N10:0', SLC).at_offset(300)
     words.create(place, 1)
     words.write(place, b'\xAA\x55')
     command, reply = pair('slc_A2_N10_300')
@@ -82,7 +81,7 @@ def test_writes_of_the_vectors(name: str, words: DataTable, place: str, value: s
 
 def contents(words: DataTable, family: PlcType) -> list[bytes]:
     """Return all words of a table that was made of FILES."""
-    return [words.read(Address.parse(name.replace('_', ':', 1).replace('_', '.'), family),
+    return [words.read(parse_address(name.replace('_', ':', 1).replace('_', '.'), family),
                        len(bytes.fromhex(data)) // 2) for name, data in FILES[family].items()]
 
 
@@ -132,7 +131,7 @@ def test_command_that_lost_its_leading_00_changes_nothing(family: PlcType, tns: 
     dialect = dialect_of(family)
     kinds = ['010'] if family is PlcType.PLC2 else ['N7:1', 'N7:0']
     for text in kinds:
-        place = Address.parse(text, family)
+        place = parse_address(text, family)
         for cmd, body in (dialect.read(place, 2), dialect.write(place, b'\1\2\3\4'),
                           dialect.write_bits(place, 0xFFFF, 0x0F0F)):
             moved = Packet.decode(Packet(0, 5, cmd, 0, tns, body).encode()[1:])
@@ -187,7 +186,7 @@ def test_any_bytes_have_one_reply(data: bytes, family: PlcType, cmd: int, tns: i
         assert len(reply.data) == (reply.sts == 0xF0)
     assert set(words) == files
     with pytest.raises(OutOfRange):  # no file has grown
-        words.read(Address.parse('000' if family is PlcType.PLC2 else 'N7:0', family), 5)
+        words.read(parse_address('000' if family is PlcType.PLC2 else 'N7:0', family), 5)
 
 
 @pytest.mark.parametrize(('family', 'data'), [

@@ -18,8 +18,16 @@ from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.status import check_status, is_address_fault, status_text
+from abdf1_ros.pccc.plc2 import status as plc2
+from abdf1_ros.pccc.plc3 import status as plc3
+from abdf1_ros.pccc.slc import status as slc
+from abdf1_ros.pccc.status import (
+    check_status,
+    is_address_fault,
+    Meanings,
+    status_text,
+    USUAL_MEANINGS,
+)
 import pytest
 from support.vectors import pair
 
@@ -92,19 +100,19 @@ def test_refusal_for_another_reason(sts: int, data: bytes) -> None:
     assert not is_address_fault(failure(sts, data))
 
 
-@pytest.mark.parametrize(('family', 'sts', 'ext_sts', 'meaning'), [
-    (PlcType.PLC2, 0x80, None, 'protected commands are inhibited'),
-    (PlcType.PLC2, 0x70, None, 'processor is in program mode'),
-    (PlcType.PLC3, 0x30, None, 'a shutdown was requested'),
-    (PlcType.PLC3, 0xF0, 0x09, 'past the end of the file'),
-    (PlcType.SLC, 0xF0, 0x0B, 'access denied'),
-    (PlcType.SLC, 0xF0, 0x0E, 'command cannot be executed'),
-    (PlcType.PLC5, 0xF0, 0x0D, 'condition exists already, resource is already available'),
-    (None, 0xF0, 0x0B, 'no access: privilege missing')])
-def test_meanings_of_a_family(family: PlcType | None, sts: int, ext_sts: int | None,
+@pytest.mark.parametrize(('meanings', 'sts', 'ext_sts', 'meaning'), [
+    (plc2.MEANINGS, 0x80, None, 'protected commands are inhibited'),
+    (plc2.MEANINGS, 0x70, None, 'processor is in program mode'),
+    (plc3.MEANINGS, 0x30, None, 'a shutdown was requested'),
+    (plc3.MEANINGS, 0xF0, 0x09, 'past the end of the file'),
+    (slc.MEANINGS, 0xF0, 0x0B, 'access denied'),
+    (slc.MEANINGS, 0xF0, 0x0E, 'command cannot be executed'),
+    (USUAL_MEANINGS, 0xF0, 0x0D, 'condition exists already, resource is already available'),
+    (USUAL_MEANINGS, 0xF0, 0x0B, 'no access: privilege missing')])
+def test_meanings_of_a_family(meanings: Meanings, sts: int, ext_sts: int | None,
                               meaning: str) -> None:
     """M 8-4, and M 8-5..8-10 for those that differ."""
-    assert status_text(sts, ext_sts, family).endswith(f': {meaning}')
+    assert status_text(sts, ext_sts, meanings).endswith(f': {meaning}')
     data = b'' if ext_sts is None else bytes((ext_sts,))
     with pytest.raises(RemoteError, match=f': {meaning}$'):
-        check_status(Packet(5, 1, 0x4F, sts, 1, data), family)
+        check_status(Packet(5, 1, 0x4F, sts, 1, data), meanings)

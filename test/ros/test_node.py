@@ -26,7 +26,7 @@ import time
 from typing import Any
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.node import BridgeNode, main
@@ -104,7 +104,7 @@ class Bench:
     def words(self, address: str, count: int = 1, station: int = 1) -> list[int]:
         """Return words of a PLC."""
         table = self.plcs[station].table
-        data = table.read(Address.parse(address, table.plc_type), count)
+        data = table.read(parse_address(address, table.plc_type), count)
         return [int.from_bytes(data[at:at + 2], 'little') for at in range(0, 2 * count, 2)]
 
     def stop(self) -> None:
@@ -389,7 +389,7 @@ def test_every_value_of_a_long_block_is_published(
     bench = make_bench(*words)
     inboxes = [observer.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
     assert len(bench.node.driver.blocks) == 1
-    plcs[1].table.write(Address.parse('N7:0', PlcType.PLC5), bytes(range(18)))
+    plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))
     for number, inbox in enumerate(inboxes):
         inbox.values([0x202 * number + 0x100])
     bench.node.link.stop()

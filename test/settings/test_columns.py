@@ -19,7 +19,8 @@ from __future__ import annotations
 from enum import Enum
 import re
 
-from abdf1_ros.pccc.access import Access, accesses_of
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.families import accesses_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS

@@ -20,7 +20,7 @@ import math
 
 from abdf1_ros.messages import Severity
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.dialects import dialect_of
+from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import COLUMNS
@@ -211,9 +211,9 @@ def test_members_and_named_bits_are_writable(cells: dict[str, str]) -> None:
 
 
 @pytest.mark.parametrize('cells, shown', [
-    ({'Address': 'T4:0/0'}, 'T4:0/0'), ({'Address': 'T4:0/12'}, 'T4:0/12'),
-    ({'Address': 'T4:0/12', 'Length': '2'}, 'T4:0/12'), ({'Address': 'C5:0/9'}, 'C5:0/9'),
-    ({'Address': 'R6:0/7', 'Length': '2'}, 'R6:0/7')])
+    ({'Address': 'T4:0.0/0'}, 'T4:0.0/0'), ({'Address': 'T4:0.0/12'}, 'T4:0.0/12'),
+    ({'Address': 'T4:0.0/12', 'Length': '2'}, 'T4:0.0/12'), ({'Address': 'C5:0.0/9'}, 'C5:0.0/9'),
+    ({'Address': 'R6:0.0/7', 'Length': '2'}, 'R6:0.0/7')])
 def test_internal_bits_are_not_writable(cells: dict[str, str], shown: str) -> None:
     assert fault(Command='Write', **cells).startswith(
         f'2:3 (Address): Item: 1, {shown} belongs to the processor; of such an element ')
@@ -385,8 +385,8 @@ def test_addresses_of_plc2_and_plc3_that_are_none(plc: str, address: str, number
 
 
 def test_mapping_ends_with_the_last_word_of_a_plc2() -> None:
-    assert 'the last word there can be is 77777' in fault(
-        PLC_Type='PLC2', Address='77777', Length='2')
+    assert 'the last word there can be is 077777' in fault(
+        PLC_Type='PLC2', Address='077777', Length='2')
 
 
 @pytest.mark.parametrize('command', ['Write', 'ReadWrite'])

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.structures import type_fault, write_fault
 from abdf1_ros.settings.values import ValueType
@@ -27,7 +28,7 @@ PLC5, SLC = PlcType.PLC5, PlcType.SLC
 
 def at(text: str, family: PlcType = PLC5) -> Address:
     """Return an address."""
-    return Address.parse(text, family)
+    return parse_address(text, family)
 
 
 @pytest.mark.parametrize(('text', 'kind', 'length'), [
@@ -60,7 +61,7 @@ def test_what_may_be_written(text: str, family: PlcType, kind: str, length: int)
 
 @pytest.mark.parametrize(('text', 'family', 'kind', 'length', 'wrong'), [
     ('T4:0', PLC5, 'int16', 1, 'T4:0'), ('T4:0.PRE', SLC, 'int16', 3, 'T4:1'),
-    ('T4:0/12', SLC, 'bool', 2, 'T4:0/12'),
+    ('T4:0.0/12', SLC, 'bool', 2, 'T4:0.0/12'),
     ('PD9:0.SP', PLC5, 'float32', 13, 'PD9:0.PV'), ('PD9:0/INI', PLC5, 'bool', 1, 'PD9:0/INI'),
     ('PD9:0/SWM', PLC5, 'bool', 2, 'PD9:0/5'), ('PD9:0.54', PLC5, 'int16', 1, 'PD9:0.54'),
     ('MG9:0/EN', PLC5, 'bool', 1, 'MG9:0/EN'), ('BT9:0.RLEN', PLC5, 'int16', 1, 'BT9:0.RLEN'),

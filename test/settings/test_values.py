@@ -22,7 +22,7 @@ import struct
 from typing import Any
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import given
@@ -219,17 +219,17 @@ def test_bits_across_words() -> None:
     ('PD9:0.50', 'PLC5', 'int16'), ('PD9:0.SPS', 'SLC', 'int16'), ('MG9:0.ERR', 'PLC5', 'int16'),
     ('BT9:0.RLEN', 'PLC5', 'int16'), ('SC9:0.TIM', 'PLC5', 'int16')])
 def test_natural_type_of_a_place(text: str, family: str, natural: str) -> None:
-    types = types_of(Address.parse(text, PlcType(family)))
+    types = types_of(parse_address(text, PlcType(family)))
     assert types[0].value == natural
     assert ValueType.BOOL not in types
 
 
 @pytest.mark.parametrize('text', ['N7:0/3', 'T4:0/DN', 'PD9:0/INI', 'O:000/17'])
 def test_bits_are_bool_only(text: str) -> None:
-    assert types_of(Address.parse(text, PlcType.PLC5)) == (ValueType.BOOL,)
+    assert types_of(parse_address(text, PlcType.PLC5)) == (ValueType.BOOL,)
 
 
 def test_words_and_floats_of_structures_are_nothing_else() -> None:
-    assert types_of(Address.parse('PD9:0.SP', PlcType.PLC5)) == (ValueType.FLOAT32,)
-    assert types_of(Address.parse('T4:0.ACC', PlcType.SLC)) == (
+    assert types_of(parse_address('PD9:0.SP', PlcType.PLC5)) == (ValueType.FLOAT32,)
+    assert types_of(parse_address('T4:0.ACC', PlcType.SLC)) == (
         ValueType.INT16, ValueType.UINT16)

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 import pytest
@@ -28,7 +28,7 @@ class Program:
 
     def __init__(self, preset: int = 300) -> None:
         self.table = DataTable(PlcType.SLC)
-        self.table.create(Address.parse('S:0', PlcType.SLC), 4)
+        self.table.create(parse_address('S:0', PlcType.SLC), 4)
         self.lamps: list[tuple[float, Lamp, bool]] = []
         self.ladder = Ladder(self.table, preset,
                              lambda at, lamp, on: self.lamps.append((round(at, 3), lamp, on)))
@@ -37,10 +37,10 @@ class Program:
         self._beat = 0
 
     def put(self, text: str, value: int) -> None:
-        self.table.write(Address.parse(text, PlcType.SLC), value.to_bytes(2, 'little'))
+        self.table.write(parse_address(text, PlcType.SLC), value.to_bytes(2, 'little'))
 
     def get(self, text: str) -> int:
-        return int.from_bytes(self.table.read(Address.parse(text, PlcType.SLC), 1), 'little')
+        return int.from_bytes(self.table.read(parse_address(text, PlcType.SLC), 1), 'little')
 
     def run(self, seconds: float) -> None:
         """Let time pass, with a heartbeat at every full second."""
@@ -164,6 +164,6 @@ def test_first_pass_shows_in_the_status_file() -> None:
 
 def test_file_of_another_type_is_refused() -> None:
     table = DataTable(PlcType.SLC)
-    table.create(Address.parse('B10:0', PlcType.SLC), 1)
+    table.create(parse_address('B10:0', PlcType.SLC), 1)
     with pytest.raises(NoSuchFile, match='file 10 is of type B already'):
         Ladder(table)

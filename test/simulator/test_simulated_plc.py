@@ -23,10 +23,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import ConfigurationError
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.dialects import dialect_of
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
 import pytest
@@ -87,7 +86,7 @@ class Master:
 
     def read(self, text: str, words: int = 1) -> bytes:
         """Return words, by a whole transaction."""
-        address = Address.parse(text, self._plc.table.plc_type)
+        address = parse_address(text, self._plc.table.plc_type)
         dialect = dialect_of(address.plc_type)
         assert self.deliver(dialect.read(address, words)) == frames.ACK
         decoder = frames.FrameDecoder(Checksum.CRC, frames.Duplex.HALF)
@@ -148,7 +147,7 @@ def test_data_file_of_a_plc2_and_a_plc3(path: Path, clock: Clock) -> None:
 def test_message_of_a_plc2_and_a_plc3(plc: str, text: str, cmd: int, clock: Clock) -> None:
     machine = simulated_plc(4, plc, clock, (text, 1))
     said: list[str] = []
-    machine.send(Address.parse(text, machine.table.plc_type), [7], 5, said.append)
+    machine.send(parse_address(text, machine.table.plc_type), [7], 5, said.append)
     sending = machine.next_task(0.0)
     assert sending is not None
     assert (sending.command.cmd, sending.command.dst) == (cmd, 5)
@@ -248,7 +247,7 @@ def test_ramp_of_floats_and_members(path: Path, clock: Clock) -> None:
 def test_motion_goes_on_from_what_was_written(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,SLC,N7:0,1,0,Ramp,100')
     master = Master(plc)
-    address = Address.parse('N7:0', plc.table.plc_type)
+    address = parse_address('N7:0', plc.table.plc_type)
     master.deliver(dialect_of(address.plc_type).write(address, b'\x64\0'))
     master.poll()
     plc.handle(ACKNOWLEDGED)

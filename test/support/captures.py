@@ -23,8 +23,8 @@ from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.sniffer.capture import Chunk, read_capture
 from abdf1_ros.sniffer.entries import Entry, Kind
@@ -95,7 +95,7 @@ class Capture:
         """Return the words of the server as they were at the beginning."""
         table = DataTable(self.family)
         for text, content in self.words.items():
-            address = Address.parse(text, self.family)
+            address = parse_address(text, self.family)
             data = bytes(2 * content) if isinstance(content, int) else bytes.fromhex(content)
             table.create(address, len(data) // 2)
             table.write(address, data)

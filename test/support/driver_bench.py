@@ -29,8 +29,8 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -96,13 +96,13 @@ def simulated_plc(station: int, plc: str, clock: Callable[[], float],
     kind = PlcType(plc)
     table = DataTable(kind)
     for text, words in areas:
-        table.create(Address.parse(text, kind), words)
+        table.create(parse_address(text, kind), words)
     return SimulatedPlc(station, table, Network(error_code=checksum).checksum, clock)
 
 
 def store(plc: SimulatedPlc, text: str, values: Sequence[float] | str) -> None:
     """Put values of the natural type into a PLC's table."""
-    address = Address.parse(text, plc.table.plc_type)
+    address = parse_address(text, plc.table.plc_type)
     if address.bit is None:
         codec = Codec(types_of(address)[0], len(values))
         plc.table.write(address, codec.encode(values))
@@ -115,7 +115,7 @@ def store(plc: SimulatedPlc, text: str, values: Sequence[float] | str) -> None:
 
 def stored(plc: SimulatedPlc, text: str, words: int = 1) -> bytes:
     """Return words of a PLC's table."""
-    return plc.table.read(Address.parse(text, plc.table.plc_type), words)
+    return plc.table.read(parse_address(text, plc.table.plc_type), words)
 
 
 class _FarEnd(Machine):

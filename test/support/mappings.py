@@ -22,7 +22,7 @@ import tempfile
 
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import COLUMNS
@@ -43,7 +43,7 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
                  processor: str | None = None) -> Mapping:
     """Return what a row of these cells becomes; its name is the address unless told."""
     way = Access(access) if access else None
-    address = Address.parse(text, PlcType(plc), way)
+    address = parse_address(text, PlcType(plc), way)
     natural = types_of(address)[0]
     name = tag or f'{text}_{station}_{command}_{length}'
     return Mapping(

@@ -17,8 +17,8 @@
 from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
@@ -28,7 +28,7 @@ def table(family: PlcType, **files: str) -> DataTable:
     """Return a table; each keyword is an address with "_" for ":", its value the words."""
     result = DataTable(family)
     for name, words in files.items():
-        address = Address.parse(name.replace('_', ':', 1).replace('_', '.'), family)
+        address = parse_address(name.replace('_', ':', 1).replace('_', '.'), family)
         data = bytes.fromhex(words)
         result.create(address, len(data) // 2)
         result.write(address, data)
@@ -42,7 +42,7 @@ def counting(words: int) -> str:
 
 def words_at(words: DataTable, text: str, count: int = 1) -> str:
     """Return words of a table in hexadecimal."""
-    address = Address.parse(text, words.plc_type)
+    address = parse_address(text, words.plc_type)
     return words.read(address, count).hex(' ').upper()
 
 

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.file_types import file_types_of, PlcType
+from abdf1_ros.pccc.families import file_types_of, parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.values import types_of
 import pytest
 
@@ -32,7 +32,7 @@ def rows(text: str) -> list[list[str]]:
 
 @pytest.mark.parametrize('plc_type', PlcType)
 def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
-    shown = {Address.parse(examples[plc_type], plc_type).file_type
+    shown = {parse_address(examples[plc_type], plc_type).file_type
              for _, examples in tables.PLACES if plc_type in examples}
     assert shown == set(file_types_of(plc_type))
 
@@ -40,7 +40,7 @@ def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
 @pytest.mark.parametrize(('label', 'examples'), tables.PLACES)
 def test_places_of_one_row_have_the_same_types(label: str,
                                                examples: dict[PlcType, str]) -> None:
-    kinds = {types_of(Address.parse(text, plc_type)) for plc_type, text in examples.items()}
+    kinds = {types_of(parse_address(text, plc_type)) for plc_type, text in examples.items()}
     assert len(kinds) == 1, label
 
 

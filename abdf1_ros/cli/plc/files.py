@@ -28,8 +28,8 @@ from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.errands import Order
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialects import dialect_of
-from abdf1_ros.pccc.file_types import DEFAULT_FILES, file_types_of, FileType, layout_of, PlcType
+from abdf1_ros.pccc.families import dialect_of, family_of, file_types_of, layout_of
+from abdf1_ros.pccc.file_types import DEFAULT_FILES, FileType, PlcType
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.typed_data import BYTE_STRING, TypedData
 
@@ -90,12 +90,13 @@ def _type_of(session: Session, station: int, plc_type: PlcType, number: int) -> 
     """Return the type of a file, None where there is none of a type that we can read."""
     if plc_type is PlcType.PLC5:
         return _type_by_reply(session, station, number)
+    addressing = family_of(plc_type).addressing
     usual = _USUAL.get(number)
     candidates = [usual] if usual else []
     if number >= _FIRST_OF_ANY_TYPE:
         candidates += [kind for kind in _SLC_TYPES if kind is not usual]
     return next((kind for kind in candidates if any(
-        _is_there(session, station, Address(plc_type, kind, number, element))
+        _is_there(session, station, Address(addressing, kind, number, element))
         for element in range(_SLOTS_TRIED if kind.is_io else 1))), None)
 
 
@@ -115,7 +116,7 @@ def _type_by_reply(session: Session, station: int, number: int) -> FileType | No
 
 
 def _first_element(number: int) -> Order[TypedData]:
-    address = Address(PlcType.PLC5, FileType.INTEGER, number, 0)
+    address = Address(family_of(PlcType.PLC5).addressing, FileType.INTEGER, number, 0)
     reply = yield dialect_of(PlcType.PLC5).read(address, 1)
     return TypedData.decode(check_status(reply))
 
@@ -137,10 +138,11 @@ def _is_there(session: Session, station: int, address: Address) -> bool:
 def _count(session: Session, station: int, plc_type: PlcType, kind: FileType,
            number: int) -> int:
     """Return how many elements a file has, by halving: the first of them is there."""
+    addressing = family_of(plc_type).addressing
     low, high = 1, _MOST_ELEMENTS[plc_type]
     while low < high:
         middle = (low + high + 1) // 2
-        if _is_there(session, station, Address(plc_type, kind, number, middle - 1)):
+        if _is_there(session, station, Address(addressing, kind, number, middle - 1)):
             low = middle
         else:
             high = middle - 1

@@ -15,37 +15,62 @@
 """
 Addresses of a PLC-2, whose data table is one stretch of words.
 
-Grammar, as PLC-2 manuals write it (M 13-2)::
+Grammar, as PLC-2 manuals write it (M 13-2), all octal::
 
-    address  := word ["/" bit]          020, 110/17; both octal
+    address  := word ["/" bit]          020, 110/17
+              | five digits             11017 is bit 17 of word 110
+              | six digits              011017 is word 11017
 """
 
 from __future__ import annotations
 
 import re
 
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.plc2.files import FILES
 
-LAST_WORD = 0o77777  # the byte address has 16 bits
+_LAST_WORD = 0o77777  # the byte address has 16 bits
 _LAST_BIT = 0o17
-_FORM = re.compile(r'[#$]?(?P<word>\d{1,6})(?:/(?P<bit>\d{1,3}))?', re.ASCII)
+_LAST_SHORT = 0o7777  # words that four digits hold
+_FORM = re.compile(r'[#$]?(?P<word>\d{1,9})(?:/(?P<bit>\d{1,3}))?', re.ASCII)
+_BIT_FORM = re.compile(r'[#$]?(?P<word>\d{3})(?P<bit>\d{2})', re.ASCII)
 
 
-def parse(text: str) -> tuple[int, int | None]:
-    """Return word and bit; AddressSyntaxError or AddressRangeError for anything else."""
-    match = _FORM.fullmatch(text)
-    if match is None:
-        raise AddressSyntaxError('write the octal number of a word, as in 020 or 110/17')
-    if set(text) & set('89'):
-        raise AddressSyntaxError('PLC-2 words and bits are octal, as in 020 or 110/17')
-    word, bit = int(match['word'], 8), int(match['bit'], 8) if match['bit'] else None
-    if word > LAST_WORD:
-        raise AddressRangeError(f'words run from 0 to {LAST_WORD:o} (octal)')
-    if bit and bit > _LAST_BIT:
-        raise AddressRangeError(f'bits run from 0 to {_LAST_BIT:o} (octal)')
-    return word, bit
+class _Plc2Addressing(Addressing):
+    plc_type = PlcType.PLC2
+    files = FILES
+
+    def parse(self, text: str, access: Access | None = None) -> Address:
+        """Read a word or bit; what it raises, it raises with what would be right."""
+        text = text.strip()
+        match = _BIT_FORM.fullmatch(text) or _FORM.fullmatch(text)
+        if match is None:
+            raise AddressSyntaxError('write the octal number of a word, as in 020 or 110/17')
+        if set(text) & set('89'):
+            raise AddressSyntaxError('PLC-2 words and bits are octal, as in 020 or 110/17')
+        word, bit = int(match['word'], 8), int(match['bit'], 8) if match['bit'] else None
+        if word > _LAST_WORD:
+            raise AddressRangeError(f'words run from 0 to {_LAST_WORD:o} (octal)')
+        if bit and bit > _LAST_BIT:
+            raise AddressRangeError(f'bits run from 0 to {_LAST_BIT:o} (octal)')
+        return Address(self, FileType.BINARY, 0, word, 0, bit)
+
+    def show(self, address: Address) -> str:
+        """Return the text that ``parse`` reads."""
+        word = show_word(address.element)
+        return word if address.bit is None else f'{word}/{address.bit:02o}'
+
+    def last_element(self, kind: FileType, is_flat: bool = False) -> int:
+        """Return the last word."""
+        return _LAST_WORD
 
 
-def show(word: int, bit: int | None) -> str:
-    """Return the text that ``parse`` reads."""
-    return f'{word:03o}' if bit is None else f'{word:03o}/{bit:02o}'
+ADDRESSING = _Plc2Addressing()
+
+
+def show_word(word: int) -> str:
+    """Return the octal number of a word, in six digits where five would be a bit."""
+    return f'{word:03o}' if word <= _LAST_SHORT else f'{word:06o}'

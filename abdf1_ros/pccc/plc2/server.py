@@ -26,11 +26,12 @@ from dataclasses import dataclass
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
-from abdf1_ros.pccc.family import BasicCommand, BasicCommands, Codes, Commands, Refusal
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc2.address import ADDRESSING
 from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite
+from abdf1_ros.pccc.serving import BasicCommand, BasicCommands, Codes, Commands, Refusal
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,6 @@ class Plc2Commands:
     out_of_range: Codes = status.STS_ADDRESS, None
 
     def __init__(self, table: DataTable) -> None:
-        everything = Window(Address(PlcType.PLC2, FileType.BINARY, 0, 0))
+        everything = Window(Address(ADDRESSING, FileType.BINARY, 0, 0))
         self.commands: Commands = {}
         self.basic_commands = BasicService(table, lambda source: everything).everything()

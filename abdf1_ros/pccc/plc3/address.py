@@ -30,13 +30,13 @@ from __future__ import annotations
 
 import re
 
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.plc3.commands import CONTEXT, DATA_TABLE
-
-Parts = tuple[FileType, int, int, int, int | None]
-"""File type, file, element, word in the element, bit."""
+from abdf1_ros.pccc.plc3.files import FILES
 
 SECTIONS = {
     FileType.OUTPUT: 1, FileType.INPUT: 2, FileType.TIMER: 3, FileType.COUNTER: 4,
@@ -52,49 +52,59 @@ _NO_FILE_NEEDED = (
     FileType.OUTPUT, FileType.INPUT, FileType.TIMER, FileType.COUNTER, FileType.STATUS)
 
 _LETTERS = re.compile(
-    r'[#$]?(?P<type>[A-Z]{1,2})(?P<file>\d{1,4})?[:;](?P<number>\d{1,5})'
+    r'[#$]?(?P<type>[A-Z]{1,2})(?P<file>\d{1,9})?[:;](?P<number>\d{1,9})'
     r'(?:\.(?P<member>[A-Z]{2,3}|\d))?(?:/(?P<bit>[A-Z]{2}|\d{1,3}))?', re.ASCII)
 _LEVELS = re.compile(r'E(\d{1,5}(?:\.\d{1,5}){5})(?:/(\d{1,3}))?', re.ASCII)
 
 
-def parse(text: str) -> Parts:
-    """Return the parts of an address; AddressSyntaxError or AddressRangeError otherwise."""
-    levels = _LEVELS.fullmatch(text)
-    if levels is not None:
-        return _from_levels(levels[1].split('.'), levels[2])
-    match = _LETTERS.fullmatch(text)
-    if match is None:
-        raise AddressSyntaxError(
-            'write type, file, ":", word, as in N7:0 or B10:5/03, or E3.1.8.10.0.5')
-    kind = _kind(match['type'])
-    file = _file(match['file'], kind)
-    number = _number(match['number'], kind)
-    member, bit = match['member'], match['bit']
-    if kind.is_structure:
-        return kind, file, number, *_member(kind, member, bit)
-    if member:
-        raise AddressSyntaxError(f'words of {kind.value} files have no members')
-    return kind, file, number, 0, _bit(bit)
+class _Plc3Addressing(Addressing):
+    plc_type = PlcType.PLC3
+    files = FILES
+    has_sections = True
+
+    def parse(self, text: str, access: Access | None = None) -> Address:
+        """Read an address; what it raises, it raises with what would be right."""
+        text = text.strip().upper()
+        levels = _LEVELS.fullmatch(text)
+        if levels is not None:
+            return Address(self, *_from_levels(levels[1].split('.'), levels[2]))
+        match = _LETTERS.fullmatch(text)
+        if match is None:
+            raise AddressSyntaxError(
+                'write type, file, ":", word, as in N7:0 or B10:5/03, or E3.1.8.10.0.5')
+        kind = _kind(match['type'])
+        file = _file(match['file'], kind)
+        number = _number(match['number'], kind)
+        member, bit = match['member'], match['bit']
+        if kind.is_structure:
+            return Address(self, kind, file, number, *_member(kind, member, bit))
+        if member:
+            raise AddressSyntaxError(f'words of {kind.value} files have no members')
+        return Address(self, kind, file, number, 0, _bit(bit))
+
+    def show(self, address: Address) -> str:
+        """Return the text that ``parse`` reads."""
+        kind, file = address.file_type, address.file
+        number = f'{address.element:04o}' if kind.is_io else str(address.element)
+        place = f'{kind.value}{file or ""}:{number}' if kind in _NO_FILE_NEEDED \
+            else f'{kind.value}{file}:{number}'
+        if kind.is_structure:
+            names = (name for name, member in FILES[kind].members.items()
+                     if (member.word, member.bit) == (address.word, None))
+            place += f'.{next(names, address.word)}'
+        return place if address.bit is None else f'{place}/{address.bit:02o}'
+
+    def last_element(self, kind: FileType, is_flat: bool = False) -> int:
+        """Return the last word of a file, or the last timer or counter."""
+        return _LAST_IO_WORD if kind.is_io else _LAST_NUMBER
 
 
-def show(kind: FileType, file: int, element: int, word: int, bit: int | None) -> str:
-    """Return the text that ``parse`` reads."""
-    number = f'{element:04o}' if kind.is_io else str(element)
-    place = f'{kind.value}{file or ""}:{number}' if kind in _NO_FILE_NEEDED \
-        else f'{kind.value}{file}:{number}'
-    if kind.is_structure:
-        names = (name for name, member in _members(kind).items()
-                 if (member.word, member.bit) == (word, None))
-        place += f'.{next(names, word)}'
-    return place if bit is None else f'{place}/{bit:02o}'
+ADDRESSING = _Plc3Addressing()
 
 
-def last_element(kind: FileType) -> int:
-    """Return the last word of a file, or the last timer or counter."""
-    return _LAST_IO_WORD if kind.is_io else _LAST_NUMBER
-
-
-def _from_levels(levels: list[str], bit: str | None) -> Parts:
+def _from_levels(levels: list[str],
+                 bit: str | None) -> tuple[FileType, int, int, int, int | None]:
+    """Return file type, file, element, word in the element, and bit."""
     area, context, section, file, structure = map(int, levels[:-1])
     if (area, context) != (DATA_TABLE, CONTEXT):
         raise AddressRangeError(f'only the data table, E{DATA_TABLE}.{CONTEXT}, can be read')
@@ -106,7 +116,7 @@ def _from_levels(levels: list[str], bit: str | None) -> Parts:
     if kind.is_structure:
         _check_number(structure, kind)
         word = int(levels[-1])
-        if word >= layout_of(kind, PlcType.PLC3).words:
+        if word >= FILES[kind].words:
             raise AddressRangeError('words of a timer or counter are 0, 1 and 2')
         return kind, file, structure, word, _bit(bit)
     if structure:
@@ -148,7 +158,7 @@ def _number(text: str, kind: FileType) -> int:
 
 
 def _check_number(number: int, kind: FileType) -> None:
-    last = last_element(kind)
+    last = ADDRESSING.last_element(kind)
     if number > last:
         shown = f'{last:o} (octal)' if kind.is_io else str(last)
         raise AddressRangeError(f'elements of {kind.value} run from 0 to {shown}')
@@ -156,7 +166,7 @@ def _check_number(number: int, kind: FileType) -> None:
 
 def _member(kind: FileType, member: str | None, bit: str | None) -> tuple[int, int | None]:
     """Return word and bit of a part of a timer or counter."""
-    members = _members(kind)
+    members = FILES[kind].members
     if member is None and bit is None:
         raise AddressSyntaxError(f'say which word, as in {kind.value}:0.ACC')
     place = members.get(member or 'CTL')
@@ -170,11 +180,17 @@ def _member(kind: FileType, member: str | None, bit: str | None) -> tuple[int, i
         return named.word, named.bit
     if place.bit is not None and bit is not None:
         raise AddressSyntaxError(f'{member} is a bit already')
+    if bit is not None and member is None:
+        _check_named(kind, members, _bit(bit))
     return place.word, place.bit if bit is None else _bit(bit)
 
 
-def _members(kind: FileType) -> Members:
-    return layout_of(kind, PlcType.PLC3).members
+def _check_named(kind: FileType, members: Members, bit: int | None) -> None:
+    """Refuse a number that may be meant for a word, unless it is that of a bit with a name."""
+    bits = {name: member.bit for name, member in members.items() if member.bit is not None}
+    if bit not in bits.values():
+        raise AddressSyntaxError(f'bit {bit:02o} of a {kind.value} element has no name; bits: '
+                                 f'{", ".join(bits)}; words: {kind.value}:0.ACC')
 
 
 def _bit(text: str | None) -> int | None:

@@ -20,12 +20,12 @@ from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.family import Codes
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
-from abdf1_ros.pccc.plc3 import address as plc3_address
+from abdf1_ros.pccc.plc3.address import ADDRESSING, BY_SECTION
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
+from abdf1_ros.pccc.serving import Codes
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.pccc.word_range.server import RangeCodes, WordRangeService
 
@@ -59,15 +59,15 @@ _CODES = RangeCodes(
 
 
 def _place(address: ExtendedAddress) -> Address:
-    kind = plc3_address.BY_SECTION.get(address.section)
+    kind = BY_SECTION.get(address.section)
     if kind is None:
         number = address.section
         raise AddressRefusal(
             status.EXT_ILLEGAL_FIELD if number > _LAST_SECTION else status.EXT_BAD_ADDRESS,
             f'section {number} is not known')
     if kind.is_structure:
-        return Address(PlcType.PLC3, kind, address.file, address.structure, address.word)
-    return Address(PlcType.PLC3, kind, address.file, address.word)
+        return Address(ADDRESSING, kind, address.file, address.structure, address.word)
+    return Address(ADDRESSING, kind, address.file, address.word)
 
 
 def _read_file_address(reader: Reader) -> ExtendedAddress:
@@ -80,4 +80,4 @@ def _read_file_address(reader: Reader) -> ExtendedAddress:
 
 
 def _compatibility_file(source: int) -> Window:
-    return Window(Address(PlcType.PLC3, FileType.INPUT, source, 0))
+    return Window(Address(ADDRESSING, FileType.INPUT, source, 0))

@@ -23,7 +23,8 @@ from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressRefusal, AddressSyntaxError
 from abdf1_ros.pccc.fields import number, Reader, word
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.typed_data import FLOAT, INTEGER, TypedData
 
 CMD = 0x0F
@@ -126,7 +127,7 @@ class SystemAddress:
             raise AddressRefusal(status.EXT_NO_SUCH_SYMBOL,
                                  'a symbol; an address in ASCII begins with "$"')
         try:
-            address = Address.parse(text[1:].decode('ascii', 'replace'), PlcType.PLC5)
+            address = ADDRESSING.parse(text[1:].decode('ascii', 'replace'))
         except AddressSyntaxError as error:
             raise AddressRefusal(status.EXT_BAD_SYMBOL, str(error)) from None
         except AddressRangeError as error:

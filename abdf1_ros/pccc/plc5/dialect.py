@@ -20,9 +20,11 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import typed_data
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
-from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.plc5.files import FILES
 from abdf1_ros.pccc.typed_data import TypedData
+from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 
 
 class Plc5Dialect:
@@ -101,9 +103,30 @@ def _element(address: Address, words: int) -> plc5.Element:
 
 def _most_words(file_type: FileType, room: int) -> int:
     """Return the words of as many whole elements as fit into ``room`` with their descriptors."""
-    layout = layout_of(file_type, PlcType.PLC5)
+    layout = FILES[file_type]
     size = 2 * layout.wire_words
     some = bytes(8 * size)  # enough for the array's size to need a byte of its own, as all do
     descriptors = len(TypedData(layout.code, size, some).encode()) - len(some)
     count = (room - descriptors) // size
     return min(count, plc5.MAX_INTEGERS) * layout.words
+
+
+class _Range:
+    """Read-modify-write for bits, as with typed commands."""
+
+    files = FILES
+    # Mask, file and element in three bytes each, sub-element (M 13-10..13-12).
+    address_size = 8
+
+    def address(self, address: Address) -> plc5.SystemAddress:
+        """Return the system address."""
+        return plc5.SystemAddress(address.file, address.element, address.word or None)
+
+    def write_bits(self, address: Address, set_bits: int, reset_bits: int) -> bytes:
+        """Return a read-modify-write."""
+        change = plc5.BitSet(self.address(address), ~(set_bits | reset_bits) & 0xFFFF, set_bits)
+        return plc5.ReadModifyWrite((change,)).encode()
+
+
+PLC5_TYPED = Plc5Dialect()
+PLC5_WORD_RANGE = WordRangeDialect(_Range())

@@ -26,8 +26,9 @@ from dataclasses import replace
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
+from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 
 EXTENDED = 0xEB  # byte 2: an expansion byte tells the model
@@ -50,7 +51,7 @@ MODES = {0: Mode.PROGRAM, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM, 5: Mode.REMOTE_TE
          6: Mode.REMOTE_RUN}
 
 _UNNAMED_FAULT = 'major processor fault (word S:11 says which)'
-_FAULT_WORDS = Address(PlcType.PLC5, FileType.STATUS, 2, 11)
+_FAULT_WORDS = Address(ADDRESSING, FileType.STATUS, 2, 11)
 # Bits of S:11 as the PLC-5 manuals list them with their status file (1785-UM012).
 _FAULTS = (
     'corrupted program file', 'bad address in the ladder program', 'programming error',

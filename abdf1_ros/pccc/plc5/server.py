@@ -19,11 +19,11 @@ from __future__ import annotations
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.family import Codes, Commands, extended
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
 from abdf1_ros.pccc.plc5 import commands as plc5
+from abdf1_ros.pccc.plc5.address import ADDRESSING
+from abdf1_ros.pccc.serving import Codes, Commands, extended
 from abdf1_ros.pccc.word_range.server import RangeCodes, WordRangeService
 
 _TOO_LARGE: Codes = status.EXTENDED, status.EXT_TOO_LARGE
@@ -92,14 +92,14 @@ class Plc5Commands:
 
     def _compatibility_file(self, source: int) -> Window:
         """Return the file whose number is the station that the command comes from (M 6-4)."""
-        return Window(Address(PlcType.PLC5, self._table.file_type(source), source, 0))
+        return Window(Address(ADDRESSING, self._table.file_type(source), source, 0))
 
     def _address(self, address: plc5.SystemAddress, offset: int = 0) -> Address:
         """Return the place ``offset`` elements (values, with a sub-element) behind ``address``."""
         kind = self._table.file_type(address.file)
         if address.sub_element is None:
-            return Address(PlcType.PLC5, kind, address.file, address.element + offset)
-        start = Address(PlcType.PLC5, kind, address.file, address.element, address.sub_element)
+            return Address(ADDRESSING, kind, address.file, address.element + offset)
+        start = Address(ADDRESSING, kind, address.file, address.element, address.sub_element)
         if address.sub_element >= start.layout.words:
             raise extended(status.EXT_TOO_MANY_LEVELS)
         return start.at_offset(start.offset + offset * _element(start, address).size // 2)

@@ -19,9 +19,10 @@ from __future__ import annotations
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import exactly, Request, Transfer
 from abdf1_ros.pccc.fields import word
-from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.files import FILES
 
 
 class SlcDialect:
@@ -72,10 +73,14 @@ class SlcDialect:
 
 def _whole_elements(file_type: FileType, size: int) -> int:
     """Return the words of as many whole elements as fit into ``size`` bytes."""
-    words = layout_of(file_type, PlcType.SLC).words
+    words = FILES[file_type].words
     return size // 2 // words * words
 
 
 def _logical_address(address: Address) -> slc.LogicalAddress:
     code = slc.FLAT_CODES[address.file_type] if address.is_flat else address.layout.code
     return slc.LogicalAddress(address.file, code, address.element, address.word)
+
+
+# Slots or the whole image: an address tells which.
+BY_PROCESSOR = {processor: SlcDialect(processor) for processor in Processor}

@@ -21,14 +21,16 @@ from functools import partial
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
-from abdf1_ros.pccc.family import Codes, Commands, Refusal
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import BY_SLC_CODE, FileType, PlcType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
+from abdf1_ros.pccc.serving import Codes, Commands, Refusal
 from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.address import ADDRESSING
+from abdf1_ros.pccc.slc.files import BY_CODE
 
 _COMMON_INTERFACE_FILE = 9
-_ADDRESSING_MODE = Address(PlcType.SLC, FileType.STATUS, 2, 2)
+_ADDRESSING_MODE = Address(ADDRESSING, FileType.STATUS, 2, 2)
 _BYTE_ADDRESSES = 8
 
 
@@ -76,7 +78,7 @@ class SlcCommands:
 
     def _common_interface_file(self, source: int) -> Window:
         """Return file 9, addressed by words unless S:2/8 is set (M 7-31..7-40)."""
-        start = Address(PlcType.SLC, self._table.file_type(_COMMON_INTERFACE_FILE),
+        start = Address(ADDRESSING, self._table.file_type(_COMMON_INTERFACE_FILE),
                         _COMMON_INTERFACE_FILE, 0)
         try:
             flags = int.from_bytes(self._table.read(_ADDRESSING_MODE, 1), 'little')
@@ -103,7 +105,7 @@ class SlcCommands:
 
     def _in_slots(self, kind: FileType, first: int, words: int) -> list[tuple[Address, int]]:
         """Return words of the flat image, in which slot follows slot."""
-        image = [Address(PlcType.SLC, kind, area.file, area.slot or 0, word)
+        image = [Address(ADDRESSING, kind, area.file, area.slot or 0, word)
                  for area in sorted(self._table, key=lambda area: area.slot or 0)
                  if area.file_type is kind for word in range(self._table.length(area))]
         found = image[first:first + words]
@@ -112,8 +114,8 @@ class SlcCommands:
         return [(address, 1) for address in found]
 
     def _address(self, address: slc.LogicalAddress) -> Address:
-        kind = BY_SLC_CODE.get(address.type_code)
+        kind = BY_CODE.get(address.type_code)
         if kind is None or self._table.file_type(address.file) is not kind:
             raise Refusal(*self.no_such_file)
         return Address(
-            PlcType.SLC, kind, address.file, address.element, address.sub_element or 0)
+            ADDRESSING, kind, address.file, address.element, address.sub_element or 0)

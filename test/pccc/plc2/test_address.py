@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
@@ -28,29 +28,34 @@ PLC2 = PlcType.PLC2
 
 @pytest.mark.parametrize(('text', 'word', 'bit', 'shown'), [
     ('020', 16, None, '020'), ('110/17', 72, 15, '110/17'), ('0', 0, None, '000'),
-    ('7/3', 7, 3, '007/03'), ('77777', 0x7FFF, None, '77777'), ('$110/0', 72, 0, '110/00')])
+    ('7/3', 7, 3, '007/03'), ('077777', 0x7FFF, None, '077777'), ('11017', 72, 15, '110/17'),
+    ('7777', 0o7777, None, '7777'), ('10000/1', 0o10000, 1, '010000/01'),
+    ('$110/0', 72, 0, '110/00')])
 def test_words_and_bits_are_octal(text: str, word: int, bit: int | None, shown: str) -> None:
-    address = Address.parse(text, PLC2)
+    address = parse_address(text, PLC2)
     assert (address.offset, address.bit, str(address)) == (word, bit, shown)
 
 
 @given(st.integers(0, 0x7FFF), st.one_of(st.none(), st.integers(0, 15)))
 def test_every_address_is_read_back(word: int, bit: int | None) -> None:
-    address = Address.parse(f'{word:o}' + ('' if bit is None else f'/{bit:o}'), PLC2)
+    # Five digits alone are a word of three and a bit, as PLC-2 manuals write it.
+    digits = f'{word:06o}' if bit is None else f'{word:o}'
+    address = parse_address(digits + ('' if bit is None else f'/{bit:o}'), PLC2)
     assert (address.offset, address.bit) == (word, bit)
-    assert Address.parse(str(address), PLC2) == address
-    assert address.at_offset(word) == Address.parse(f'{word:o}', PLC2)
+    assert parse_address(str(address), PLC2) == address
+    assert address.at_offset(word) == parse_address(f'{word:06o}', PLC2)
     assert word < address.area_size
 
 
 @pytest.mark.parametrize('text', ['', 'N7:0', '020:1', '20/', '/1', '018', '20/9', '-1', '٢'])
 def test_what_is_no_address(text: str) -> None:
     with pytest.raises(AddressSyntaxError, match='as in 020 or 110/17$'):
-        Address.parse(text, PLC2)
+        parse_address(text, PLC2)
 
 
 @pytest.mark.parametrize(('text', 'right'), [
-    ('100000', 'words run from 0 to 77777'), ('20/20', 'bits run from 0 to 17')])
+    ('100000', 'words run from 0 to 77777'), ('11020', 'bits run from 0 to 17'),
+    ('20/20', 'bits run from 0 to 17')])
 def test_out_of_range(text: str, right: str) -> None:
     with pytest.raises(AddressRangeError, match=f'^{right} \\(octal\\)$'):
-        Address.parse(text, PLC2)
+        parse_address(text, PLC2)

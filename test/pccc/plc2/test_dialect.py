@@ -19,6 +19,7 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
 import pytest
@@ -31,7 +32,7 @@ CIF = Plc2Dialect(Access.CIF)
 
 def at(text: str) -> Address:
     """Return an address."""
-    return Address.parse(text, PlcType.PLC2)
+    return parse_address(text, PlcType.PLC2)
 
 
 @pytest.mark.parametrize(('name', 'request_'), [

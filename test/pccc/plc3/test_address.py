@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc3.address import last_element, SECTIONS
+from abdf1_ros.pccc.plc3.address import ADDRESSING, SECTIONS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -40,8 +41,8 @@ PLC3 = PlcType.PLC3
     ('C:9999.PRE', 'E3.1.4.0.9999.1', 'C:9999.PRE', 29998)])
 def test_both_forms_name_the_same_place(text: str, levels: str, shown: str,
                                         offset: int) -> None:
-    address = Address.parse(text, PLC3)
-    assert address == Address.parse(levels, PLC3)
+    address = parse_address(text, PLC3)
+    assert address == parse_address(levels, PLC3)
     assert (str(address), address.offset) == (shown, offset)
 
 
@@ -49,18 +50,18 @@ def test_both_forms_name_the_same_place(text: str, levels: str, shown: str,
        st.one_of(st.none(), st.integers(0, 15)))
 def test_every_address_is_read_back(kind: FileType, file: int, data: st.DataObject,
                                     bit: int | None) -> None:
-    element = data.draw(st.integers(0, last_element(kind)))
+    element = data.draw(st.integers(0, ADDRESSING.last_element(kind)))
     word = data.draw(st.integers(0, 2)) if kind.is_structure else 0
-    address = Address(PLC3, kind, 0 if kind.is_structure else file, element, word, bit)
-    assert Address.parse(str(address), PLC3) == address
+    address = Address(ADDRESSING, kind, 0 if kind.is_structure else file, element, word, bit)
+    assert parse_address(str(address), PLC3) == address
     assert address.offset < address.area_size
-    whole = Address(PLC3, kind, address.file, element, word)
+    whole = Address(ADDRESSING, kind, address.file, element, word)
     assert address.at_offset(address.offset) == whole
 
 
 def test_last_word_of_each_file_is_the_last_of_its_area() -> None:
     for text in ('O:7777', 'N7:9999', 'T:9999.ACC'):
-        address = Address.parse(text, PLC3)
+        address = parse_address(text, PLC3)
         assert address.offset + 1 == address.area_size
 
 
@@ -75,7 +76,7 @@ def test_last_word_of_each_file_is_the_last_of_its_area() -> None:
     ('E3.1.8.10.0', 'or E3.1.8.10.0.5'), ('N7:0/DN', 'PLC-3 bits are octal')])
 def test_what_is_no_address(text: str, right: str) -> None:
     with pytest.raises(AddressSyntaxError) as fault:
-        Address.parse(text, PLC3)
+        parse_address(text, PLC3)
     assert right in str(fault.value)
 
 
@@ -91,5 +92,5 @@ def test_what_is_no_address(text: str, right: str) -> None:
     ('I:10000', 'elements of I run from 0 to 7777 (octal)')])
 def test_out_of_range(text: str, right: str) -> None:
     with pytest.raises(AddressRangeError) as fault:
-        Address.parse(text, PLC3)
+        parse_address(text, PLC3)
     assert right in str(fault.value)

@@ -19,7 +19,8 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.commands import (
     BitSet,
     element_of,
@@ -102,7 +103,7 @@ def test_file_that_is_left_out_is_file_1(encoded: str, address: SystemAddress) -
     ('BT', '99 20 0C', 6, 12)])
 def test_descriptors_and_element_sizes(letters: str, descriptor: str, words: int,
                                        size: int) -> None:
-    address = Address(PlcType.PLC5, FileType(letters), 9, 0)
+    address = Address(ADDRESSING, FileType(letters), 9, 0)
     element = element_of(address, is_value=False)
     assert (element.size, element.wire_size) == (2 * words, size)
     encoded = element.typed(bytes(4 * size)).encode()

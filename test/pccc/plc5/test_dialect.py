@@ -19,7 +19,8 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.file_types import FileType, layout_of, PlcType
+from abdf1_ros.pccc.families import layout_of, parse_address
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
 import pytest
@@ -32,7 +33,7 @@ DIALECT = Plc5Dialect()
 
 def at(text: str) -> Address:
     """Return an address."""
-    return Address.parse(text, PLC5)
+    return parse_address(text, PLC5)
 
 
 @pytest.mark.parametrize(('text', 'words', 'encoded'), [

@@ -21,7 +21,7 @@ from functools import partial
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import BY_SLC_CODE, FileType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.slc.commands import (
     FLAT_CODES,
     LogicalAddress,
@@ -31,6 +31,7 @@ from abdf1_ros.pccc.slc.commands import (
     MAX_READ,
     MAX_WRITE,
 )
+from abdf1_ros.pccc.slc.files import BY_CODE
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -129,7 +130,7 @@ def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str)
 
 def test_flat_codes_are_those_of_the_images() -> None:
     assert FLAT_CODES == {FileType.OUTPUT: 0x82, FileType.INPUT: 0x83}
-    assert not FLAT_CODES.values() & BY_SLC_CODE.keys()
+    assert not FLAT_CODES.values() & BY_CODE.keys()
 
 
 def test_limits_of_the_manual() -> None:

@@ -20,6 +20,7 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc import commands as slc
@@ -34,7 +35,7 @@ DIALECT = SlcDialect()
 
 def at(text: str) -> Address:
     """Return an address."""
-    return Address.parse(text, SLC)
+    return parse_address(text, SLC)
 
 
 @pytest.mark.parametrize(('text', 'words', 'encoded'), [
@@ -108,13 +109,13 @@ def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int,
     ('I:1', Access.SLOT, 'slc_A2_I1_slot')])
 def test_io_is_that_of_the_vectors(text: str, access: Access, name: str) -> None:
     command, reply = pair(name)
-    address = Address.parse(text, SLC, access)
+    address = parse_address(text, SLC, access)
     assert DIALECT.read(address, 1) == (command.cmd, command.data)
     assert DIALECT.read_data(address, 1, reply.data) == reply.data
 
 
 def test_flat_io_of_the_whole_image() -> None:
-    address = Address.parse('I:300', SLC, Access.FLAT)
+    address = parse_address('I:300', SLC, Access.FLAT)
     assert DIALECT.read(address, 2) == (0x0F, bytes.fromhex('A2 04 01 83 FF 2C 01 00'))
     assert DIALECT.write(address, b'\1\2') == (
         0x0F, bytes.fromhex('AA 02 01 83 FF 2C 01 00 01 02'))

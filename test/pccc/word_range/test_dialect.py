@@ -18,8 +18,11 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Transfer
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.word_range.dialect import PLC3, PLC5_WORD_RANGE, WordRangeDialect
+from abdf1_ros.pccc.plc3.dialect import PLC3
+from abdf1_ros.pccc.plc5.dialect import PLC5_WORD_RANGE
+from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 import pytest
 from support.vectors import vector, without_area
 
@@ -28,7 +31,7 @@ FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
 
 def at(text: str, family: str = 'PLC3') -> Address:
     """Return an address."""
-    return Address.parse(text, PlcType(family))
+    return parse_address(text, PlcType(family))
 
 
 @pytest.mark.parametrize('number', [1, 2, 3])

@@ -1,0 +1,81 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The PLC families that there are, each in a folder of its own."""
+
+from __future__ import annotations
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.family import Family
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+from abdf1_ros.pccc.plc2.family import FAMILY as PLC2
+from abdf1_ros.pccc.plc3.family import FAMILY as PLC3
+from abdf1_ros.pccc.plc5.family import FAMILY as PLC5
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.slc.family import FAMILY as SLC
+
+FAMILIES = {family.plc_type: family for family in (SLC, PLC5, PLC3, PLC2)}
+
+
+def family_of(plc_type: PlcType) -> Family:
+    """Return the family of that name."""
+    return FAMILIES[plc_type]
+
+
+def parse_address(text: str, plc_type: PlcType, access: Access | None = None) -> Address:
+    """
+    Read the text of an address, reached by ``access`` where that makes a difference.
+
+    Raises AddressSyntaxError or AddressRangeError, whose text says what would be right.
+    """
+    return FAMILIES[plc_type].addressing.parse(text, access)
+
+
+def file_types_of(plc_type: PlcType) -> tuple[FileType, ...]:
+    """Return the file types that a family can have."""
+    files = FAMILIES[plc_type].addressing.files
+    return tuple(kind for kind in FileType if kind in files)
+
+
+def layout_of(file_type: FileType, plc_type: PlcType) -> Layout:
+    """Return how elements of such a file are built; KeyError where the family has none."""
+    return FAMILIES[plc_type].addressing.files[file_type]
+
+
+def accesses_of(plc_type: PlcType) -> tuple[Access, ...]:
+    """Return the ways to the words of a family, the usual one first."""
+    return tuple(FAMILIES[plc_type].dialects)
+
+
+def dialect_of(plc_type: PlcType, access: Access | None = None,
+               processor: Processor | None = None) -> Dialect:
+    """
+    Return how such a PLC is spoken to; None stands for what is usual in the family.
+
+    Raises FormatError when the family does not have this access, and for a processor of
+    another family.
+    """
+    family = FAMILIES[plc_type]
+    ways = tuple(family.dialects)
+    if access is not None and access not in ways:
+        right = ', '.join(entry.value for entry in ways)
+        raise FormatError(f'Access of a {plc_type.value} is {right}, not {access.value}')
+    if processor is None:
+        return family.dialects[access or ways[0]]
+    if not family.by_processor:
+        raise FormatError(f'Processor is for PLC_Type SLC, not for {plc_type.value}')
+    return family.by_processor[processor]

@@ -1,0 +1,27 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What STS mean that a PLC-2's module sends (M 8-5)."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.status import Meanings
+
+MEANINGS = Meanings(sts={
+    0x20: 'the PLC has found errors when it verified a command',
+    0x30: 'somebody has to look after the PLC: switch, cable or fault',
+    0x40: 'error between module and PLC',
+    0x50: 'address outside the data table or the window, or no compatibility file',
+    0x60: 'function disabled by a switch of the module',
+    0x80: 'protected commands are inhibited'})

@@ -1,0 +1,31 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What STS and EXT STS mean that a PLC-3 sends (M 8-6..8-10)."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.status import Meanings
+
+MEANINGS = Meanings(
+    sts={
+        0x30: 'a shutdown was requested',
+        0x40: 'backplane error',
+        0x50: 'file or word not there, or file above 65535 words',
+        0x60: 'keyswitch does not allow this'},
+    ext_sts={
+        0x06: 'file or word not there, or address does not lead to a word',
+        0x07: 'words of the transaction are not there',
+        0x09: 'past the end of the file',
+        0x0A: 'total and word address are above 65535 together'})
