@@ -106,7 +106,9 @@ class _Output:
             check, duplex = (
                 settings.get(name, '').lower() if chosen == _AUTO else chosen
                 for name, chosen in (('check', options.check), ('duplex', options.duplex)))
-            self._session = Session(_CHECKS.get(check), _DUPLEX.get(duplex))
+            # What the head of a capture says was a setting, and may have been the fault.
+            self._session = Session(_CHECKS.get(check), _DUPLEX.get(duplex),
+                                    is_certain=options.check != _AUTO)
             speed = whole_number(baud)
             if self._summary.baud is None and speed and speed > 0:
                 self._summary.baud = speed

@@ -23,14 +23,21 @@ from abdf1_ros.df1.frames import Duplex, EOT, Frame, FrameDecoder, MORE, Poll, R
 
 # One in 256 wrong frames has what looks like a good BCC, so one alone proves nothing.
 _BCC_FRAMES = 2
+# So many frames in a row that are right with the other check only: the guess was wrong.
+_CONTRARY_FRAMES = 3
 
 
 @dataclass(slots=True)
 class LineKind:
-    """Check and discipline of a line, None while nobody knows; both directions share one."""
+    """
+    Check and discipline of a line, None while nobody knows; both directions share one.
+
+    ``is_certain`` tells that the check is not to be found out, nor found wrong.
+    """
 
     checksum: Checksum | None = None
     duplex: Duplex | None = None
+    is_certain: bool = False
 
 
 class ListeningDecoder(FrameDecoder):
@@ -40,7 +47,8 @@ class ListeningDecoder(FrameDecoder):
     DLE SOH and DLE EOT exist in half duplex only (M 2-6); a message that neither came before is
     taken for full duplex until one of them comes. A frame whose CRC is right settles the check
     for CRC, two with a right BCC settle it for BCC. Until then a frame is given out when the
-    byte behind its BCC is there, which may be the second byte of a CRC.
+    byte after its BCC is there, which may be the second byte of a CRC. When three frames in a row
+    would be right with the other check only, the guess was wrong and is changed.
     """
 
     def __init__(self, kind: LineKind) -> None:
@@ -48,6 +56,7 @@ class ListeningDecoder(FrameDecoder):
         self._kind = kind
         self._duplex_given = kind.duplex is not None
         self._bcc_frames = 0
+        self._contrary_frames = 0
 
     @property
     def checksum(self) -> Checksum:
@@ -83,6 +92,8 @@ class ListeningDecoder(FrameDecoder):
     def _check(self) -> Result:
         if self._kind.checksum is not None:
             self._checksum = self._kind.checksum
+            if not self._kind.is_certain and len(self._buffer) >= self._checksum.size:
+                self._doubt()
         elif len(self._buffer) < Checksum.CRC.size:
             return MORE
         else:
@@ -99,6 +110,18 @@ class ListeningDecoder(FrameDecoder):
             if self._bcc_frames == _BCC_FRAMES:
                 self._kind.checksum = Checksum.BCC
 
-    def _matches(self, checksum: Checksum) -> bool:
+    def _doubt(self) -> None:
+        """Change over to the other check when the frames of late have been right with it only."""
+        other = Checksum.BCC if self._checksum is Checksum.CRC else Checksum.CRC
+        if self._matches(self._checksum):
+            self._contrary_frames = 0
+        elif self._matches(other, self._checksum.size):
+            self._contrary_frames += 1
+        if self._contrary_frames == _CONTRARY_FRAMES:
+            self._contrary_frames = 0
+            self._kind.checksum = other
+
+    def _matches(self, checksum: Checksum, count: int = 2) -> bool:
+        """Tell whether the check that has come is of this kind, by its first ``count`` bytes."""
         check = checksum.encode(checksum.of_message(self._data, self._station))
-        return self._buffer.startswith(check)
+        return self._buffer.startswith(check[:count])

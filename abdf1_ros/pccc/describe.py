@@ -25,6 +25,7 @@ from typing import Any
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import diagnostics, notation
+from abdf1_ros.pccc.address_errors import AddressRefusal
 from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.notation import count_of, hexadecimal, part_of, words_text
@@ -34,9 +35,10 @@ from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
-from abdf1_ros.pccc.status import check_status
+from abdf1_ros.pccc.status import check_status, EXT_BAD_SYMBOL, EXT_NO_SUCH_SYMBOL
 from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.word_range import commands as word_range
+from abdf1_ros.text import printable
 
 # Commands that carry a function code (M 7-2, 7-3).
 _WITH_FUNCTION = (0x06, 0x07, 0x0F)
@@ -156,18 +158,54 @@ def _masked_write(request: slc.MaskedWrite) -> str:
             f'{words_text(request.data) or "nothing"}')
 
 
-_Range = SystemAddress | ExtendedAddress
+@dataclass(frozen=True, slots=True)
+class _Symbol:
+    """A name that a PLC-3 has for a place (M 13-8); only it knows which."""
+
+    name: str
+
+    def encode(self) -> bytes:
+        """Return it as it stands in a command."""
+        return b'\0' + self.name.encode('latin-1', 'replace') + b'\0'
+
+
+_Range = SystemAddress | ExtendedAddress | _Symbol
 
 
 def _range_address(reader: Reader) -> _Range:
     """Take an address of a PLC-5 or a PLC-3; only the former has bit 1 (file) and none above 3."""
     flag = copy(reader).byte()
-    if flag == 0 or flag & 0xF2 == 0x02:
+    if flag == 0:
+        return _named(reader)
+    if flag & 0xF2 == 0x02:
         return SystemAddress.read(reader)
     return ExtendedAddress.read(reader)
 
 
+def _named(reader: Reader) -> SystemAddress | _Symbol:
+    """Take what is written in ASCII: an address of a PLC-5 after "$", or a symbol, "$" or not."""
+    ahead = copy(reader)
+    try:
+        return SystemAddress.read(reader)
+    except AddressRefusal as error:
+        name = _text(ahead).removeprefix('$')
+        if error.ext_sts not in (EXT_NO_SUCH_SYMBOL, EXT_BAD_SYMBOL) or not name:
+            raise
+        return _Symbol(name)
+
+
+def _text(reader: Reader) -> str:
+    """Take 00, characters, and 00."""
+    reader.byte()
+    text = bytearray()
+    while byte := reader.byte():
+        text.append(byte)
+    return printable(text.decode('latin-1'))
+
+
 def _range_text(address: _Range) -> str:
+    if isinstance(address, _Symbol):
+        return f'symbol {address.name}'
     if isinstance(address, SystemAddress):
         return notation.system_address(address)
     return notation.extended_address(address)

@@ -69,12 +69,14 @@ class Session:
     Decode the traffic of one line, whatever the bytes are; nothing is raised.
 
     ``feed`` takes chunks in the order of their times, ``finish`` ends the traffic. Check and
-    duplex are found where they are not given; ``kind`` tells what they are. Where the direction
+    duplex are found where they are not given; ``kind`` tells what they are. A ``checksum`` that is
+    not ``is_certain`` is a guess that the frames may prove wrong. Where the direction
     is not known it is inferred on half-duplex lines, ``>`` being the master's.
     """
 
-    def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None) -> None:
-        self.kind = LineKind(checksum, duplex)
+    def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None, *,
+                 is_certain: bool = True) -> None:
+        self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
         self._wires: dict[Direction, _Wire] = {}
         self._conversation = Conversation()
         self._station: int | None = None  # that the master has spoken to last

@@ -153,3 +153,31 @@ def test_any_bytes_are_symbols_or_noise(chunks: list[bytes]) -> None:
     assert found == expected
     assert pieces.noise == whole.noise
     assert pieces.finish() == whole.finish()
+
+
+@pytest.mark.parametrize('wrong', Checksum)
+def test_a_guess_that_three_frames_contradict_is_changed(wrong: Checksum) -> None:
+    right = Checksum.BCC if wrong is Checksum.CRC else Checksum.CRC
+    kind = LineKind(wrong)
+    decoder = ListeningDecoder(kind)
+    said = b''.join(frames.ACK + frame(right, tns) for tns in range(4))
+    found = [symbol for symbol in symbols(decoder, said) if isinstance(symbol, Frame)]
+    assert kind.checksum is right
+    assert [symbol.fault for symbol in found] == [Fault.BAD_CHECK] * 3 + [None]
+
+
+def test_a_check_that_is_certain_stays() -> None:
+    kind = LineKind(Checksum.CRC, is_certain=True)
+    decoder = ListeningDecoder(kind)
+    symbols(decoder, b''.join(frames.ACK + frame(Checksum.BCC, tns) for tns in range(9)))
+    assert kind.checksum is Checksum.CRC
+
+
+def test_damaged_frames_change_no_guess() -> None:
+    kind = LineKind(Checksum.CRC)
+    decoder = ListeningDecoder(kind)
+    for tns in range(300):
+        damaged = bytearray(frame(Checksum.CRC, tns % 200))
+        damaged[6] ^= 1 + tns % 2
+        symbols(decoder, bytes(damaged))
+    assert kind.checksum is Checksum.CRC

@@ -64,6 +64,12 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('01 72 00 56 01 2C 08 FF 04 01 00 E4',
      'word range read B260:0, 114 words (from 114 of 342)'),
     ('01 00 00 01 00 2C 06 02 03 02', 'word range read E3.1.6.2.0.3, 1 word'),
+    ('01 00 00 01 00 00 50 55 4D 50 00 02', 'word range read symbol PUMP, 1 word'),
+    ('01 00 00 01 00 00 24 50 55 4D 50 00 02', 'word range read symbol PUMP, 1 word'),
+    ('00 00 00 01 00 00 50 55 4D 50 00 02 00', 'word range write symbol PUMP = 0002'),
+    ('01 00 00 01 00 00 24 4E 37 3A 33 00 02', 'word range read N7:3, 1 word'),
+    ('01 00 00 01 00 00 00 02', 'word range read, malformed (a symbol; an address in ASCII begins '
+     'with "$"): 01 00 00 01 00 00 00 02'),
     ('01 00 00 01 00 2E 01 08 0A 00 02', 'word range read B10:0, 1 word'),
     ('01 00 00 01 00 34 03 04 02 02', 'word range read T:4.ACC, 1 word'),
     ('00 00 00 02 00 07 00 07 05 01 00 FF FF', 'word range write N7:5 = 0001 FFFF'),
