@@ -29,8 +29,8 @@ import subprocess
 import sys
 
 import pytest
-from support.launch_stand_in import SOURCE
 from support.ros import get_parameters, Observer, PATIENCE
+from support.ros_tools import SOURCE
 
 DEPLOY = SOURCE / 'deploy'
 UNIT = DEPLOY / 'abdf1@.service'

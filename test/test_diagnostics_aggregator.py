@@ -20,8 +20,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from support.launch_stand_in import SOURCE
 from support.ros import EVERYTHING, EXAMPLE_FILES, Observer, Process, ros_args
+from support.ros_tools import SOURCE
 from support.simulator_process import OFTEN
 import yaml
 

@@ -18,12 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import runpy
+import sys
+import threading
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
-from support.launch_stand_in import SOURCE
+from support.commands import call
 from support.ros import Observer, Process
+from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files
 
 EXAMPLE = SOURCE / 'examples' / 'command_writer.py'
@@ -43,43 +46,52 @@ def simulator(files: Files) -> Iterator[Process]:
         node.end()
 
 
-def write(*args: str, node: str = '/writing/abdf1') -> tuple[int, str]:
-    """Return the exit status and the last line."""
-    with Process(EXAMPLE, '--timeout', '15', *args, '--node', node) as writer:
-        status = writer.result()
-    assert 'Traceback' not in writer.text
-    return status, writer.lines[-1]
+Write = Callable[..., tuple[int, list[str]]]
+
+
+@pytest.fixture
+def write(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Return what runs the example, and returns exit status and lines."""
+    main = runpy.run_path(str(EXAMPLE))['main']
+
+    def run(*args: str, node: str = '/writing/abdf1') -> tuple[int, list[str]]:
+        monkeypatch.setattr(sys, 'argv', ['command_writer', '--timeout', '15', *args,
+                                          '--node', node])
+        said = call(lambda _: main(), capsys)
+        return said.status, [*said.out.splitlines(), *said.err.splitlines()]
+
+    return run
 
 
 @pytest.mark.parametrize('words', [
     ('recipe', '1', '2', '3', '4'), ('setpoint', '0.1'), ('name', 'Tank', '5'), ('lamp', '1'),
     ('digits', '0x10', '99')])
 def test_value_that_the_plc_has_taken_is_written(
-        simulator: Process, words: tuple[str, ...]) -> None:
-    status, line = write(*words)
+        simulator: Process, write: Write, words: tuple[str, ...]) -> None:
+    status, (line,) = write(*words)
     assert status == 0, line
     assert line.startswith(f'{words[0]}: written (')
 
 
-def test_value_that_the_bridge_refuses_is_not_written(simulator: Process) -> None:
-    status, line = write('recipe', '1', '2', '3', '5000')
+def test_value_that_the_bridge_refuses_is_not_written(simulator: Process, write: Write) -> None:
+    status, (line,) = write('recipe', '1', '2', '3', '5000')
     assert status == 1
     assert line.startswith('recipe: not written: refused: value 5000 at index 3')
 
 
-def test_value_that_no_reply_confirms_is_unknown(simulator: Process) -> None:
+def test_value_that_no_reply_confirms_is_unknown(simulator: Process, write: Write) -> None:
     simulator.say('slow 2 100000')
     try:
-        status, line = write('setpoint', '3.5')
+        status, (line,) = write('setpoint', '3.5')
     finally:
         simulator.say('normal 2')
     assert status == 3
     assert line.startswith('setpoint: unknown whether written')
 
 
-def test_nobody_who_listens_is_not_written() -> None:
+def test_nobody_who_listens_is_not_written(write: Write) -> None:
     assert write('recipe', '1', '--timeout', '0.5', node='/nobody') == (
-        1, 'not written: there is no node /nobody')
+        1, ['not written: there is no node /nobody'])
 
 
 @pytest.mark.parametrize(('words', 'text'), [
@@ -88,8 +100,8 @@ def test_nobody_who_listens_is_not_written() -> None:
     (('a b', '1'), "1: cannot be sent: topic name '/writing/abdf1/write/a b' is invalid"),
 ])
 def test_what_is_no_value_is_refused(
-        simulator: Process, words: tuple[str, ...], text: str) -> None:
-    status, line = write(*words)
+        simulator: Process, write: Write, words: tuple[str, ...], text: str) -> None:
+    status, (line,) = write(*words)
     assert status == 2
     assert line.startswith(text)
 
@@ -99,42 +111,54 @@ def test_what_is_no_value_is_refused(
 Answer = Callable[[list[int]], list[tuple[str, str, str]]]
 
 
-def answered(answer: Answer, *args: str) -> tuple[int, list[str]]:
-    """Return exit status and lines; ``answer`` gives tag, text and value of each result."""
+Answered = Callable[..., tuple[int, list[str]]]
+
+
+@pytest.fixture
+def answered(write: Write) -> Iterator[Answered]:
+    """Return what writes 7 to lamps; its ``answer`` gives tag, text and value of each result."""
     with Observer() as observer:
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
+        answers: list[Answer] = []
 
         def take(message: Int16MultiArray) -> None:
-            for tag, text, value in answer(list(message.data)):
+            for tag, text, value in answers[-1](list(message.data)):
                 pairs = [KeyValue(key='value', value=value),
                          KeyValue(key='latency_ms', value='1.0')]
                 results.publish(DiagnosticStatus(name=tag, message=text, values=pairs))
 
+        def run(answer: Answer, *args: str) -> tuple[int, list[str]]:
+            answers.append(answer)
+            return write('lamps', '7', *args, node='/fake')
+
         observer.node.create_subscription(Int16MultiArray, '/fake/write/lamps', take, 10)
-        with Process(EXAMPLE, 'lamps', '7', '--node', '/fake', *args) as writer:
-            observer.until(lambda: not writer.is_running, 'the writer to end')
-            return writer.result(), writer.lines
+        turning = threading.Thread(target=observer.executor.spin)
+        turning.start()
+        yield run
+        observer.executor.shutdown()
+        turning.join()
 
 
-def test_results_of_other_mappings_and_other_writers_are_not_taken() -> None:
+def test_results_of_other_mappings_and_other_writers_are_not_taken(answered: Answered) -> None:
     status, lines = answered(lambda data: [
         ('recipe', 'not written: refused', '[7]'), ('lamps', 'not written: refused', '[8]'),
         ('lamps', 'written', '[7]'), ('lamps', 'unknown whether written', '[7]')])
     assert (status, lines) == (0, ['lamps: written (1.0 ms)'])
 
 
-def test_no_result_in_time_is_unknown() -> None:
-    status, lines = answered(lambda data: [], '--timeout', '4')
-    assert (status, lines) == (3, ['unknown whether written: no result within 4 s'])
+def test_no_result_in_time_is_unknown(answered: Answered) -> None:
+    status, lines = answered(lambda data: [], '--timeout', '1.5')
+    assert (status, lines) == (3, ['unknown whether written: no result within 1.5 s'])
 
 
-def test_every_mapping_of_the_topic_has_to_be_written() -> None:
-    tags = ('--tags', 'north', 'south', '--timeout', '4')
+def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> None:
+    tags = ('--tags', 'north', 'south')
     assert answered(lambda data: [('north', 'written', '[7]'), ('south', 'written', '[7]')],
                     *tags)[0] == 0
-    status, lines = answered(lambda data: [('north', 'written', '[7]')], *tags)
+    status, lines = answered(lambda data: [('north', 'written', '[7]')], *tags,
+                             '--timeout', '1.5')
     assert (status, lines) == (
-        3, ['north: written (1.0 ms)', 'unknown whether written: no result within 4 s'])
+        3, ['north: written (1.0 ms)', 'unknown whether written: no result within 1.5 s'])
 
 
 @pytest.mark.parametrize(('message', 'status'), [

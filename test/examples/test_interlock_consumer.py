@@ -21,8 +21,8 @@ from pathlib import Path
 import signal
 
 import pytest
-from support.launch_stand_in import SOURCE
 from support.ros import Process
+from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files
 
 EXAMPLE = SOURCE / 'examples' / 'interlock_consumer.py'

@@ -25,8 +25,8 @@ import shlex
 import signal
 
 import pytest
-from support.launch_stand_in import SOURCE
 from support.ros import EXAMPLE_FILES, Observer, Process, ros_args
+from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files, READS
 
 EXAMPLE = SOURCE / 'examples' / 'recorder.py'

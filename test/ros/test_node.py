@@ -20,7 +20,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
-import signal
 import threading
 import time
 from typing import Any
@@ -429,21 +428,6 @@ def test_internal_errors_are_told_and_the_third_is_the_end(
 
 
 # Starts that are refused
-
-
-@pytest.fixture
-def refusal(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., list[str]]]:
-    """Return the lines that a node says which refuses to start."""
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def start(*arguments: str, status: int = 2) -> list[str]:
-        capfd.readouterr()
-        assert main(['node', *arguments]) == status
-        return ''.join(capfd.readouterr()).splitlines()
-
-    yield start
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
 
 
 @pytest.mark.parametrize('arguments', [

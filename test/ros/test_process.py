@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 import re
@@ -53,6 +53,8 @@ from support.simulator_process import (
     NET_ROW,
     STATUSES,
 )
+
+Refusal = Callable[..., list[str]]
 
 
 @pytest.fixture
@@ -204,14 +206,6 @@ def test_leaves_nothing_behind_when_the_line_goes_away(
 # Starts
 
 
-def refused_start(*arguments: str, status: int = 2) -> list[str]:
-    """Return the lines of a node that does not start."""
-    with Process('node', *arguments) as node:
-        assert node.result() == status, node.text
-        assert 'Traceback' not in node.text
-        return node.lines
-
-
 def fatal(line: str) -> str:
     """Return the text of a line of the log, which has to be of level FATAL."""
     match = re.fullmatch(r'\[FATAL\] \[[0-9.]+\] \[abdf1\]: (.+)', line)
@@ -219,24 +213,24 @@ def fatal(line: str) -> str:
     return match[1]
 
 
-def test_faulty_parameter_ends_with_one_clear_line(files: Files) -> None:
-    (line,) = refused_start(*files.args('net.station:=300'))
+def test_faulty_parameter_ends_with_one_clear_line(files: Files, refusal: Refusal) -> None:
+    (line,) = refusal(*files.args('net.station:=300'))
     assert fatal(line) == (
         'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (300) must be '
         'less than 255; Station = "300" should be a whole number from 0 to 254')
 
 
-def test_missing_files_end_with_one_clear_line_each(files: Files) -> None:
-    lines = refused_start(*ros_args('net_file:=/nowhere/net.csv', 'map_file:=map.csv'))
+def test_missing_files_end_with_one_clear_line_each(files: Files, refusal: Refusal) -> None:
+    lines = refusal(*ros_args('net_file:=/nowhere/net.csv', 'map_file:=map.csv'))
     assert [fatal(line) for line in lines] == [
         '/nowhere/net.csv: cannot be read: No such file or directory',
         'map.csv: cannot be read: No such file or directory']
 
 
-def test_every_fault_of_the_net_file_is_told(files: Files) -> None:
+def test_every_fault_of_the_net_file_is_told(files: Files, refusal: Refusal) -> None:
     write_csv(files.net, 'Station,Mode,PLC_Type,Error_Code,NAK_Retries,ENQ_Retries,Cmd_Timeout,'
                          'Baud', ['255,Client,PLC7,XOR,11,x,499,9601'])
-    lines = [fatal(line) for line in refused_start(*files.args())]
+    lines = [fatal(line) for line in refusal(*files.args())]
     assert [line.split('; ')[0] for line in lines] == [
         f'{files.net}:2:1 (Station): 2552 CRT_BAD_STATION_ID: '
         'Invalid station number (255) must be less than 255',
@@ -260,19 +254,27 @@ BAD_ROWS = ('bad_station,Read,N7:0,255,SLC,,,,,,', 'bad_type,Read,N7:0,2,PLC9,,,
             'bad_syntax,Read,N7-0,2,SLC,,,,,,', 'bad_range,Read,N7:250,2,SLC,20,,,,,')
 
 
-def test_strict_map_ends_with_every_bad_row(files: Files) -> None:
+def test_strict_map_ends_with_every_bad_row(files: Files, refusal: Refusal) -> None:
     write_csv(files.map, MAP_HEADER, [MAP_ROWS[0], *BAD_ROWS])
-    lines = [fatal(line) for line in refused_start(*files.args('strict_map:=true'))]
+    lines = [fatal(line) for line in refusal(*files.args('strict_map:=true'))]
     assert [re.sub(r'^.*?: (\d{4} \w+: Item: \d).*', r'\1', line) for line in lines] == [
         '2501 ERR_BAD_STATION: Item: 2', '2502 ERR_BAD_PLC_TYPE: Item: 3',
         '2503 ERR_ADDRESS_SYNTAX: Item: 4', '2504 ERR_ADDRESS_RANGE: Item: 5']
 
 
-def test_malformed_arguments_end_with_one_clear_line() -> None:
-    lines = refused_start('--ros-args', '-p', 'port')
+def test_malformed_arguments_end_with_one_clear_line(refusal: Refusal) -> None:
+    lines = refusal('--ros-args', '-p', 'port')
     (line,) = [line for line in lines if '[rcl]' not in line]
     assert line.startswith('abdf1: bad arguments: ')
     assert "Couldn't parse parameter override rule: '-p port'." in line
+
+
+def refused_start(*arguments: str, status: int = 2) -> list[str]:
+    """Return the lines of a node that does not start; its log is that of no other."""
+    with Process('node', *arguments) as node:
+        assert node.result() == status, node.text
+        assert 'Traceback' not in node.text
+        return node.lines
 
 
 @pytest.mark.parametrize('directory', ['/proc/none', '/proc'])
