@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.errors import Place, Problem
@@ -47,9 +48,22 @@ class _MappedTable(DataTable):
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
         """Return where the words are, if all of them are mapped."""
         place = super().find(address, words)
-        if not self._mapped.issuperset(_words(address, words)):
+        if not self._has_all(address, words):
             raise OutOfRange(f'not all of {words} words at {address} are mapped')
         return place
+
+    def _has_all(self, address: Address, words: int) -> bool:
+        """
+        Tell whether these words are mapped.
+
+        Who moves whole elements of a structure has no say in which of their words are: there
+        one of each will do, and the others are what the other end has written, or 0.
+        """
+        mapped = (place in self._mapped for place in _words(address, words))
+        size = address.layout.words
+        if not address.file_type.is_structure or address.word or words % size:
+            return all(mapped)
+        return all(any(list(islice(mapped, size))) for _ in range(words // size))
 
     def write(self, address: Address, data: bytes) -> None:
         """Store whole words and remember which."""

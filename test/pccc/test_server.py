@@ -106,7 +106,7 @@ def test_what_is_no_command_of_the_family(family: PlcType, cmd: int, data: str) 
 
 
 def test_families_do_not_take_each_others_commands() -> None:
-    assert ask(table(SLC, N7_0='00 00'), '68 00 00 01 00 07 00 07 00 01 00') == (0x10, '')
+    assert ask(table(SLC, B3_0='00 00'), '26 06 03 00 FF FF 01 00') == (0x10, '')
     assert ask(table(PLC5, N7_0='00 00'), 'A2 02 07 89 00 00') == (0x10, '')
 
 

@@ -67,7 +67,7 @@ class Element:
 
 def element_of(address: Address, is_value: bool) -> Element:
     """Return what is moved at ``address``: one value of a structure, or whole elements."""
-    layout = address.layout
+    layout = ADDRESSING.files[address.file_type]  # an SLC serves these commands too
     if not is_value:
         parts = 2 if address.file_type is FileType.ASCII else 1
         return Element(layout.code, 2 * layout.wire_words, 2 * layout.words, parts)

@@ -24,6 +24,7 @@ from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
+from abdf1_ros.pccc.plc5.server import TypedService
 from abdf1_ros.pccc.serving import Codes, Commands, Refusal
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING
@@ -35,7 +36,7 @@ _BYTE_ADDRESSES = 8
 
 
 class SlcCommands:
-    """The commands an SLC 5/03 serves."""
+    """The commands an SLC 5/03 serves, from operating system 303 on (M 7-2, 7-3)."""
 
     no_such_file: Codes = status.STS_ILLEGAL_COMMAND, None
     out_of_range: Codes = status.STS_ADDRESS, None
@@ -44,13 +45,14 @@ class SlcCommands:
         self._table = table
         self.basic_commands = BasicService(
             table, self._common_interface_file, slc.MAX_READ, slc.MAX_WRITE).reads_and_writes()
-        self.commands: Commands = {
+        own: Commands = {
             (slc.CMD, slc.LOGICAL_READ): self._read,
             (slc.CMD, slc.SHORT_READ): partial(self._read, is_short=True),
             (slc.CMD, slc.LOGICAL_WRITE): self._write,
             (slc.CMD, slc.SHORT_WRITE): partial(self._write, is_short=True),
             (slc.CMD, slc.MASKED_WRITE): self._masked_write,
         }
+        self.commands = own | TypedService(table, ADDRESSING).commands()
 
     def _read(self, reader: Reader, is_short: bool = False) -> bytes:
         request = slc.LogicalRead.read(reader, is_short)

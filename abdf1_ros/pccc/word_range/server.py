@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -77,9 +77,13 @@ class WordRangeService(Generic[_Place]):
         request = WordRangeRead.read(reader, self.read_address)
         if request.size > word_range.MAX_READ:
             raise Refusal(*self.codes.bad_size)
-        words = self._words(self.find(request.address), request.offset, request.size,
-                            request.total, self.codes.read_past_end)
-        return b''.join(self.table.read(word, 1) for word in words)
+        start = self.find(request.address)
+        words = self._words(start, request.offset, request.size, request.total,
+                            self.codes.read_past_end)
+        whole = self.table.read(start, request.total)
+        asked = {start.offset + n: whole[2 * n:2 * n + 2] for n in range(request.total)}
+        return b''.join(asked[word.offset] if word.offset in asked else self.table.read(word, 1)
+                        for word in words)
 
     def _write(self, reader: Reader) -> bytes:
         request = WordRangeWrite.read(reader, self.read_address)
@@ -87,8 +91,14 @@ class WordRangeService(Generic[_Place]):
             raise Refusal(*self.codes.bad_size)
         words = self._words(self.find(request.address), request.offset, len(request.data),
                             request.total, self.codes.write_past_end)
-        for number, word in enumerate(words):
-            self.table.write(word, request.data[2 * number:2 * number + 2])
+        values = {word.offset: request.data[2 * number:2 * number + 2]
+                  for number, word in enumerate(words)}
+        if max(values) - min(values) < len(values):  # one stretch: all of it or nothing
+            first = words[0].at_offset(min(values))
+            self.table.write(first, b''.join(values[at] for at in sorted(values)))
+        else:
+            for word in words:
+                self.table.write(word, values[word.offset])
         return b''
 
     def _write_bits(self, reader: Reader) -> bytes:
@@ -98,14 +108,19 @@ class WordRangeService(Generic[_Place]):
         return b''
 
     def _words(self, start: Address, offset: int, size: int, total: int,
-               past_end: Codes) -> Iterator[Address]:
+               past_end: Codes) -> list[Address]:
         """Return the words of one packet, after a look at all of the transaction."""
         if size == 0 or size % 2 or offset + size // 2 > total:
             raise Refusal(*self.codes.bad_size)
-        for words, refusal in ((1, self.codes.missing), (total, past_end)):
-            try:
-                self.table.find(start, words)
-            except OutOfRange:
-                raise Refusal(*refusal) from None
+        if not self._is_there(start, total):
+            is_missing = not self._is_there(start, 1)
+            raise Refusal(*(self.codes.missing if is_missing else past_end))
         first = start.offset + offset
-        return (word_on_line(start.at_offset(first + n)) for n in range(size // 2))
+        return [word_on_line(start.at_offset(first + n)) for n in range(size // 2)]
+
+    def _is_there(self, start: Address, words: int) -> bool:
+        try:
+            self.table.find(start, words)
+        except OutOfRange:
+            return False
+        return True

@@ -84,3 +84,17 @@ def test_slc_masked_write_masks_every_word() -> None:
     words = table(SLC, N7_0='FF FF 00 00 FF FF')
     assert ask(words, 'AB 04 07 89 00 00 0F 00 05 00 FF FF') == (0, '')
     assert words_at(words, 'N7:0', 3) == 'F5 FF 0F 00 FF FF'
+
+
+def test_slc_takes_typed_commands_on_files_that_a_plc5_has_too() -> None:
+    """From operating system 303 on; the codes are those of a PLC-5."""
+    words = table(SLC, N7_0='01 00 02 00', T4_0='00 20 0A 00 05 00', F8_0='00 00 7A 44',
+                  L10_0='01 00 00 00', I_1_0='05 00')
+    assert ask(words, '68 00 00 02 00 06 07 00 02 00') == (0, '95 09 42 01 00 02 00')
+    assert ask(words, '68 00 00 01 00 0E 04 00 02 01 00') == (0, '93 09 42 05 00')
+    assert ask(words, '68 00 00 01 00 06 08 00 01 00') == (0, '96 09 94 08 00 00 7A 44')
+    assert ask(words, '67 00 00 01 00 06 07 01 93 09 42 07 00') == (0, '')
+    assert words_at(words, 'N7:1') == '07 00'
+    for data, ext_sts in (('06 0A 00', '06'), ('06 01 00', '06'), ('06 63 00', '06'),
+                          ('06 07 02', '07')):
+        assert ask(words, f'68 00 00 01 00 {data} 01 00') == (0xF0, ext_sts)
