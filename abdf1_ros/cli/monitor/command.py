@@ -15,9 +15,9 @@
 """
 Show what a running bridge does, from its topics alone.
 
-That is: values and their ages, stations, the load of the line, writes and counters. On a terminal
-the picture is renewed in place; arrow and page keys scroll, Ctrl-L draws it anew, q or Ctrl-C
-ends. Elsewhere, or with --once, plain text is printed.
+That is: values and their ages, stations, the load of the line, writes and counters. On a
+terminal the picture is renewed in place, and its last line names the keys. Elsewhere, or with
+--once, plain text is printed.
 
 A value is fresh, or STALE when it is older than its topic promises; topics that are published on
 change, or when a PLC writes to us, promise nothing.
@@ -57,6 +57,10 @@ _PROGRESS_PERIOD = 2.0
 
 # What draws everything anew on a terminal, as when something else has written there.
 _CONTROL_L = 12
+
+_SECTION_KEYS = {ord('l'): 'link', ord('s'): 'stations', ord('v'): 'values',
+                 ord('r'): 'reasons', ord('w'): 'writes', ord('c'): 'counters'}
+_KEYS = 'q end  arrows, pages  l link  s stations  v values  r reasons  w writes  c counters'
 
 # Colours by the codes of ANSI, which stand for the same colours in curses.
 _COLOURS = {Style.GOOD: 2, Style.WARNING: 3, Style.BAD: 1}
@@ -98,6 +102,9 @@ class _Screen:
     def __init__(self, window: curses.window) -> None:
         self._window = window
         self._top = 0
+        self._sections: dict[str, int] = {}
+        self._toggle: Callable[[], None] | None = None
+        self._keys = _KEYS
         self._colours: dict[Style, int] = {}
         window.nodelay(True)
         try:
@@ -110,13 +117,18 @@ class _Screen:
                 curses.init_pair(number, number, -1)
                 self._colours[style] = curses.color_pair(number)
 
+    def offer_toggle(self, toggle: Callable[[], None]) -> None:
+        """Let the key t call ``toggle``."""
+        self._toggle, self._keys = toggle, f't toggle  {_KEYS}'
+
     @property
     def width(self) -> int:
         return self._window.getmaxyx()[1] - 1  # writing into the last corner is an error
 
     def show(self, lines: Sequence[Line]) -> None:
-        """Show what fits, from the line that has been scrolled to."""
-        height = self._window.getmaxyx()[0]
+        """Show what fits, from the line that has been scrolled to, and the keys below it."""
+        height = self._window.getmaxyx()[0] - 1
+        self._sections = {line.section: row for row, line in enumerate(lines) if line.section}
         self._top = max(0, min(self._top, len(lines) - height))
         self._window.erase()
         for row, line in enumerate(lines[self._top:self._top + height]):
@@ -127,11 +139,36 @@ class _Screen:
                 self._window.addnstr(row, 0, line.text, self.width, attributes)
             except curses.error:  # letters of double width, or a window just made smaller
                 pass
+        last = min(self._top + height, len(lines))
+        self._bottom(f'{self._top + 1}-{last} of {len(lines)}  {self._keys}')
         self._window.refresh()
+
+    def _bottom(self, text: str) -> None:
+        try:
+            self._window.addnstr(
+                self._window.getmaxyx()[0] - 1, 0, text, self.width, curses.A_REVERSE)
+        except curses.error:  # a window just made smaller
+            pass
+
+    def ask(self, question: str) -> str:
+        """Return what is typed after a question on the last line; empty for Escape or Ctrl-C."""
+        self._window.move(self._window.getmaxyx()[0] - 1, 0)
+        self._window.clrtoeol()
+        self._bottom(question)
+        self._window.nodelay(False)
+        curses.echo()
+        try:
+            row = self._window.getmaxyx()[0] - 1
+            return self._window.getstr(row, min(len(question), self.width - 1)).decode().strip()
+        except (KeyboardInterrupt, UnicodeError):
+            return ''
+        finally:
+            curses.noecho()
+            self._window.nodelay(True)
 
     def wants_end(self) -> bool:
         """Take the keys that have been pressed; tell whether one of them ends."""
-        page = self._window.getmaxyx()[0] - 1
+        page = self._window.getmaxyx()[0] - 2
         steps = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
                  curses.KEY_NPAGE: page, curses.KEY_HOME: -self._top, ord(' '): page}
         while (key := self._window.getch()) != -1:
@@ -139,6 +176,10 @@ class _Screen:
                 return True
             if key in (_CONTROL_L, curses.KEY_RESIZE):
                 self._window.clearok(True)
+            if key == ord('t') and self._toggle is not None:
+                self._toggle()
+            if (section := _SECTION_KEYS.get(key)) in self._sections:
+                self._top = self._sections[section]
             self._top = max(0, self._top + steps.get(key, 0))
         return False
 
@@ -167,7 +208,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace, words: list[str]) -> int:
     has_ended = _Ending()
-    with Watch(full_name(options.node), words) as watch:
+    with Watch(full_name(options.node), words, options.write) as watch:
         if _find(watch, options.wait, has_ended):
             has_ended.limit(options.seconds)
             _show(watch, options, has_ended)
@@ -181,6 +222,8 @@ def _parse(args: Sequence[str]) -> argparse.Namespace:
     parser = command_parser('monitor', __doc__, _EPILOG)
     parser.add_argument('--node', default='/abdf1',
                         help='name of the bridge with its namespace (default: %(default)s)')
+    parser.add_argument('--write', action='store_true',
+                        help='let the key t toggle a bit, after a question')
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end so many seconds after the node has been found')
@@ -240,9 +283,26 @@ def _can_draw() -> bool:
 
 def _draw(window: curses.window, watch: Watch, has_ended: _Ending) -> None:
     screen = _Screen(window)
+    if watch.may_write:
+        screen.offer_toggle(lambda: _toggle(screen, watch))
     while not has_ended() and not screen.wants_end():
         screen.show(render(watch.snapshot(), time.monotonic(), screen.width))
         watch.spin(_RENEWAL)
+
+
+def _toggle(screen: _Screen, watch: Watch) -> None:
+    """Ask for a bit and for a yes; then write its other value."""
+    topic = screen.ask('toggle which topic (one bit)? ')
+    if not topic:
+        return
+    value = watch.bit(topic)
+    if value is None:
+        screen.ask(f'{printable(topic)}: there is no single bit of this name that is read and '
+                   'written; Return goes on ')
+        return
+    question = f'write {1 - value} to {printable(topic)}, which is {value} now? [y/N] '
+    if screen.ask(question).lower() in ('y', 'yes') and not watch.write_bit(topic, 1 - value):
+        screen.ask('not written: the bridge does not listen; Return goes on ')
 
 
 def _complete(watch: Watch, has_ended: _Ending) -> None:

@@ -33,12 +33,17 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_full_topic_name import validate_full_topic_name
-from std_msgs.msg import String, UInt16MultiArray
+from std_msgs.msg import String, UInt8MultiArray, UInt16MultiArray
 
 # How often (s) the topics of the node are looked for; they do not change while it lives.
 _DISCOVERY_PERIOD = 0.5
 
 _RESULTS_KEPT = 8
+
+# How long (s) a publisher waits for the bridge before it gives up.
+_CONNECTION = 3.0
+
+_BITS = 'std_msgs/msg/UInt8MultiArray'
 
 _TYPES = {f'std_msgs/msg/{message.__name__}': message for message in MESSAGES.values()}
 
@@ -71,15 +76,18 @@ class Watch:
     """
     Listen to the node with the full name ``name`` until it is closed.
 
-    Nothing is asked of the publishers beyond what every bridge offers, nothing is published
-    and no service is called: the bridge does not notice. Ages of topics that promise nothing
-    count from the publisher's time stamp, so for them the clocks of the hosts have to agree.
+    Nothing is asked of the publishers beyond what every bridge offers, no service is called, and
+    nothing is published unless ``may_write``: the bridge does not notice. Ages of topics that
+    promise nothing count from the publisher's time stamp, so for them the clocks of the hosts
+    have to agree.
     """
 
-    def __init__(self, name: str, ros_arguments: list[str]) -> None:
+    def __init__(self, name: str, ros_arguments: list[str], may_write: bool = False) -> None:
         # Signals are for whoever shows the picture; rclpy's handlers would end us in between.
         rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
         self.name = name
+        self.may_write = may_write
+        self._writers: dict[str, Any] = {}
         self._node = Node('abdf1_monitor', start_parameter_services=False, enable_rosout=False)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
@@ -139,6 +147,31 @@ class Watch:
         return Snapshot(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
             self._active, tuple(self._results))
+
+    def bit(self, topic: str) -> int | None:
+        """Return the value of a mapping of one bit that is fresh and may be written, or None."""
+        known = self._subscriptions.get(f'{self.name}/read/{topic}')
+        if known is None or known.type_name != _BITS or known.reading.values is None \
+                or len(known.reading.values) != 1:
+            return None
+        if known.reading.state(time.monotonic())[1] is Style.BAD \
+                or not self._node.count_subscribers(f'{self.name}/write/{topic}'):
+            return None
+        return int(known.reading.values[0])
+
+    def write_bit(self, topic: str, value: int) -> bool:
+        """Publish a bit once; tell whether the bridge listens."""
+        if topic not in self._writers:
+            self._writers[topic] = self._node.create_publisher(
+                UInt8MultiArray, f'{self.name}/write/{topic}', 10)
+        publisher = self._writers[topic]
+        end = time.monotonic() + _CONNECTION
+        while not publisher.get_subscription_count():
+            if time.monotonic() >= end:
+                return False
+            self._executor.spin_once(timeout_sec=0.05)
+        publisher.publish(UInt8MultiArray(data=[value]))
+        return True
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""

@@ -35,6 +35,9 @@ _SILENCE = 3.0
 _NAME_WIDTH = 30
 _ADDRESS_WIDTH = 12
 _STATE_WIDTH = 16
+_SHORT_STATE = 6
+_AGE_WIDTH = 7
+_GOOD_VALUE_WIDTH = 24
 _LEAST_VALUE_WIDTH = 12
 
 _LINK_KEYS = ('settings', 'transactions per second', 'line load', 'scan time',
@@ -55,10 +58,11 @@ class Style(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line to be shown."""
+    """One line to be shown; ``section`` is the part of the picture that begins with it."""
 
     text: str
     style: Style = Style.PLAIN
+    section: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,10 +132,13 @@ class Snapshot:
 
 def render(snapshot: Snapshot, now: float, width: int) -> list[Line]:
     """Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``."""
-    lines = [*_head(snapshot, now), *_link(snapshot, width), *_stations(snapshot, width),
-             *_values(snapshot, now, width), *_mappings(snapshot, width),
-             *_writes(snapshot, now, width), *_counters(snapshot, width)]
-    return [Line(_cut(line.text, width), line.style) for line in lines]
+    parts = {
+        'link': [*_head(snapshot, now), *_link(snapshot, width)],
+        'stations': _stations(snapshot, width), 'values': _values(snapshot, now, width),
+        'reasons': _mappings(snapshot, width), 'writes': _writes(snapshot, now, width),
+        'counters': _counters(snapshot, width)}
+    return [Line(_cut(line.text, width), line.style, '' if number else name)
+            for name, lines in parts.items() for number, line in enumerate(lines)]
 
 
 def show(values: Sequence[float] | str, width: int) -> str:
@@ -178,12 +185,22 @@ def _stations(snapshot: Snapshot, width: int) -> Iterator[Line]:
 
 
 def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
-    names = [_cut(printable(reading.topic), _NAME_WIDTH) for reading in snapshot.readings]
+    longest = min(_NAME_WIDTH, width // 3)
+    names = [_cut(printable(reading.topic), longest) for reading in snapshot.readings]
     name_width = max(map(len, ['topic', *names]))
-    value_width = max(_LEAST_VALUE_WIDTH,
-                      width - name_width - _ADDRESS_WIDTH - _STATE_WIDTH - 15)
-    yield Line(f'  {"topic":<{name_width}}  {"address":<{_ADDRESS_WIDTH}}'
-               f'  {"age":>6}  {"state":<{_STATE_WIDTH}}  value', Style.TITLE)
+    # The value goes last: on a narrow terminal the address leaves first, then the state is short.
+    left = width - name_width - _AGE_WIDTH - 6
+    state_width = _STATE_WIDTH if left - _STATE_WIDTH - 2 >= _GOOD_VALUE_WIDTH else _SHORT_STATE
+    left -= state_width + 2
+    has_address = left - _ADDRESS_WIDTH - 2 >= _GOOD_VALUE_WIDTH
+    value_width = max(_LEAST_VALUE_WIDTH, left - (_ADDRESS_WIDTH + 2) * has_address)
+
+    def row(topic: str, age: str, state: str, value: str, address: str) -> str:
+        state = f'{state[:state_width]:<{state_width}}'
+        place = f'  {address:<{_ADDRESS_WIDTH}}' if has_address else ''
+        return f'  {topic:<{name_width}}{place}  {age:>{_AGE_WIDTH}}  {state}  {value}'
+
+    yield Line(row('topic', 'age', 'state', 'value', 'address').rstrip(), Style.TITLE)
     for name, reading in zip(names, snapshot.readings, strict=True):
         state, style = reading.state(now)
         age, value = '', ''
@@ -191,8 +208,7 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
             age = f'{now - reading.received:.1f} s'
             value = show(reading.values, value_width)
         address = _cut(printable(reading.address), _ADDRESS_WIDTH)
-        yield Line(f'  {name:<{name_width}}  {address:<{_ADDRESS_WIDTH}}'
-                   f'  {age:>6}  {state:<{_STATE_WIDTH}}  {value}', style)
+        yield Line(row(name, age, state, value, address).rstrip(), style)
     if not snapshot.readings:
         yield Line('  no read topic found', Style.WARNING)
 

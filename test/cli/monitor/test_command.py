@@ -195,6 +195,41 @@ def test_picture_is_drawn_in_place_and_q_ends(simulator: Process) -> None:
         assert 'Traceback' not in screen.drawn
 
 
+def test_keys_lead_to_the_parts_of_the_picture(simulator: Process) -> None:
+    with terminal('--node', NODE) as screen:
+        screen.wait_for('CRD_CHAR_RECV')
+        screen.resize(6, 80)
+        screen.press('c' + CONTROL_L)
+        screen.wait_for('counters')
+        screen.wait_for('q end  arrows')
+        screen.press('l' + CONTROL_L)
+        screen.wait_for(NODE)
+        screen.press('q')
+        assert screen.result() == 0
+
+
+def test_bit_is_toggled_after_a_question(simulator: Process) -> None:
+    with terminal('--node', NODE, '--write') as screen:
+        screen.wait_for('t toggle')
+        screen.wait_for('lamp')
+        screen.press('tlamp\r')
+        screen.wait_for('write 1 to lamp, which is 0 now? [y/N]')
+        screen.press('y\r')
+        screen.wait_for('lamp [1] written')
+        screen.press('trecipe\r')
+        screen.wait_for('there is no single bit of this name')
+        screen.press('\rq')
+        assert screen.result() == 0
+
+
+def test_without_write_nothing_is_toggled(simulator: Process) -> None:
+    with terminal('--node', NODE) as screen:
+        screen.wait_for('q end  arrows')
+        screen.press('tq')
+        assert screen.result() == 0
+        assert 'toggle' not in screen.drawn
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signals_give_the_terminal_back(simulator: Process, number: signal.Signals) -> None:
     with terminal('--node', NODE) as screen:

@@ -58,6 +58,24 @@ def test_a_reading_is_shown_with_address_age_state_and_values() -> None:
     assert line.style is Style.GOOD
 
 
+@pytest.mark.parametrize('width', [44, 60, 80, 120])
+def test_value_is_the_last_column_to_go(width: int) -> None:
+    reading = Reading('a_topic_of_some_length', [12345, -12345], 'N7:0', NOW - 0.2, 1.0)
+    line = next(text for text in lines(snapshot(readings=[reading]), width) if 'a_t' in text)
+    assert len(line) <= width
+    assert '12345' in line if width < 60 else '12345 -12345' in line
+    assert ('N7:0' in line) == (width > 80)
+
+
+def test_every_part_can_be_found_by_its_first_line() -> None:
+    picture = snapshot(statuses=[
+        Status('mappings', Style.BAD, 'ERROR', {'a': 'failed'}),
+        Status('writes', Style.GOOD, 'OK'), Status('counters', Style.GOOD, 'OK', {'A': '1'})])
+    found = {line.section: line.text for line in render(picture, NOW, WIDTH) if line.section}
+    assert {name: found[name].split()[0] for name in ('reasons', 'writes', 'counters')} == {
+        'reasons': 'mappings', 'writes': 'writes', 'counters': 'counters'}
+
+
 @pytest.mark.parametrize(('reading', 'state'), [
     (Reading('a', [1], received=NOW - 0.5, promised=0.5), ('fresh', Style.GOOD)),
     (Reading('a', [1], received=NOW - 0.51, promised=0.5), ('STALE (>0.5 s)', Style.BAD)),
