@@ -98,20 +98,18 @@ class HalfDuplexMaster:
         else:
             task.reply(reply)
 
-    def exchange(self, command: Packet, station: int | None = None,
-                 reply_size: int = 0, expires: float = math.inf
+    def exchange(self, command: Packet, reply_size: int = 0, expires: float = math.inf
                  ) -> Generator[Step, Symbol | None, Packet]:
         """
         Send ``command`` and return the reply to it.
 
-        ``station`` is the address on this line; it differs from the command's DST only behind
-        a gateway (M 3-7). ``reply_size`` and ``expires`` are those of a task. While this runs and
-        after it, ``command_sent`` tells whether the command has been on the line: without a reply
-        its outcome is then unknown. A broadcast has no reply; the one returned for it is our own.
+        ``reply_size`` and ``expires`` are those of a task. While this runs and after it,
+        ``command_sent`` tells whether the command has been on the line: without a reply its
+        outcome is then unknown. A broadcast has no reply; the one returned for it is our own.
 
         Raises StationInactive, CommandTimeout, CommandExpired or WrongCommandCode.
         """
-        number = command.dst if station is None else station
+        number = self._stations.via(command.dst)  # on this line (M 3-7)
         self.command_sent = False
         if number != BROADCAST and not self._stations[number].active:
             yield from self._line.revive(number)
@@ -122,9 +120,9 @@ class HalfDuplexMaster:
         try:
             reply = yield from self._collect(number, command, started, reply_size)
         except CommandTimeout:
-            yield from self._give_up(number)
+            yield from self._give_up(command.dst)
             raise
-        self._line.check_reply(number, reply, command)
+        self._line.check_reply(reply, command)
         return reply
 
     def _forward(self) -> Talk:
@@ -133,7 +131,8 @@ class HalfDuplexMaster:
         if packet is None or packet.is_reply or packet.dst == BROADCAST:
             return
         try:
-            reply = yield from self._collect(packet.dst, packet, self._machine.now)
+            reply = yield from self._collect(
+                self._stations.via(packet.dst), packet, self._machine.now)
         except (StationInactive, CommandTimeout):
             return  # the sender has a time limit of its own
         self._line.take_unwanted(packet.dst, reply)
@@ -147,7 +146,7 @@ class HalfDuplexMaster:
             packet = None
             if isinstance(answer, Frame):
                 packet = yield from self._line.receive(number, answer)
-            if packet is not None and packet.answers(command):
+            if packet is not None and self._line.answers(packet, command):
                 return packet
             if packet is not None:
                 self._line.take_unwanted(number, packet)

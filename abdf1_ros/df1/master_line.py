@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Container, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import NoReturn, TypeGuard
 
@@ -123,7 +123,6 @@ class MasterLine:
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
         self._forwards: deque[Packet] = deque()
-        self._behind: dict[int, int] = {}  # by station: the one of this line that it is behind
         self._next_probe = 0.0
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf
@@ -140,7 +139,6 @@ class MasterLine:
             begun = self.machine.now
             yield Step(frame, BROADCAST_PAUSE)
             return begun
-        self._behind[packet.dst] = number
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             begun = self.machine.now
@@ -288,7 +286,7 @@ class MasterLine:
         packet = Packet.decode(frame.data)
         if packet.src not in self.stations or self._speaks_for(number, packet.src):
             return False
-        station = self.stations[packet.src]
+        station = self.stations[self.stations.via(packet.src)]
         self.counters.messages_received += 1
         self.stations.heard(packet.src, self.machine.now)
         if packet.is_reply and packet.dst == self.settings.station and station.accepts(packet):
@@ -299,7 +297,7 @@ class MasterLine:
 
     def _speaks_for(self, number: int, src: int) -> bool:
         """Tell whether a message of ``src`` may come from station ``number`` of this line."""
-        return src == number or self._behind.get(src) == number
+        return self.stations.via(src) == number
 
     def _is_echo(self, symbol: Frame | Poll, frame: bytes) -> bool:
         """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
@@ -321,7 +319,7 @@ class MasterLine:
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
         station = self.stations[number]
-        if not self._speaks_for(number, packet.src) or packet.dst == number:
+        if not self._speaks_for(number, packet.src) or packet.dst == packet.src:
             if frame.data != station.last_refused:
                 station.last_refused = frame.data
                 self.counters.invalid_messages += 1
@@ -349,9 +347,17 @@ class MasterLine:
         else:
             self.counters.commands_received += 1
 
-    def check_reply(self, number: int, reply: Packet, command: Packet) -> None:
+    def answers(self, packet: Packet, command: Packet) -> bool:
+        """Tell whether a message is the reply to ``command``; a gateway may fill in its DST."""
+        if self.stations.via(command.dst) != command.dst:
+            packet = replace(packet, dst=command.src)
+        return packet.answers(command)
+
+    def check_reply(self, reply: Packet, command: Packet) -> None:
         """Account for the reply to ``command``; WrongCommandCode when it is another's."""
-        check_reply(reply, command, self.stations[number], self.counters, self._report)
+        if reply.sts == 0 or reply.sts & 0xF0:  # else a gateway has sent it in its place (M 8-2)
+            self.stations.heard(reply.src, self.machine.now)
+        check_reply(reply, command, self.stations[reply.src], self.counters, self._report)
 
     def take_unwanted(self, number: int, packet: Packet) -> None:
         """
@@ -385,9 +391,10 @@ class MasterLine:
         packet = next(packet for packet in self._forwards if packet.dst not in busy)
         self._forwards.remove(packet)
         try:
-            if packet.dst != BROADCAST and not self.stations[packet.dst].active:
-                yield from self._revive_for_others(packet.dst)
-            yield from self.deliver(packet.dst, packet)
+            number = self.stations.via(packet.dst)
+            if number != BROADCAST and not self.stations[number].active:
+                yield from self._revive_for_others(number)
+            yield from self.deliver(number, packet)
         except StationInactive:
             if not packet.is_reply and packet.src != self.settings.station:
                 self._forwards.append(packet.reply(sts=_NOT_DELIVERED))

@@ -265,9 +265,8 @@ class StandardPollingMaster:
             if not self._stations[number].active:
                 return
             try:
-                entry = self._outstanding.get(number)
                 answer = yield from self._line.poll_with_retries(
-                    number, 0.0, entry.task.reply_size if entry else 0)
+                    number, 0.0, self._reply_size(number))
             except StationInactive as error:
                 self._lost(number, begun, error)
                 return
@@ -277,6 +276,16 @@ class StandardPollingMaster:
             if not is_more_wanted:
                 yield from self._pace(begun)
                 return
+
+    def _waiting_for(self, number: int) -> list[tuple[int, _Outstanding]]:
+        """Return the commands whose replies a station of the line has for us."""
+        return [(station, self._outstanding[station]) for station in self._stations.behind(number)
+                if station in self._outstanding]
+
+    def _reply_size(self, number: int) -> int:
+        """Return the size of the reply that comes next, 0 where nobody knows."""
+        sizes = [entry.task.reply_size for _, entry in self._waiting_for(number)]
+        return sizes[0] if len(sizes) == 1 else 0
 
     def _pace(self, begun: float) -> Talk:
         """Poll a line without a speed of its own, such as TCP, no faster than the set one."""
@@ -290,22 +299,22 @@ class StandardPollingMaster:
         if isinstance(answer, Frame):
             packet = yield from self._line.receive(number, answer)
         if packet is not None and packet.is_reply and packet.dst != self._settings.station:
-            self._given.pop(number, None)
+            self._given.pop(packet.src, None)
         if packet is not None and self._take_reply(number, packet):
             return
         if packet is not None:
             self._line.take_unwanted(number, packet)
-        entry = self._outstanding.get(number)
-        if entry is not None and entry.is_over(self._machine.now, isinstance(answer, Frame)):
-            self._overdue(number)
+        for station, entry in self._waiting_for(number):
+            if entry.is_over(self._machine.now, isinstance(answer, Frame)):
+                self._overdue(station)
 
     def _take_reply(self, number: int, packet: Packet) -> bool:
-        """Complete the command that a message of a station answers; tell whether it is one."""
-        entry = self._outstanding.get(number)
-        if entry is None or not packet.answers(entry.task.command):
+        """Complete the command that a message answers, by its SRC; tell whether it is one."""
+        entry = self._outstanding.get(packet.src)
+        if entry is None or not self._line.answers(packet, entry.task.command):
             return False
-        del self._outstanding[number]
-        self._complete(number, packet, entry.task)
+        del self._outstanding[packet.src]
+        self._complete(packet, entry.task)
         return True
 
     def _overdue(self, number: int) -> None:
@@ -314,9 +323,9 @@ class StandardPollingMaster:
         self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
         self._end(number, CommandTimeout())
 
-    def _complete(self, number: int, reply: Packet, task: Task) -> None:
+    def _complete(self, reply: Packet, task: Task) -> None:
         try:
-            self._line.check_reply(number, reply, task.command)
+            self._line.check_reply(reply, task.command)
         except WrongCommandCode as error:
             task.fail(error)
         else:
@@ -338,12 +347,13 @@ class StandardPollingMaster:
                        if self._is_active(number) and self._machine.now < until}
         while self._line.has_forwards(self._given):
             packet = yield from self._line.forward(self._given)
-            if packet is not None and not packet.is_reply and packet.dst in self._listed:
+            if packet is not None and not packet.is_reply \
+                    and self._stations.via(packet.dst) in self._listed:
                 self._given[packet.dst] = self._machine.now + self._settings.cmd_timeout
         for number, entry in list(self._outstanding.items()):
             if not self._stations[number].active:  # it did not take what was passed on
                 self._end(number, StationInactive(number))
-            elif number not in self._polled and self._machine.now >= entry.deadline:
+            elif self._stations.via(number) not in self._polled and self._machine.now >= entry.deadline:
                 self._overdue(number)
         for _ in range(COMMANDS_BETWEEN_POLLS):
             task = source.next_task(self._machine.now, self._outstanding)
@@ -352,7 +362,8 @@ class StandardPollingMaster:
             yield from self._send(task)
 
     def _send(self, task: Task) -> Talk:
-        number = task.command.dst
+        station = task.command.dst
+        number = self._stations.via(station)
         if number == BROADCAST:
             task.sent = True
             yield from self._line.deliver(number, task.command)
@@ -362,7 +373,7 @@ class StandardPollingMaster:
             task.fail(StationInactive(number))  # it is polled in its turn
             return
         task.sent = True
-        entry = self._outstanding[number] = _Outstanding(task)
+        entry = self._outstanding[station] = _Outstanding(task)
         now = self._machine.now
         try:
             begun = yield from self._line.deliver(number, task.command, task.expires)
@@ -370,14 +381,15 @@ class StandardPollingMaster:
             self._lost(number, now, error)
         except CommandExpired as error:
             task.sent = error.sent
-            self._end(number, error)
+            self._end(station, error)
         else:
             self._doubtful.discard(number)
             entry.deadline = begun + self._settings.cmd_timeout
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Take note that a station does not answer any more, and has had the line since then."""
-        self._end(number, error)
+        for station in self._stations.behind(number):
+            self._end(station, error)
         if number in self._doubtful:
             self._doubtful.remove(number)
             self._line.probed(begun)

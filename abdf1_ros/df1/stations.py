@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import Packet
@@ -76,14 +76,20 @@ class ActiveStationList:
     list whenever it becomes active or inactive. A station outside of it, to which a slave wants
     something passed on, has a record like any other, but is not in the list: no message can
     put a station there.
+
+    ``routes`` gives, by number, the gateway of this line that a station is behind: it is polled
+    in place of the station, and what it is, active or not, all behind it are (M 3-7).
     """
 
     def __init__(self, numbers: Iterable[int] = (),
-                 on_change: Callable[[Station], None] = lambda station: None) -> None:
+                 on_change: Callable[[Station], None] = lambda station: None,
+                 routes: Mapping[int, int] | None = None) -> None:
         self._stations: dict[int, Station] = {}
         self._strangers: dict[int, Station] = {}
         self._on_change = on_change
-        self.add(numbers)
+        self._routes = {station: gateway for station, gateway in (routes or {}).items()
+                        if station != gateway}
+        self.add((*numbers, *self._routes.values()))
 
     def add(self, numbers: Iterable[int]) -> None:
         """Take stations into the list."""
@@ -105,20 +111,28 @@ class ActiveStationList:
         station = self._stations.get(number)
         return station or self._strangers.setdefault(number, Station(number))
 
+    def via(self, number: int) -> int:
+        """Return the station of this line that speaks for a station: a gateway, or itself."""
+        return self._routes.get(number, number)
+
+    def behind(self, number: int) -> list[int]:
+        """Return the stations for which a station of this line speaks, itself the first."""
+        return [number, *(station for station, via in self._routes.items() if via == number)]
+
     def heard(self, number: int, now: float) -> None:
-        """Note an answer of any kind: the station is active."""
-        station = self[number]
-        station.last_heard = now
-        if not station.active:
-            station.active, station.silent_since = True, None
-            self._tell(station)
+        """Note an answer of any kind: the station is active, and all that share its gateway."""
+        self[number].last_heard = now
+        for station in map(self.__getitem__, self.behind(self.via(number))):
+            if not station.active:
+                station.active, station.silent_since = True, None
+                self._tell(station)
 
     def lost(self, number: int, now: float) -> None:
-        """Take a station out of the active ones."""
-        station = self[number]
-        if station.active:
-            station.active, station.silent_since = False, now
-            self._tell(station)
+        """Take a station out of the active ones, and all that share its gateway."""
+        for station in map(self.__getitem__, self.behind(self.via(number))):
+            if station.active:
+                station.active, station.silent_since = False, now
+                self._tell(station)
 
     def _tell(self, station: Station) -> None:
         if station.number in self._stations:

@@ -89,6 +89,12 @@ class Listener(Protocol):
         """Take note that a station has become active or inactive."""
 
 
+def _routes(network: Network, mappings: Iterable[Mapping]) -> dict[int, int]:
+    """Return the gateway of each station that is behind one; only a master addresses them."""
+    return {mapping.station: mapping.via for mapping in mappings
+            if mapping.via is not None and network.mode == 'Master'}
+
+
 class Driver:
     """Read and write the mapped addresses over one line, and serve those that are ours."""
 
@@ -99,7 +105,8 @@ class Driver:
         self.counters = Counters()
         self.stations = ActiveStationList(
             (mapping.station for mapping in mappings
-             if not mapping.serves and mapping.station != BROADCAST), self._station_changed)
+             if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
+            _routes(network, mappings))
         self.machine = Machine(
             lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
             timing=network.timing, counters=self.counters,

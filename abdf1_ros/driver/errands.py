@@ -20,7 +20,7 @@ It is the same link, with the same rules, that the driver reads and writes over.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Generator, Iterable
+from collections.abc import Callable, Container, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -68,15 +68,16 @@ class Errands:
     Carry out orders over the line of ``network``; ``machine`` is to be run on its port.
 
     Stations that are ``absent`` get one try each until they answer, all others every retry of
-    the network. ``first_tns`` should be random, or we may be taken for whoever was here before
-    us. Commands that come for us are refused, but for an echo and the diagnostic status.
+    the network. ``routes`` gives the gateways of stations that are behind one. ``first_tns``
+    should be random, or we may be taken for whoever was here before us. Commands that come for us are refused, but for an echo and the diagnostic status.
     """
 
-    def __init__(self, network: Network, absent: Iterable[int] = (), first_tns: int = 0) -> None:
+    def __init__(self, network: Network, absent: Sequence[int] = (), first_tns: int = 0,
+                 routes: Mapping[int, int] | None = None) -> None:
         self.counters = Counters()
-        self.stations = ActiveStationList(absent)
-        for station in self.stations:
-            self.stations.lost(station.number, 0.0)
+        self.stations = ActiveStationList(absent, routes=routes)
+        for number in absent:
+            self.stations.lost(number, 0.0)
         self.machine = Machine(
             lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
             timing=network.timing, counters=self.counters,

@@ -93,6 +93,6 @@ def _polling(settings: DriverSettings, stations: ActiveStationList) -> PollingSe
     """Return the poll lists, with every mapped station in one: no other reply would come."""
     polling = settings.polling or PollingSettings(())
     listed = {*polling.priority, *polling.normal}
-    mapped = (station.number for station in stations)
+    mapped = dict.fromkeys(stations.via(station.number) for station in stations)
     return replace(polling, normal=(
         *polling.normal, *(number for number in mapped if number not in listed)))

@@ -133,6 +133,8 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
         elif mapping.station == network.station and network.mode != 'Peer':
             text = (f'Station {mapping.station} is our own in the net file, and nobody asks '
                     'himself; the station to read or write belongs here')
+        elif mapping.via == network.station and network.mode == 'Master':
+            text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
         if text is not None:
             where = Place(path, mapping.line)
             found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))

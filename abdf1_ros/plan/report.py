@@ -148,6 +148,7 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
             kinds = ', '.join(f'{name} ({_tags(group)})' for name, group in types.items())
             yield Remark(Kind.STATION, (
                 f'station {station} has more than one PLC_Type: {kinds}'), station)
+    yield from _gateway_remarks(network, stations)
     if network.mode == 'Peer' and 0 in (network.station, *stations):
         whose = 'our own Station is 0' if network.station == 0 else 'station 0 is in the map'
         yield Remark(Kind.STATION, (
@@ -158,6 +159,24 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
         yield Remark(Kind.STATION, (
             f'a full-duplex line has one PLC, the map has stations {listed}; only a gateway '
             'answers for several'))
+
+
+def _gateway_remarks(network: Network,
+                     stations: dict[int, list[Mapping]]) -> Iterator[Remark]:
+    """Find what is odd about the column Via."""
+    for station, mappings in sorted(stations.items()):
+        via = mappings[0].via
+        if via is None:
+            continue
+        if network.mode != 'Master':
+            yield Remark(Kind.STATION, (
+                f'station {station} of {_tags(mappings)}: Via is for Mode Master; in Mode '
+                f'{network.mode} the gateway is not addressed'), station)
+        elif station > 7 and set(str(station)) <= set('01234567'):
+            yield Remark(Kind.STATION, (
+                f'station {station} of {_tags(mappings)} is behind gateway {via}: on Data Highway '
+                f'Plus node numbers are octal; if {station} is what a panel there shows, write '
+                f'{int(str(station), 8)}'), station)
 
 
 def _load_remarks(report: Report) -> Iterator[Remark]:

@@ -78,6 +78,9 @@ MAP_COLUMNS = (
            'published only while it holds'),
     Column('Heartbeat_Timeout', 'none',
            'ms that the counter of Publish_While may stand still'),
+    Column('Via', 'Station',
+           'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
+           'Station is'),
 )
 
 COLUMNS = tuple(column.name for column in MAP_COLUMNS)

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import Problem
@@ -30,6 +30,9 @@ from abdf1_ros.settings.mapping import Command, Mapping
 
 # Reads of a counter that its timeout has to allow for (docs/heartbeats.md, rule 14).
 _LEAST_PERIODS = 3
+
+Clash = Callable[[str, Mapping, str], None]
+"""Takes column, other row, and what is wrong with both."""
 
 
 def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
@@ -124,6 +127,8 @@ class _Clashes:
         self._writers: dict[str, Mapping] = {}
         self._slcs: dict[int, Mapping] = {}
         self._changing: list[Mapping] = []
+        self._routed: dict[int, Mapping] = {}
+        self._gateways: dict[int, Mapping] = {}
 
     def add(self, mapping: Mapping) -> list[Fault]:
         """Return the clashes of ``mapping``; without any, it counts for the rows after it."""
@@ -149,15 +154,16 @@ class _Clashes:
         if here and other and (there := _processor(other)) and there is not here:
             clash('Processor', other, f'Processor of station {mapping.station} is {here.value} '
                                       f'here, but {there.value} in the row')
-        for other in self._changing if _changes(mapping) else ():
-            if (_owns(mapping) or _owns(other)) and mapping.shares_words(other):
-                clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '
-                                        f'{mapping.address} shares some with the row')
-                break
+        self._check_route(mapping, clash)
+        self._check_words(mapping, clash)
         if not faults:
             if _changes(mapping):
                 self._changing.append(mapping)
             self._names[mapping.name] = mapping
+            if not mapping.serves:
+                self._routed.setdefault(mapping.station, mapping)
+            if mapping.via is not None:
+                self._gateways.setdefault(mapping.via, mapping)
             if here:
                 self._slcs.setdefault(mapping.station, mapping)
             if mapping.reads:
@@ -165,3 +171,27 @@ class _Clashes:
             if mapping.writes:
                 self._writers[mapping.topic] = mapping
         return faults
+
+    def _check_route(self, mapping: Mapping, clash: Clash) -> None:
+        """Find a station that is to be reached in two ways: replies tell only its number."""
+        if mapping.serves:
+            return
+        if (other := self._routed.get(mapping.station)) and other.via != mapping.via:
+            ways = [f'Via {entry.via}' if entry.via is not None else 'no Via'
+                    for entry in (mapping, other)]
+            clash('Via', other, f'station {mapping.station} has {ways[0]} here, but {ways[1]} in '
+                                'the row')
+        elif mapping.via is not None and (other := self._gateways.get(mapping.station)):
+            clash('Via', other, f'station {mapping.station} is itself the gateway in the row')
+        elif mapping.via is not None and (other := self._routed.get(mapping.via)) \
+                and other.via is not None:
+            clash('Via', other, f'station {mapping.via} is itself behind the gateway {other.via} '
+                                'in the row')
+
+    def _check_words(self, mapping: Mapping, clash: Clash) -> None:
+        """Find another writer of words that a heartbeat or a Fallback has for itself."""
+        for other in self._changing if _changes(mapping) else ():
+            if (_owns(mapping) or _owns(other)) and mapping.shares_words(other):
+                clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '
+                                        f'{mapping.address} shares some with the row')
+                return

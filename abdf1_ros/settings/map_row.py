@@ -106,6 +106,7 @@ class RowReader:
         last_station = BROADCAST if command is Command.WRITE else _MAX_STATION
         station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
                                _MAX_STATION + 1)
+        via = self._via(command, station)
         plc_type = self._plc_type()
         length = self._number('Length', 1, 65535, 1)
         period = self._number('Period', 0, _MAX_PERIOD, None)
@@ -125,7 +126,7 @@ class RowReader:
         mapping = Mapping(
             self._row.item, self._row.line, self._row.get('Tag'), name, command, address,
             station, plc_type, length, value_type or _natural_type(address), topic,
-            period, publish, minimum, maximum, word_order, scaling, access, processor)
+            period, publish, minimum, maximum, word_order, scaling, access, processor, via)
         self._check(mapping)
         mapping = self._with_conditions(mapping)
         if self.faults:
@@ -220,6 +221,18 @@ class RowReader:
         if scaling.scale == 0:
             self._fault('Scale', 'Scale should not be 0')
         return scaling
+
+    def _via(self, command: Command | None, station: int | None) -> int | None:
+        """Return the gateway, None for a station that needs none."""
+        via = self._number('Via', 0, _MAX_STATION, None)
+        if via is None or via == station:
+            return None
+        if command is Command.SERVE:
+            self._fault('Via', 'a Serve row has words of ours', is_superfluous=True)
+        elif station == BROADCAST:
+            self._fault('Via', 'what is written to station 255 goes to the stations of this line '
+                               'only', is_superfluous=True)
+        return via
 
     def _plc_type(self) -> PlcType | None:
         text = self._row.get('PLC_Type')

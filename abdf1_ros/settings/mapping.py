@@ -73,7 +73,8 @@ class Mapping:
     ``item`` counts data rows from 1, ``line`` lines of the file. ``name`` is the tag and
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
-    in the unit of the topic: where ``scaling`` is given, that of the engineering values.
+    in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
+    is the gateway that the station is behind, None for a station of the line itself.
     ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
     ``remarks`` say what is odd about the row.
     """
@@ -97,6 +98,7 @@ class Mapping:
     scaling: Scaling | None = None
     access: Access | None = None
     processor: Processor | None = None
+    via: int | None = None
     heartbeat: Heartbeat | None = None
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None

@@ -739,14 +739,54 @@ def test_timeout_zero_is_as_short_as_the_equipment_can_do() -> None:
 
 
 def test_station_behind_a_gateway() -> None:
-    script = MasterScript(SETTINGS)
+    """STN is the gateway, DST the station (M 3-7)."""
+    script = MasterScript(SETTINGS, routes={99: SLAVE, 98: SLAVE})
     command = replace(COMMAND, dst=99)
     reply = command.reply(b'\x34\x12')
     assert script.run(
         command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
-        says(reply), ACKED, station=SLAVE) == reply
-    assert [station.number for station in script.stations] == [SLAVE]
-    assert script.numbers() == [(2523, SLAVE)]
+        says(reply), ACKED) == reply
+    assert script.numbers() == [(2523, 99)]
+    assert script.stations[99].replies == 1
+    assert script.stations[SLAVE].replies == 0
+
+
+def test_reply_of_another_station_behind_the_same_gateway_is_stale() -> None:
+    script = MasterScript(SETTINGS, routes={99: SLAVE, 98: SLAVE})
+    command = replace(COMMAND, dst=99)
+    other = replace(COMMAND, dst=98).reply(b'\x77')
+    assert script.run(
+        command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
+        says(other), ACKED, POLLED_AGAIN, says(command.reply()), ACKED
+    ) == command.reply()
+    assert script.numbers() == [(2510, 98, command.src, command.tns), (2523, 99)]
+
+
+def test_stations_behind_a_gateway_share_its_state() -> None:
+    script = MasterScript(SETTINGS, routes={99: SLAVE, 98: SLAVE})
+    script.stations.add((98, 99))
+    command, other = replace(COMMAND, dst=99), replace(COMMAND, dst=98)
+    frame = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
+    assert isinstance(script.run(command, *(frame, TIMEOUT) * 3), StationInactive)
+    assert sorted(script.changes) == [(SLAVE, False), (98, False), (99, False)]
+    assert script.numbers()[-1] == (2509, SLAVE)
+    script.changes.clear()
+    # One poll of the gateway, and all behind it are back.
+    assert script.run(
+        other, POLLED, SAYS_EOT, Expect(master_frame(SLAVE, other.encode(), Checksum.CRC)),
+        SAYS_ACK, POLLED, says(other.reply()), ACKED) == other.reply()
+    assert sorted(script.changes) == [(SLAVE, True), (98, True), (99, True)]
+
+
+def test_station_that_its_gateway_does_not_reach_is_not_heard() -> None:
+    script = MasterScript(SETTINGS, routes={99: SLAVE})
+    command = replace(COMMAND, dst=99)
+    reply = command.reply(sts=0x02)
+    assert script.run(
+        command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
+        says(reply), ACKED) == reply
+    assert script.stations[SLAVE].last_heard is not None
+    assert script.stations[99].last_heard is None
 
 
 def test_stations_are_kept_apart() -> None:

@@ -122,3 +122,25 @@ def test_one_late_reply_is_an_accident_and_two_are_not() -> None:
     station.overdue = 2
     assert not station.replies_in_time
     assert not Station(7, active=False).replies_in_time
+
+
+def test_stations_behind_a_gateway_are_what_it_is() -> None:
+    changes: list[tuple[int, bool]] = []
+    stations = ActiveStationList(
+        (1, 2, 3), lambda station: changes.append((station.number, station.active)),
+        {2: 10, 3: 10})
+    assert [station.number for station in stations] == [1, 2, 3, 10]
+    assert [stations.via(number) for number in (1, 2, 3, 10, 77)] == [1, 10, 10, 10, 77]
+    assert stations.behind(10) == [10, 2, 3]
+    stations.lost(10, 5.0)
+    assert changes == [(10, False), (2, False), (3, False)]
+    assert stations[3].silent_since == 5.0
+    assert stations.words()[0] == 0b10
+    stations.heard(10, 6.0)
+    assert changes[3:] == [(10, True), (2, True), (3, True)]
+    assert (stations[10].last_heard, stations[2].last_heard) == (6.0, None)
+
+
+def test_station_that_is_its_own_gateway_is_one_of_the_line() -> None:
+    stations = ActiveStationList((1,), routes={1: 1})
+    assert stations.behind(1) == [1]

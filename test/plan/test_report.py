@@ -87,6 +87,24 @@ def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: in
         assert text.startswith(f'{begin}: a message to station 0 begins with 00')
 
 
+@pytest.mark.parametrize(('station', 'octal'), [(10, 8), (17, 15), (77, 63), (7, None), (18, None)])
+def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: int | None) -> None:
+    found = texts(report_of(make_mapping('N7:0', station=station, via=3)), Kind.STATION)
+    if octal is None:
+        assert found == []
+    else:
+        text, = found
+        assert 'on Data Highway Plus node numbers are octal' in text
+        assert text.endswith(f'if {station} is what a panel there shows, write {octal}')
+    assert texts(report_of(make_mapping('N7:0', station=station)), Kind.STATION) == []
+
+
+@pytest.mark.parametrize('mode', ['Peer', 'Slave'])
+def test_via_is_for_a_master(mode: str) -> None:
+    text, = texts(report_of(make_mapping('N7:0', station=2, via=3), mode=mode), Kind.STATION)
+    assert 'Via is for Mode Master' in text
+
+
 def test_slower_plc_makes_everything_slower() -> None:
     report = report_of(make_mapping('N7:0', length=2), response=0.03)
     assert report.scan_time == pytest.approx(TWO_WORDS + 0.06)

@@ -22,7 +22,7 @@ from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.values import ValueType
 import pytest
-from support.mappings import faults, load_rows, load_text, row, slc
+from support.mappings import fault, faults, load_rows, load_text, row, slc
 
 
 def test_needed_column_that_the_file_does_not_have() -> None:
@@ -140,3 +140,34 @@ def test_rows_of_several_stations_and_an_empty_cell_for_the_usual_one() -> None:
                   slc(Tag='d', Station='2', Processor='5/01'),
                   slc(Tag='e', Station='255', Command='Write'),
                   slc(Tag='f', Station='255', Command='Write', Processor='5/01')) == []
+
+
+def test_two_stations_behind_one_gateway() -> None:
+    mappings, problems = load_rows(
+        row(Station='1', Via='10'), row(Tag='b', Topic='b', Station='2', Via='10'),
+        row(Tag='c', Topic='c', Station='10'), row(Tag='d', Topic='d', Station='4', Via='4'))
+    assert problems == []
+    assert [mapping.via for mapping in mappings] == [10, 10, None, None]
+
+
+@pytest.mark.parametrize(('first', 'second', 'text'), [
+    ({'Via': '10'}, {'Via': '11'}, 'station 1 has Via 11 here, but Via 10 in the row'),
+    ({'Via': '10'}, {}, 'station 1 has no Via here, but Via 10 in the row'),
+    ({}, {'Via': '10'}, 'station 1 has Via 10 here, but no Via in the row'),
+    ({'Via': '2'}, {'Station': '2', 'Via': '3'}, 'station 2 is itself the gateway in the row'),
+    ({'Via': '2'}, {'Station': '3', 'Via': '1'},
+     'station 1 is itself behind the gateway 2 in the row')])
+def test_station_is_reached_in_one_way(first: dict[str, str], second: dict[str, str],
+                                       text: str) -> None:
+    found, = faults(row(**first), row(**{'Tag': 'b', 'Topic': 'b'} | second))
+    assert f'{text} of item 1 (line 2, tag "a")' in found
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Via': '255'}, 'Via = "255" should be a whole number from 0 to 254'),
+    ({'Via': 'KF3'}, 'Via = "KF3" should be a whole number from 0 to 254'),
+    ({'Via': '3', 'Command': 'Serve'}, 'a Serve row has words of ours; leave the cell empty'),
+    ({'Via': '3', 'Command': 'Write', 'Station': '255'},
+     'what is written to station 255 goes to the stations of this line only')])
+def test_via_that_cannot_be(cells: dict[str, str], text: str) -> None:
+    assert text in fault(**cells)

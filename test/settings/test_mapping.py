@@ -42,7 +42,8 @@ def test_cells_as_text_with_defaults_filled_in() -> None:
         'PLC_Type': 'PLC5', 'Length': '1', 'Type': 'int16', 'Topic': 'Line_speed', 'Period': '',
         'Publish': 'Always', 'Min': '', 'Max': '', 'Word_Order': 'Low', 'Scale': '',
         'Offset': '', 'Access': 'Typed', 'Processor': '', 'Fallback': '', 'Fallback_After': '',
-        'Requires': '', 'Requires_Timeout': '', 'Publish_While': '', 'Heartbeat_Timeout': ''}
+        'Requires': '', 'Requires_Timeout': '', 'Publish_While': '', 'Heartbeat_Timeout': '',
+        'Via': ''}
 
 
 @pytest.mark.parametrize('text, cell', [

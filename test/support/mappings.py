@@ -40,7 +40,7 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
                  topic: str | None = None, minimum: float = -math.inf,
                  maximum: float = math.inf, item: int = 1, word_order: str = 'Low',
                  scaling: Scaling | None = None, access: str | None = None,
-                 processor: str | None = None) -> Mapping:
+                 processor: str | None = None, via: int | None = None) -> Mapping:
     """Return what a row of these cells becomes; its name is the address unless told."""
     way = Access(access) if access else None
     address = parse_address(text, PlcType(plc), way)
@@ -50,7 +50,7 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
         item, item + 1, name, name, Command(command), address, station, PlcType(plc), length,
         ValueType(kind) if kind else natural, topic or name, period, Publish(publish),
         minimum, maximum, word_order=WordOrder(word_order), scaling=scaling,
-        access=way, processor=Processor(processor) if processor else None)
+        access=way, processor=Processor(processor) if processor else None, via=via)
 
 
 def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:

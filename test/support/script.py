@@ -60,18 +60,19 @@ class Silence:
 class MasterScript:
     """A master whose line says what a script tells it."""
 
-    def __init__(self, settings: MasterSettings, timing: LineTiming | None = None) -> None:
+    def __init__(self, settings: MasterSettings, timing: LineTiming | None = None,
+                 routes: dict[int, int] | None = None) -> None:
         self.now = 100.0
         self.events: list[Event] = []
         self.changes: list[tuple[int, bool]] = []
         self.stations = ActiveStationList(
-            on_change=lambda station: self.changes.append((station.number, station.active)))
+            on_change=lambda station: self.changes.append((station.number, station.active)),
+            routes=routes)
         self.machine = Machine(self._procedure, checksum=settings.checksum, timing=timing,
                                forget_on_send=True)
         self.master = HalfDuplexMaster(
             self.machine, settings, self.stations, self.events.append)
         self._command: Packet | None = None
-        self._station: int | None = None
         self._result: Packet | LinkError | None = None
         self._sent = self._received = 0
         self._started = False
@@ -80,27 +81,25 @@ class MasterScript:
         while True:
             if self._command is not None:
                 try:
-                    self._result = yield from self.master.exchange(self._command, self._station)
+                    self._result = yield from self.master.exchange(self._command)
                 except LinkError as error:
                     self._result = error
                 self._command = None
             yield Step(None, None)
 
-    def run(self, command: Packet, *script: Expect | Answer | Silence,
-            station: int | None = None) -> Packet | LinkError:
+    def run(self, command: Packet, *script: Expect | Answer | Silence) -> Packet | LinkError:
         """Carry out one transaction and return its reply or its error."""
-        self.begin(command, *script, station=station)
+        self.begin(command, *script)
         assert self._result is not None, 'the script ends before the transaction'
         assert self.machine.data_to_send() == b'', 'the master says more than the script'
         assert self.machine.counters.chars_sent == self._sent
         assert self.machine.counters.chars_received == self._received
         return self._result
 
-    def begin(self, command: Packet, *script: Expect | Answer | Silence,
-              station: int | None = None) -> None:
+    def begin(self, command: Packet, *script: Expect | Answer | Silence) -> None:
         """Carry out the first part of a transaction."""
-        self._command, self._station, self._result = command, station, None
-        self.stations.add((command.dst if station is None else station,))
+        self._command, self._result = command, None
+        self.stations.add((command.dst,))
         if not self._started:
             self._started = True
             self.machine.start(self.now)

@@ -105,7 +105,8 @@ def _mappings(options: argparse.Namespace, session: Session, command: Command,
         else data.ask_kind(session, options.station)
     given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
              'Type': options.type, 'Word_Order': options.word_order, 'Access': options.access,
-             'Processor': options.processor}
+             'Processor': options.processor,
+             'Via': None if options.via is None else str(options.via)}
     cells = kind | {column: text for column, text in given.items() if text}
     return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
 
@@ -124,7 +125,7 @@ def _failed(session: Session, station: int, error: Abdf1Error,
 
 def _read(options: argparse.Namespace) -> int:
     status = 0
-    with Session(network_of(options)) as session:
+    with Session(network_of(options), via=options.via) as session:
         try:
             mappings = _mappings(
                 options, session, Command.READ, options.addresses, options.length)
@@ -156,7 +157,7 @@ def _write(options: argparse.Namespace) -> int:
             '--station', 'say which station to write to: a half-duplex line may have several')])
     if options.station is None:
         options.station = DEFAULT_STATION
-    with Session(network) as session:
+    with Session(network, via=options.via) as session:
         try:
             length = data.length_of(options.address, options.type, options.values)
             mapping, = _mappings(
@@ -217,7 +218,7 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
 
 def _watch(options: argparse.Namespace) -> int:
     network = network_of(options)
-    with Session(network) as session:
+    with Session(network, via=options.via) as session:
         try:
             mappings = _mappings(
                 options, session, Command.READ, options.addresses, options.length)
@@ -228,7 +229,7 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 def _status(options: argparse.Namespace) -> int:
-    with Session(network_of(options)) as session:
+    with Session(network_of(options), via=options.via) as session:
         there = presence.look_at(session, options.station)
         if there.identity is None:
             assert there.error is not None
@@ -240,7 +241,7 @@ def _status(options: argparse.Namespace) -> int:
 def _ping(options: argparse.Namespace) -> int:
     times: list[float] = []
     failures = 0
-    with Session(network_of(options)) as session:
+    with Session(network_of(options), via=options.via) as session:
         try:
             for _ in range(options.count):
                 try:
@@ -266,7 +267,7 @@ def _scan(options: argparse.Namespace) -> int:
     progress = Progress()
     found = 0
     network = network_of(options)
-    for number, there in enumerate(presence.scan(network, options.stations), 1):
+    for number, there in enumerate(presence.scan(network, options.stations, options.via), 1):
         if there.is_there:
             if not found:
                 print('station    answer  processor')
@@ -362,7 +363,7 @@ def _ports(options: argparse.Namespace) -> int:
 
 
 def _files(options: argparse.Namespace) -> int:
-    with Session(network_of(options)) as session:
+    with Session(network_of(options), via=options.via) as session:
         try:
             kind = {'PLC_Type': options.plc_type} if options.plc_type \
                 else data.ask_kind(session, options.station)

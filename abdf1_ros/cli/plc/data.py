@@ -39,7 +39,8 @@ from abdf1_ros.settings.values import Values, ValueType
 
 # What stands on the command line for a column of a map CSV.
 _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
-              'Word_Order': '--word-order', 'Access': '--access', 'Processor': '--processor'}
+              'Word_Order': '--word-order', 'Access': '--access', 'Processor': '--processor',
+              'Via': '--via'}
 
 _WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
 _VALUES_IN_ROW = 10

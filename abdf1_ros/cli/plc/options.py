@@ -92,6 +92,10 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
             epilog=f'example:\n{shown}\n\n{_STATUSES}',
             formatter_class=argparse.RawDescriptionHelpFormatter)
         add_line_options(command, defaults)
+        if defaults.baud != _DETECT_DEFAULTS.baud:
+            command.add_argument('--via', metavar='N', type=_station, default=None,
+                                 help='in half duplex: the gateway on the line that the station '
+                                      'is behind')
         return command
 
     _add_addresses(add('read', 'read addresses once', 'read N7:0 --length 10 --net net.csv'))

@@ -66,14 +66,17 @@ def look_at(session: Session, station: int) -> Presence:
     except Abdf1Error as caught:
         error = caught
     seconds = time.monotonic() - started
-    takes_commands = not isinstance(error, StationInactive)
+    # A gateway answers for a station that it does not reach (M 8-2).
+    is_reached = not (isinstance(error, RemoteError) and 0 < error.sts < 0x10)
+    takes_commands = is_reached and not isinstance(error, StationInactive)
     is_there = takes_commands or session.stations[station].last_heard is not None
     return Presence(station, seconds, identity, error, is_there, takes_commands)
 
 
-def scan(network: Network, stations: Sequence[int]) -> Iterator[Presence]:
-    """Yield every station, there or not; raises OSError and PortLost."""
-    with Session(network, absent=stations) as session:
+def scan(network: Network, stations: Sequence[int],
+         via: int | None = None) -> Iterator[Presence]:
+    """Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost."""
+    with Session(network, absent=stations, via=via) as session:
         for station in stations:
             yield look_at(session, station)
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 import random
 from types import TracebackType
@@ -24,7 +24,7 @@ from typing import TypeVar
 
 from abdf1_ros.cli.terminal import reason_of
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.driver.errands import Errands, Order
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import Port
@@ -57,13 +57,16 @@ class Session:
     """
     A line from opening its port to the end of a ``with`` block.
 
-    ``absent`` stations get one try. Raises OSError when the port cannot be opened.
+    ``absent`` stations get one try. With ``via`` all stations are behind this gateway. Raises
+    OSError when the port cannot be opened.
     """
 
-    def __init__(self, network: Network, absent: Iterable[int] = ()) -> None:
+    def __init__(self, network: Network, absent: Sequence[int] = (),
+                 via: int | None = None) -> None:
+        routes = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         self.network = network
         self._lost: str | None = None
-        self._errands = Errands(network, absent, random.randrange(0x10000))
+        self._errands = Errands(network, absent, random.randrange(0x10000), routes)
         self._link = LinkThread(
             self._errands.machine, opened(network), on_state=self._port_changed)
         self._link.start()
