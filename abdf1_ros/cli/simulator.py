@@ -61,6 +61,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
+from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 
@@ -221,7 +222,7 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
                  options: argparse.Namespace) -> LinkThread:
     """Return the thread that plays ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
-    machine = Machine(multidrop(plcs), checksum=checksum)
+    machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
     open_line = line.open
     if options.full_duplex is not None:
         # Only a port has a speed of its own, for which the timers have to wait.

@@ -353,7 +353,8 @@ class StandardPollingMaster:
         for number, entry in list(self._outstanding.items()):
             if not self._stations[number].active:  # it did not take what was passed on
                 self._end(number, StationInactive(number))
-            elif self._stations.via(number) not in self._polled and self._machine.now >= entry.deadline:
+            elif self._machine.now >= entry.deadline \
+                    and self._stations.via(number) not in self._polled:
                 self._overdue(number)
         for _ in range(COMMANDS_BETWEEN_POLLS):
             task = source.next_task(self._machine.now, self._outstanding)

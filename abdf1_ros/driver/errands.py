@@ -69,7 +69,8 @@ class Errands:
 
     Stations that are ``absent`` get one try each until they answer, all others every retry of
     the network. ``routes`` gives the gateways of stations that are behind one. ``first_tns``
-    should be random, or we may be taken for whoever was here before us. Commands that come for us are refused, but for an echo and the diagnostic status.
+    should be random, or we may be taken for whoever was here before us. Commands that come for
+    us are refused, but for an echo and the diagnostic status.
     """
 
     def __init__(self, network: Network, absent: Sequence[int] = (), first_tns: int = 0,

@@ -243,8 +243,9 @@ class Diagnostics:
         return OK, f'station {station.number} active'
 
     def _station_values(self, station: Station, now: float) -> dict[str, str]:
-        heard = station.last_heard
+        heard, via = station.last_heard, self._driver.stations.via(station.number)
         return {
+            **({} if via == station.number else {'gateway': str(via)}),
             'active': 'yes' if station.active else 'no',
             'last answer': 'none yet' if heard is None else f'{now - heard:.1f} s ago',
             'last TNS': 'none yet' if station.last_tns is None else f'0x{station.last_tns:04X}',

@@ -46,7 +46,7 @@ from abdf1_ros.settings.csv_table import read_rows, Row
 from abdf1_ros.settings.values import Codec, types_of, ValueType
 from abdf1_ros.simulator.ladder import Ladder
 
-COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period')
+COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period', 'Via')
 _RAMP_TOP = 1000
 
 _Choice = TypeVar('_Choice')
@@ -133,6 +133,7 @@ class SimulatedPlc:
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
                  clock: Callable[[], float], seed: int = 0) -> None:
         self.station = station
+        self.via: int | None = None  # the gateway that it is behind
         self.table = table
         self.faults = Faults()
         self.processor = EmulatedProcessor(table.plc_type)
@@ -302,12 +303,15 @@ def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list
 def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
               clock: Callable[[], float]) -> None:
     station = _number(row, 'Station', 0, 254)
+    via = _number(row, 'Via', 1, 254) if row.get('Via') else None
     length = _number(row, 'Length', 1, 1000) if row.get('Length') else 1
     motion = _choice(row, 'Motion', {entry.value: entry for entry in Motion})
     plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in PlcType})
     if station not in plcs:
         plcs[station] = SimulatedPlc(station, DataTable(plc_type), checksum, clock)
+        plcs[station].via = via
     plc = plcs[station]
+    _check_route(row, plc, via, plcs)
     if plc.table.plc_type is not plc_type:
         raise Problem(row.where('PLC_Type'),
                       f'station {station} is a {plc.table.plc_type.value} already')
@@ -327,6 +331,17 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
             raise Problem(row.where('Motion'), 'bits have no Ramp, only Toggle')
         period = _number(row, 'Period', 1, 3_600_000)
         plc.move(_Mover(address, codec, motion, period / 1000))
+
+
+def _check_route(row: Row, plc: SimulatedPlc, via: int | None,
+                 plcs: dict[int, SimulatedPlc]) -> None:
+    """Raise Problem for a PLC in two places, or a gateway that is a PLC."""
+    if via != plc.via:
+        place = 'on the line itself' if plc.via is None else f'behind gateway {plc.via}'
+        raise Problem(row.where('Via'), f'station {plc.station} is {place} already')
+    gateways = {other.via for other in plcs.values()}
+    for number in gateways & plcs.keys():
+        raise Problem(row.where('Via'), f'station {number} is a PLC, it cannot be a gateway too')
 
 
 def _check_extent(row: Row, address: Address, codec: Codec) -> None:

@@ -26,6 +26,7 @@ from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
+from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
 import pytest
@@ -414,3 +415,26 @@ def test_power_cycle_keeps_words_and_begins_anew() -> None:
     plc.advance()
     assert stored(plc, 'N10:0', 2) == bytes([5, 0, 42, 0])
     assert stored(plc, 'S:1')[1] >> 7 == 1
+
+
+def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> None:
+    plcs = load(tmp_path / 'simulator.csv', Clock(), '1,PLC5,N7:0,,,,,10', '1,PLC5,F8:0,,,,,10',
+                '2,SLC,N7:0,,,,,10', '3,SLC,N7:0,,,,,')
+    direct, gateway = stations_of(plcs, Checksum.CRC)
+    assert direct is plcs[2]
+    assert isinstance(gateway, SimulatedGateway)
+    identify = Packet(2, 5, 0x06, 0, 9, b'\x03')
+    frame = Frame(identify.encode(), 10)
+    assert direct.handle(frame) == b''
+    assert gateway.handle(frame) == frames.ACK
+    reply = plcs[1].serve(identify)
+    assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.CRC)
+
+
+@pytest.mark.parametrize(('row', 'text'), [
+    ('1,PLC5,F8:0,,,,,11', '3:8 (Via): station 1 is behind gateway 10 already'),
+    ('1,PLC5,F8:0,,,,,', '3:8 (Via): station 1 is behind gateway 10 already'),
+    ('10,PLC5,F8:0,,,,,', '3:8 (Via): station 10 is a PLC, it cannot be a gateway too'),
+    ('2,PLC5,F8:0,,,,,0', '3:8 (Via): Via = "0" should be a whole number from 1 to 254')])
+def test_gateways_that_cannot_be(tmp_path: Path, row: str, text: str) -> None:
+    assert faults(tmp_path / 'simulator.csv', '1,PLC5,N7:0,,,,,10', row) == [text]

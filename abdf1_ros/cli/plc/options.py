@@ -92,7 +92,7 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
             epilog=f'example:\n{shown}\n\n{_STATUSES}',
             formatter_class=argparse.RawDescriptionHelpFormatter)
         add_line_options(command, defaults)
-        if defaults.baud != _DETECT_DEFAULTS.baud:
+        if defaults is not _DETECT_DEFAULTS:
             command.add_argument('--via', metavar='N', type=_station, default=None,
                                  help='in half duplex: the gateway on the line that the station '
                                       'is behind')

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 import threading
+import time
 
 from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan
 from abdf1_ros.cli.plc.session import Session
@@ -25,6 +26,8 @@ from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.settings.network import Network
 import pytest
+from support.driver_bench import simulated_plc
+from support.plc_line import plc_line
 from support.ptys import Pty
 
 IDENTITY = Identity(
@@ -74,3 +77,14 @@ def test_poll_that_is_answered_is_a_station_though_it_takes_no_command(tmp_path:
     line.close()
     assert presence.is_there
     assert not presence.takes_commands
+
+
+def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
+    plcs = [simulated_plc(1, 'PLC5', time.monotonic), simulated_plc(2, 'SLC', time.monotonic)]
+    for plc in plcs:
+        plc.via = 10
+    with plc_line(tmp_path / 'line', *plcs) as name:
+        found = list(scan(Network(com_port=name, timeout=200), [1, 2, 3], via=10))
+    assert [presence.is_there for presence in found] == [True, True, False]
+    assert [str(presence.identity)[:5] for presence in found[:2]] == ['PLC-5', 'SLC 5']
+    assert 'STS 02' in str(found[2].error)

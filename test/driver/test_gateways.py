@@ -1,0 +1,163 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Two PLCs behind a gateway: one station of the line is polled for both (M 3-7)."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.gateway import SimulatedGateway
+import pytest
+from support.driver_bench import DriverBench, simulated_plc, store, stored
+from support.mappings import make_mapping
+
+GATEWAY, FIRST, SECOND, DIRECT = 10, 1, 2, 3
+POLLING = ['Message', 'Standard']
+
+
+class Bench(DriverBench):
+    """A driver, a KF3 with a PLC-5 and an SLC behind it, and a PLC-5 on the line itself."""
+
+    def __init__(self, polling: str = 'Message', **settings: float) -> None:
+        self.first = make_mapping('N7:0', station=FIRST, via=GATEWAY, length=2)
+        self.second = make_mapping('N7:0', 'ReadWrite', station=SECOND, via=GATEWAY, plc='SLC')
+        self.third = make_mapping('N7:0', station=DIRECT)
+        network = Network(baud=115200, timeout=100, cmd_timeout=500, polling=polling)
+        super().__init__([self.first, self.second, self.third], network=network,
+                         settings=DriverSettings(**settings), start=False)  # type: ignore
+        self.plcs = [simulated_plc(FIRST, 'PLC5', self.clock, ('N7:0', 10)),
+                     simulated_plc(SECOND, 'SLC', self.clock, ('N7:0', 10))]
+        self.gateway = SimulatedGateway(GATEWAY, self.plcs, Checksum.CRC)
+        self.connect(self.gateway)
+        self.direct = self.plc(DIRECT, 'PLC5', ('N7:0', 10))
+        self.polled: list[int] = []
+        self.asked: list[tuple[int | None, int]] = []
+        self._decoder = FrameDecoder(Checksum.CRC, Duplex.HALF)
+        self.far.hear = self._listen
+        for plc, value in zip([*self.plcs, self.direct], (11, 22, 33), strict=True):
+            store(plc, 'N7:0', [value])
+        self.open()
+
+    def _listen(self, data: bytes) -> bytes:
+        self._decoder.feed(data)
+        while (symbol := self._decoder.next_symbol()) is not None:
+            if isinstance(symbol, Poll):
+                self.polled.append(symbol.station)
+            elif isinstance(symbol, Frame):
+                self.asked.append((symbol.station, Packet.decode(symbol.data).dst))
+        return data
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_both_are_read_and_told_apart(polling: str) -> None:
+    bench = Bench(polling)
+    bench.run(1.0)
+    values = bench.listener.values
+    assert len(values(bench.first)) >= 8
+    assert {tuple(entry) for entry in values(bench.first)} == {(11, 0)}
+    assert {tuple(entry) for entry in values(bench.second)} == {(22,)}
+    assert {tuple(entry) for entry in values(bench.third)} == {(33,)}
+    assert set(bench.polled) == {GATEWAY, DIRECT}
+    assert set(bench.asked) >= {(GATEWAY, FIRST), (GATEWAY, SECOND), (DIRECT, DIRECT)}
+    assert all(link == (GATEWAY if dst in (FIRST, SECOND) else dst) for link, dst in bench.asked)
+    assert bench.listener.numbers() == {2523}
+    assert [station.number for station in bench.driver.stations] == [
+        FIRST, SECOND, DIRECT, GATEWAY]
+    assert bench.driver.stations[FIRST].replies >= 8
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_write_reaches_the_one_it_is_for(polling: str) -> None:
+    bench = Bench(polling)
+    bench.run(0.2)
+    bench.write(bench.second, [77])
+    bench.run(0.5)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert stored(bench.plcs[1], 'N7:0') == b'\x4D\0'
+    assert stored(bench.plcs[0], 'N7:0') == b'\x0B\0'
+    assert bench.listener.values(bench.second)[-1] == [77]
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_gateway_that_is_gone_takes_both_with_it_and_one_poll_brings_both_back(
+        polling: str) -> None:
+    bench = Bench(polling)
+    bench.run(0.5)
+    hear = bench.far.hear
+    frames_of = bench.gateway.slave.handle
+    bench.gateway.slave.handle = lambda symbol: b''  # type: ignore[method-assign]
+    bench.run(5.0)
+    assert sorted(bench.listener.changes) == [(FIRST, False), (SECOND, False), (GATEWAY, False)]
+    bench.polled.clear()
+    bench.asked.clear()
+    before = len(bench.listener.values(bench.third))
+    bench.run(10.0)
+    assert set(bench.polled) == {GATEWAY, DIRECT}
+    assert set(bench.asked) == {(DIRECT, DIRECT)}  # nothing but polls for the gateway
+    assert len(bench.listener.values(bench.third)) - before >= 80
+    bench.listener.changes.clear()
+    bench.gateway.slave.handle = frames_of  # type: ignore[method-assign]
+    bench.run(5.0)
+    assert sorted(bench.listener.changes) == [(FIRST, True), (SECOND, True), (GATEWAY, True)]
+    bench.listener.reads.clear()
+    bench.run(1.0)
+    assert bench.listener.values(bench.first) and bench.listener.values(bench.second)
+    assert bench.far.hear == hear
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_plc_that_the_gateway_does_not_reach_costs_the_other_nothing(polling: str) -> None:
+    bench = Bench(polling)
+    bench.plcs[1].faults.silent = True
+    bench.run(2.0)
+    assert bench.listener.values(bench.second) == []
+    assert [address for address, _ in bench.listener.reasons] == ['N7:0']
+    assert 'STS 02' in bench.listener.reasons[0][1]
+    assert len(bench.listener.values(bench.first)) >= 16
+    assert bench.driver.stations[SECOND].active  # the gateway is
+    assert bench.driver.stations[SECOND].last_heard is None
+    bench.plcs[1].faults.silent = False
+    bench.run(3.0)
+    assert bench.listener.values(bench.second)
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_gateway_that_fills_in_its_own_node(polling: str) -> None:
+    """M 6-4: it may put its node in place of our station, so replies come to that."""
+    bench = Bench(polling)
+    serve = bench.plcs[0].serve
+
+    def serve_for_itself(command: Packet) -> Packet:
+        reply = serve(command)
+        return Packet(0, reply.src, reply.cmd, reply.sts, reply.tns, reply.data)
+
+    bench.plcs[0].serve = serve_for_itself  # type: ignore[method-assign]
+    bench.run(1.0)
+    assert len(bench.listener.values(bench.first)) >= 8
+    assert len(bench.listener.values(bench.second)) >= 8
+    assert bench.listener.numbers() == {2523}
+
+
+def test_processors_behind_a_gateway_tell_what_they_are() -> None:
+    bench = Bench(processor_period=5.0)
+    bench.run(2.0)
+    known = bench.driver.health.known
+    assert 'PLC-5' in known(FIRST).processor
+    assert '5/03' in known(SECOND).processor
+    assert '1770-KF3' in known(GATEWAY).processor
