@@ -36,13 +36,13 @@ class Cause(NamedTuple):
 
 MESSAGES: dict[Message, Cause] = {
     Message.ERR_BAD_STATION: Cause(
-        'The cell Station of a map row is no whole number from 0 to 254; 255 goes for Write only.',
+        'The cell Station of a map row is not a whole number from 0 to 254; 255: Write only.',
         'Correct the cell. A PLC-5 shows station numbers in octal: 17 there is 15 here.'),
     Message.ERR_BAD_PLC_TYPE: Cause(
         'The cell PLC_Type of a map row is none of PLC2, PLC3, PLC5 and SLC.',
         'Correct the cell; SLC for every SLC 500 and MicroLogix.'),
     Message.ERR_ADDRESS_SYNTAX: Cause(
-        'The cell Address of a map row is no address of this family; the text behind it says '
+        'The cell Address of a map row is not an address of this family; the text after it says '
         'what is expected.',
         'Compare with the table of addresses. PLC-5 inputs and outputs are octal, those of an SLC '
         'name slot and word.'),
@@ -123,7 +123,7 @@ MESSAGES: dict[Message, Cause] = {
         'dropped.',
         'None; often: noise towards the PLC.'),
     Message.CRT_BAD_STATION_ID: Cause(
-        'Station of the net file is no whole number from 0 to 254.',
+        'Station of the net file is not a whole number from 0 to 254.',
         'An address of our own that no PLC on the line has.'),
     Message.CRT_BAD_DRIVER_MODE: Cause(
         'Mode of the net file is none of Master, Slave and Peer.',
@@ -138,13 +138,13 @@ MESSAGES: dict[Message, Cause] = {
         'Error_Code of the net file is neither BCC nor CRC.',
         "What the PLC's channel is set to; CRC where there is a choice."),
     Message.CRT_BAD_NAK_RETRIES: Cause(
-        'NAK_Retries of the net file is no whole number from 0 to 10.',
+        'NAK_Retries of the net file is not a whole number from 0 to 10.',
         'Leave the cell empty: 3.'),
     Message.CRT_BAD_ENQ_RETRIES: Cause(
-        'ENQ_Retries of the net file is no whole number from 0 to 10.',
+        'ENQ_Retries of the net file is not a whole number from 0 to 10.',
         'Leave the cell empty: 3.'),
     Message.CRT_BAD_CMD_TIMEOUT: Cause(
-        'Cmd_Timeout of the net file is no whole number from 500 to 5000.',
+        'Cmd_Timeout of the net file is not a whole number from 500 to 5000.',
         'Milliseconds, not seconds; leave the cell empty: 1000.'),
 }
 
@@ -194,9 +194,9 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.BROADCAST: 'Station 255. It counts as accepted, and as nothing else.',
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
-                     'open: nothing was sent. The reason stands behind it.',
+                     'open: nothing was sent. The reason follows.',
     Outcome.NOT_SENT: 'Station inactive, or it waited longer than `write_timeout`.',
-    Outcome.FAILED: "The PLC's own error stands behind it, as STS and in words.",
+    Outcome.FAILED: "The PLC's own error follows, as STS and in words.",
     Outcome.PARTLY: 'A write of several packets failed between them. Where a reply is missing, it '
                     'is read back, as the next one is.',
     Outcome.UNKNOWN: 'Sent, but no reply came, or a node on the way has lost it. Behind it stands '
