@@ -195,12 +195,15 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
                      'open: nothing was sent. The reason follows.',
-    Outcome.NOT_SENT: 'Station inactive, or it waited longer than `write_timeout`.',
+    Outcome.NOT_SENT: 'Station inactive, or it waited longer than `write_timeout`; '
+                      '`fallback`: it was published before a fallback value went out.',
     Outcome.FAILED: "The PLC's own error follows, as STS and in words.",
     Outcome.PARTLY: 'A write of several packets failed between them. Where a reply is missing, it '
                     'is read back, as the next one is.',
     Outcome.UNKNOWN: 'Sent, but no reply came, or a node on the way has lost it. Behind it stands '
                      'what the next read has found, within `write_timeout`: `read back: the PLC '
                      'holds the value`, `... another value`, or why nothing was read.',
+    Outcome.FALLBACK: 'No message has asked for it: `timeout` where none came in time, `start`, '
+                      '`return` of the station, its change to `run`, or our own `end`.',
 }
 """How a write ends: what it means."""

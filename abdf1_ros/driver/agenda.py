@@ -15,7 +15,8 @@
 """
 Who has the line next: one place decides.
 
-There are three queues. ``writes`` go first, but after four of their commands in a row a check or
+What we write by ourselves (``interlocks``) goes before all else, but for every eighth turn. Then
+there are three queues. ``writes`` go first, but after four of their commands in a row a check or
 read that is due has its turn. A check, such as the question for a station's mode, goes before
 the reads, but after one every read that was due when it began goes before the next. ``reads`` go
 in the order that ``read_queue`` tells. All that asks a silent station whether it is there again is
@@ -30,6 +31,7 @@ import math
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Check, Checks, Kind
+from abdf1_ros.driver.interlocks import Interlocks, OwnWrite
 from abdf1_ros.driver.job_tasks import JobTask, JobTasks
 from abdf1_ros.driver.points import Write, WriteResult
 from abdf1_ros.driver.probes import Probes
@@ -38,6 +40,7 @@ from abdf1_ros.driver.reads import Reads
 from abdf1_ros.driver.writes import WriteQueue
 
 MAX_WRITES_IN_A_ROW = 4
+MAX_OWN_IN_A_ROW = 7
 
 
 class Agenda:
@@ -45,7 +48,8 @@ class Agenda:
     Say who has the line next, of the ``writes``, the ``checks``, the ``reads``.
 
     ``tasks`` are those under way: each packet of a write has a turn of its own. A probe usually
-    takes ``probe_time`` seconds. ``patience`` and ``report`` are those of the writes.
+    takes ``probe_time`` seconds. ``patience`` and ``report`` are those of the writes;
+    ``interlocks`` is set afterwards, where there are any.
     """
 
     def __init__(self, stations: ActiveStationList, checks: Checks, tasks: JobTasks, *,
@@ -57,14 +61,31 @@ class Agenda:
         self.checks = checks
         self.reads = Reads(stations, self._probes)
         self.writes = WriteQueue(stations, self._write_probes, patience, report)
+        self.interlocks: Interlocks | None = None
+        self._own_in_a_row = 0
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
         self._last_probe_was_echo = False
 
     def next(self, now: float, busy: Container[int] = (),  # noqa: A003
-             ) -> JobTask | Write | Check | ReadJob | None:
+             ) -> OwnWrite | JobTask | Write | Check | ReadJob | None:
         """Return who has the line next, nobody for a station in ``busy``; None for nobody."""
+        if self._own_in_a_row < MAX_OWN_IN_A_ROW:
+            return self._own(now, busy) or self._usual(now, busy)
+        self._own_in_a_row = 0
+        return self._read(now, busy) or self._own(now, busy) or self._usual(now, busy)
+
+    def _own(self, now: float, busy: Container[int]) -> OwnWrite | None:
+        """Return a heartbeat or fallback; they are not among the writes in a row (rule 11)."""
+        own = self.interlocks.next(now, busy) if self.interlocks else None
+        if own is not None:
+            self.writes.begin_own(own.write)
+            self._own_in_a_row += 1
+        return own
+
+    def _usual(self, now: float,
+               busy: Container[int]) -> JobTask | Write | Check | ReadJob | None:
         if self._writes_in_a_row < MAX_WRITES_IN_A_ROW and (write := self._write(now, busy)):
             return write
         return self._check(now, busy) or self._read(now, busy) or self._write(now, busy)
@@ -110,13 +131,16 @@ class Agenda:
         else:
             job = self.reads.next(now, busy)
         if job is not None:
-            self._writes_in_a_row = 0
+            self._writes_in_a_row = self._own_in_a_row = 0
         return job
 
     def next_due(self) -> float | None:
         """Return when there is something to do next (clock value in s), None for never."""
-        moments = self.reads.next_due(), self.checks.next_due()
-        return min((moment for moment in moments if moment is not None), default=None)
+        moments = [moment for moment in (self.reads.next_due(), self.checks.next_due())
+                   if moment is not None]
+        if self.interlocks and (own := self.interlocks.next_due()) < math.inf:
+            moments.append(own)
+        return min(moments, default=None)
 
     def write_ended(self, write: Write, begun: float, now: float, *, is_answered: bool) -> None:
         """Take note that a write has ended that had the line from ``begun`` on."""

@@ -96,22 +96,26 @@ class Checks:
     """
     The checks of all ``stations``, of which only the ones in ``read`` have reads of their own.
 
-    ``period`` is the seconds between two questions for the diagnostic status, 0 for never.
+    ``period`` is the seconds between two questions for the diagnostic status, 0 for never;
+    stations in ``wanted`` are asked at least as often as that says.
     ``link_failed`` takes note of a transaction without a reply. Only ``request_counters`` may
     be called from another thread; ``known`` gives values that never change.
     """
 
     def __init__(self, stations: ActiveStationList, read: Container[int], period: float,
-                 link_failed: Callable[[int, LinkError], None],
-                 clock: Callable[[], float]) -> None:
+                 link_failed: Callable[[int, LinkError], None], clock: Callable[[], float],
+                 wanted: Mapping[int, float] | None = None) -> None:
         self.counters_wanted: set[int] = set()
         self._stations = stations
         self._link_failed = link_failed
         self._clock = clock
         self._known: dict[int, StationHealth] = {}
         self._requests: Inbox[int] = Inbox(is_open=False)
-        self._checks = [Check(station.number, Kind.STATUS, period)
-                        for station in stations if period]
+        self._wanted = wanted or {}
+        periods = {station.number: min(self._wanted.get(station.number, math.inf),
+                                       period or math.inf) for station in stations}
+        self._checks = [Check(number, Kind.STATUS, often) for number, often in periods.items()
+                        if not math.isinf(often)]
         self._checks += [Check(station.number, Kind.ECHO, ECHO_PERIOD)
                          for station in stations if station.number not in read]
         self._next_due = 0.0
@@ -193,7 +197,8 @@ class Checks:
             self._link_failed(check.station, error)
             if check.kind is Kind.COUNTERS or self.known(check.station).identity is None:
                 self._take_refusal(check, str(error))
-                next_due += check.period * _UNANSWERED
+                if check.station not in self._wanted:
+                    next_due += check.period * _UNANSWERED
         finally:
             self._finish(check, next_due)
 

@@ -33,8 +33,10 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda
-from abdf1_ros.driver.checks import Check, Checks
+from abdf1_ros.driver.checks import Check, Checks, Kind
+from abdf1_ros.driver.guards import Guards
 from abdf1_ros.driver.inbox import Inbox
+from abdf1_ros.driver.interlocks import Interlocks, OwnWrite, Urgency
 from abdf1_ros.driver.job_tasks import JobTask, JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
@@ -42,7 +44,7 @@ from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.transactions import carry_out
-from abdf1_ros.driver.writes import MAX_WAITING_WRITES, waited_too_long
+from abdf1_ros.driver.writes import MAX_WAITING_WRITES, patience_of, waited_too_long
 from abdf1_ros.errors import CommandExpired, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.file_types import PlcType
@@ -66,6 +68,10 @@ from abdf1_ros.settings.values import Values
 # A read of several packets lets others go between them. On a busy line so many times its own time
 # passes until it has had all its turns.
 _TURNS_OF_A_READ = 10
+
+# A station that we write heartbeats or fallbacks to is asked for its mode so often (s): a change
+# to RUN is a first contact.
+MODE_PERIOD = 2.0
 
 _NOT_OPEN = 'the port is not open'
 
@@ -113,12 +119,9 @@ class Driver:
             forget_on_send=network.mode == 'Master')
         self.is_online = False
         self._inbox: Inbox[Write] = Inbox(is_open=False)
-        self._has_begun_write = False
-        timing = network.timing
-        # The waiting before a transmission is wanted: before a probe, and before the command.
+        self._is_ending = False
         self._tasks = JobTasks(
-            network.station, settings.first_tns, settings.write_timeout + 2 * timing.tx_delay,
-            timing.char_time)
+            network.station, settings.first_tns, network.timing.char_time)
         self._settings = settings
         self._listener = listener
         self._served = self._make_served()
@@ -130,14 +133,19 @@ class Driver:
         blocks = planner.plan(mappings)
         self.expected_scan_time = scan_time(blocks)
         self.points = self._make_points(blocks)
+        self._guards = Guards(self.points.values())
         self.health = Checks(
             self.stations, {block.station for block in blocks}, settings.processor_period,
             lambda station, error: self._link_failed(station, (), error),
-            lambda: self.machine.now)
+            lambda: self.machine.now, self._status_periods())
         self._agenda = Agenda(
             self.stations, self.health, self._tasks, probe_time=longest_probe(network),
             patience=settings.write_timeout, report=listener.written)
         self._reads, self._writes = self._agenda.reads, self._agenda.writes
+        self.interlocks = self._agenda.interlocks = Interlocks(
+            () if settings.read_only else mappings, self.stations, self._writes,
+            network.cmd_timeout / 1000,
+            lambda write: self._served.store(write.mapping, write.raw), listener.written)
         self._reads.replace((), map(self._job, blocks), 0.0)
         self._read_backs = ReadBacks(settings.write_timeout, listener.written)
 
@@ -195,8 +203,20 @@ class Driver:
             return 'this node is read_only'
         if not self.is_online:
             return _NOT_OPEN
+        if self._is_ending:
+            return 'this node ends'
         waiting = len(self._inbox) + len(self._writes)
         return 'too many writes are waiting' if waiting + count > MAX_WAITING_WRITES else ''
+
+    def wind_down(self) -> None:
+        """
+        Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
+
+        May be called from any thread, then wake the link. ``interlocks`` tells when all has been
+        confirmed, and what has not.
+        """
+        self._is_ending = True
+        self.interlocks.wind_down()
 
     def request_counters(self, station: int) -> None:
         """
@@ -254,13 +274,24 @@ class Driver:
             return None
         if isinstance(job, JobTask):
             return self._tasks.take(job, now)
+        if isinstance(job, OwnWrite):
+            return self._tasks.start(job.station, self._own_steps(job), now, expires=job.expires)
         if isinstance(job, Write):
-            return self._tasks.start(
-                job.mapping.station, self._write_steps(job), now, requested=job.requested)
+            expires, patience = self._time_limits(job)
+            return self._tasks.start(job.mapping.station, self._write_steps(job), now,
+                                     expires=expires, patience=patience)
         if isinstance(job, Check):
             return self._tasks.start(job.station, self._check_steps(job), now)
         return self._tasks.start(
             job.station, self._read_steps(job, now), now, reply_size=job.reply_size)
+
+    def _time_limits(self, write: Write) -> tuple[float, float]:
+        """Return until when a message may leave, and how long after each packet the next may."""
+        # The waiting before a transmission is wanted: before a probe, and before the command.
+        wanted = 2 * self.network.timing.tx_delay
+        patience = patience_of(write.mapping, self._settings.write_timeout) + wanted
+        # Where a fallback comes, a long write has no time beyond it.
+        return write.requested + patience, 0.0 if write.mapping.fallback else patience
 
     def next_due(self) -> float | None:
         """Return when there is something to do next (clock value in s), None for never."""
@@ -269,6 +300,7 @@ class Driver:
     def expire(self, now: float) -> None:
         """Do what needs no line: store what we serve, end what has waited too long for it."""
         self._sort_inbox(now)
+        self.interlocks.expire(now)
         self._writes.expire(now)
         self._tasks.expire(now)
         self._read_backs.expire(now)
@@ -277,12 +309,13 @@ class Driver:
         """Return when ``expire`` has something to do (clock value in s), None for never."""
         due = self._read_backs.next_due()
         first = min(self._writes.next_expiry(), self._tasks.next_expiry(),
-                    math.inf if due is None else due)
+                    self.interlocks.next_expiry(), math.inf if due is None else due)
         return None if math.isinf(first) else first
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
             self._reads.release(station.number, self.machine.now)
+            self.interlocks.contact(station.number, self.machine.now)
             self.health.came_back(station.number, self.machine.now)
         else:
             self.health.went_away(station.number)
@@ -292,12 +325,17 @@ class Driver:
         """Put what is served where the other end reads it; let all else wait for the line."""
         timeout = self._settings.write_timeout
         for write in self._inbox.take():
+            if self.interlocks.is_overruled(write):
+                self._end_write(write, Outcome.NOT_SENT, 'fallback')
+                continue
+            self.interlocks.message_came(write)
             if not write.mapping.serves:
                 self._writes.add(write, now)
             elif now - write.requested > timeout:
                 self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
             else:
                 self._served.store(write.mapping, write.raw)
+                self.interlocks.message_ended(write, Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
 
     def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:
@@ -316,6 +354,7 @@ class Driver:
         """Work as long as there is a port."""
         self._reads.begin(self.machine.now)
         self.health.begin(self.machine.now)
+        self.interlocks.begin(self.machine.now)
         self._inbox.open()
         self.is_online = True
         reason = 'internal error, see the log'
@@ -370,15 +409,41 @@ class Driver:
             yield from self.health.steps(check)
         finally:
             self._agenda.check_ended(check, begun, self.machine.now)
+        if check.kind is Kind.STATUS:
+            self._mode_told(check.station, begun)
+
+    def _mode_told(self, station: int, asked: float) -> None:
+        """Hand on what a station that was asked has said of its mode."""
+        known = self.health.known(station)
+        identity = known.identity if known.told is not None and known.told >= asked else None
+        self._guards.mode_told(station, identity, asked)
+        if identity is not None and identity.is_running is not None:
+            self.interlocks.mode_seen(
+                station, identity.is_running and not identity.faults, self.machine.now)
+
+    def _status_periods(self) -> dict[int, float]:
+        """Return how often (s) stations have to be asked for their mode."""
+        periods = self._guards.status_periods()
+        for mapping in () if self._settings.read_only else self.mappings:
+            if (mapping.heartbeat or mapping.fallback) and not mapping.serves:
+                known = periods.get(mapping.station, math.inf)
+                periods[mapping.station] = min(known, MODE_PERIOD)
+        return periods
 
     def _read_done(self, job: ReadJob, data: bytes) -> None:
         """Hand on what was read to the points that want it."""
         now = self.machine.now
         self._read_backs.read(job.block, data, job.started, now)
+        self._guards.values_read(job.points, job.slices, data, now)
         has_recovered = any(point.error is not None for point in job.points)
         for point, place in zip(job.points, job.slices, strict=True):
-            if job.is_refresh or point.is_due(now, job.block.period):
+            if not job.is_refresh and not point.is_due(now, job.block.period):
+                continue
+            reason = self._guards.why_withheld(point.mapping, job.started, now)
+            if not reason:
                 self._update(point, data[place])
+            elif point.withhold(reason, now):
+                self._listener.unreadable(point.mapping, f'withheld: {reason}')
         job.done(now)
         if has_recovered:
             self._change(self._refusals.recovered(job.block, self.blocks))
@@ -442,5 +507,24 @@ class Driver:
             self._end_write(write, ending.outcome, ending.detail)
         if isinstance(ending.error, LinkError) and not isinstance(ending.error, CommandExpired):
             self._link_failed(station, (), ending.error)
+        self.interlocks.message_ended(write, ending.outcome)
         if ending.done or ending.is_unsure:
+            self._reads.refresh(write, self.machine.now)
+
+    def _own_steps(self, own: OwnWrite) -> Steps:
+        """Write a heartbeat or a fallback."""
+        write, outcome = own.write, Outcome.NOT_SENT
+        if own.urgency is Urgency.FALLBACK:
+            self._read_backs.overtaken(write, self.machine.now)
+        try:
+            ending = yield from carry_out(write)
+            outcome = ending.outcome
+        finally:
+            self._writes.ended(write)
+            self.interlocks.ended(own, outcome, self.machine.now)
+        if isinstance(ending.error, RemoteError):
+            self.stations[own.station].remote_errors += 1
+        elif isinstance(ending.error, LinkError) and not isinstance(ending.error, CommandExpired):
+            self._link_failed(own.station, (), ending.error)
+        if own.urgency is Urgency.FALLBACK and (ending.done or ending.is_unsure):
             self._reads.refresh(write, self.machine.now)

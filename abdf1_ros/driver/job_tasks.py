@@ -41,14 +41,10 @@ class JobTasks:
     All jobs under way, and the transaction numbers of their commands.
 
     ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts
-    the replies. A command of a job that was ``requested`` at a moment is sent within
-    ``patience`` seconds of it, or of the command before it, whose own time on the line, at
-    ``char_time`` s a character, does not count.
+    the replies. ``char_time`` is seconds a character.
     """
 
-    def __init__(self, station: int, first_tns: int, patience: float = math.inf,
-                 char_time: float = 0.0) -> None:
-        self.patience = patience
+    def __init__(self, station: int, first_tns: int, char_time: float = 0.0) -> None:
         self.char_time = char_time
         self.transactions = 0
         self._station = station
@@ -58,14 +54,15 @@ class JobTasks:
         self._waiting: deque[JobTask] = deque()
 
     def start(self, station: int, steps: Steps, now: float, *, reply_size: int = 0,
-              requested: float | None = None) -> JobTask:
+              expires: float = math.inf, patience: float = 0.0) -> JobTask:
         """
         Return the task of a new job, with its first command, whose reply has that size.
 
-        What somebody has ``requested`` is not sent any more when it is too old; all else is.
+        A command does not leave after ``expires``, a later one not more than ``patience`` s after
+        the command before it, whose own time on the line does not count.
         """
-        expires = math.inf if requested is None else requested + self.patience
         task = JobTask(self, station, steps, reply_size, expires)
+        task.patience = patience
         task.taken = now
         self._tasks.add(task)
         return task
@@ -125,7 +122,7 @@ class JobTask:
         self.sent = False
         self.reply_size = reply_size
         self.expires = expires
-        self.taken = 0.0
+        self.taken = self.patience = 0.0
         self.station = station
         self._tasks = tasks
         self._steps = steps
@@ -153,8 +150,8 @@ class JobTask:
             self._tasks.advanced(self, is_done=True)
             raise
         self.sent, self.reply_size = False, 0
-        if self.expires < math.inf:
+        if self.patience:
             line_time = len(self.command.encode()) * self._tasks.char_time
-            self.expires = max(self.expires, self.taken + line_time + self._tasks.patience)
+            self.expires = max(self.expires, self.taken + line_time + self.patience)
         self.command = self._tasks.new_command(self.station, request)
         self._tasks.advanced(self, is_done=False)

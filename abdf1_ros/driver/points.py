@@ -38,6 +38,7 @@ class Freshness(Enum):
     LATE = 'late'
     STALE = 'stale'
     FAILED = 'failed'
+    WITHHELD = 'withheld'
     WAITING = 'waiting for the first read'
 
 
@@ -48,7 +49,8 @@ class ReadPoint:
     ``period`` and ``stale_time`` are in seconds: a value is late when it is older than one and
     a half periods and than half of ``stale_time``, stale when older than all of it. ``interval``
     is the seconds between its last two good reads, if nothing was between them. ``error`` says
-    why the last read gave no value.
+    why the last read gave no value, ``withheld`` why its value was not published, the latter for
+    the ``withholdings``-th time since ``withheld_since`` (clock value in s).
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
@@ -59,6 +61,9 @@ class ReadPoint:
         self.interval: float | None = None
         self.error: str | None = None
         self.failures = 0
+        self.withheld = ''
+        self.withheld_since = 0.0
+        self.withholdings = 0
         self._codec = mapping.codec
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
@@ -76,7 +81,7 @@ class ReadPoint:
         changed = content != self._published or self.error is not None
         if self.last_good is not None:
             self.interval = now - self.last_good if self.error is None else None
-        self.last_good, self.error = now, None
+        self.last_good, self.error, self.withheld = now, None, ''
         self._published = content
         if self.mapping.publish is Publish.CHANGE and not changed:
             return None
@@ -87,6 +92,15 @@ class ReadPoint:
         is_news = error != self.error
         self.error = error
         self.failures += 1
+        return is_news
+
+    def withhold(self, reason: str, now: float) -> bool:
+        """Take note that a value is not published; return whether that has just begun."""
+        is_news = not self.withheld
+        if is_news:
+            self.withheld_since = now
+            self.withholdings += 1
+        self.withheld, self.error = reason, None
         return is_news
 
     def is_due(self, now: float, block_period: float) -> bool:
@@ -107,6 +121,8 @@ class ReadPoint:
         """Judge the last value."""
         if self.error is not None:
             return Freshness.FAILED
+        if self.withheld:
+            return Freshness.WITHHELD
         if self.last_good is None:
             return Freshness.WAITING
         age = now - self.last_good
@@ -126,6 +142,7 @@ class Outcome(Enum):
     FAILED = 'not written: the PLC refused it'
     PARTLY = 'only partly written'
     UNKNOWN = 'unknown whether written'
+    FALLBACK = 'fallback value written'
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +173,8 @@ class Write:
 
     Raises FormatError, saying what is wrong, when they cannot or must not be written.
     ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that
-    it takes. ``is_probe`` tells that its station was inactive when it got the line, ``request``
-    is handed on to the result.
+    it takes. ``is_probe`` tells that its station was inactive when it got the line, ``is_own``
+    that no message has asked for it; ``request`` is handed on to the result.
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
@@ -165,7 +182,7 @@ class Write:
         self.mapping = mapping
         self.request = request
         self.requested = now
-        self.is_probe = False
+        self.is_probe = self.is_own = False
         self.value = show(values)
         self.raw = raw_values(mapping, values)
         self.commands = _commands(mapping, self.raw)

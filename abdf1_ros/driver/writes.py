@@ -31,6 +31,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.probes import Probes
 from abdf1_ros.messages import Message
+from abdf1_ros.settings.mapping import Mapping
 
 MAX_WAITING_WRITES = 1000
 
@@ -38,6 +39,11 @@ MAX_WAITING_WRITES = 1000
 def waited_too_long(seconds: float) -> str:
     """Return why a write ends that has waited for more than so many seconds."""
     return f'waited longer than {seconds:g} s for the line'
+
+
+def patience_of(mapping: Mapping, patience: float) -> float:
+    """Return the seconds that a message may wait: less where a fallback is due before (rule 7)."""
+    return min(patience, mapping.fallback.after / 1000) if mapping.fallback else patience
 
 
 class WriteQueue:
@@ -113,6 +119,28 @@ class WriteQueue:
             held_up.add(station)
         return None
 
+    def youngest(self) -> dict[int, float]:
+        """
+        Return when the youngest message of each row with Fallback was published.
+
+        By the ``id`` of the mapping, of messages that wait or are under way.
+        """
+        found: dict[int, float] = {}
+        for write in itertools.chain(self._waiting, self._under_way):
+            if write.mapping.fallback is not None and not write.is_own:
+                key = id(write.mapping)
+                found[key] = max(write.requested, found.get(key, -math.inf))
+        return found
+
+    def is_held_up(self, write: Write) -> bool:
+        """Tell whether a write has to wait for one of the same words that is under way."""
+        return any(map(write.overlaps, self._under_way))
+
+    def begin_own(self, write: Write) -> None:
+        """Take note that a write of our own is under way, until it has ``ended``."""
+        write.is_own = True
+        self._under_way.append(write)
+
     def ended(self, write: Write) -> None:
         """Take note that a write is not under way any more; the next of its words may go out."""
         self._under_way.remove(write)
@@ -132,19 +160,21 @@ class WriteQueue:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
         return self._next_expiry
 
-    def drop(self, reason: str, now: float) -> None:
-        """End every waiting write without sending it."""
-        while self._waiting:
-            self._report(self._waiting.popleft().result(Outcome.NOT_SENT, reason, now))
+    def drop(self, reason: str, now: float, mapping: Mapping | None = None) -> None:
+        """End the waiting writes, of one mapping or all, without sending them."""
+        dropped = [write for write in self._waiting if mapping in (None, write.mapping)]
+        for write in dropped:
+            self._waiting.remove(write)
+            self._report(write.result(Outcome.NOT_SENT, reason, now))
 
     def _expiry(self, write: Write) -> float:
         """Return the clock value (s) from which a write is too old."""
-        return write.requested + self._patience
+        return write.requested + patience_of(write.mapping, self._patience)
 
     def _reject_reason(self, write: Write, now: float) -> str:
         """Return why a write is not to be sent any more, empty if it is."""
         if now >= self._expiry(write):
-            return waited_too_long(self._patience)
+            return waited_too_long(patience_of(write.mapping, self._patience))
         station = write.mapping.station
         # A write has just found it inactive, and others want the line.
         if now < self._probes.next and station != BROADCAST \

@@ -124,16 +124,15 @@ def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
 
 
 def test_job_that_nobody_has_asked_for_does_not_expire() -> None:
-    tasks = JobTasks(OURS, 0, patience=2.0)
+    tasks = JobTasks(OURS, 0)
     task = tasks.start(1, Job().steps(), NOW)
     task.reply(task.command.reply())
     assert (task.expires, tasks.next_expiry()) == (math.inf, math.inf)
 
 
 def test_command_expires_by_the_request_or_by_the_command_before() -> None:
-    tasks = JobTasks(OURS, 0, patience=2.0, char_time=0.01)
-    task = tasks.start(1, Job().steps(), NOW, requested=NOW - 0.5)
-    assert task.expires == NOW + 1.5
+    tasks = JobTasks(OURS, 0, char_time=0.01)
+    task = tasks.start(1, Job().steps(), NOW, expires=NOW + 1.5, patience=2.0)
     size = len(task.command.encode())
     task.reply(task.command.reply())
     assert task.expires == pytest.approx(NOW + 2.0 + 0.01 * size)
@@ -142,8 +141,8 @@ def test_command_expires_by_the_request_or_by_the_command_before() -> None:
 
 @pytest.mark.parametrize('after, errors', [(-0.001, 0), (0.0, 1), (4.0, 1)])
 def test_job_ends_whose_next_command_has_waited_too_long(after: float, errors: int) -> None:
-    job, tasks = Job(), JobTasks(OURS, 0, patience=2.0)
-    task = tasks.start(1, job.steps(), NOW, requested=NOW)
+    job, tasks = Job(), JobTasks(OURS, 0)
+    task = tasks.start(1, job.steps(), NOW, expires=NOW + 2.0, patience=2.0)
     task.sent = True
     task.reply(task.command.reply())
     tasks.expire(task.expires + after)

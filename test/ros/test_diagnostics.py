@@ -350,7 +350,8 @@ def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
     bench.point('level').update(bytes(4), NOW)
     assert bench.says('mappings', NOW + 1.0) == (OK, 'OK: of 2 mappings 2 fresh')
     assert details(bench.status('mappings', NOW + 1.0)) == {
-        'total': '2', 'fresh': '2', 'late': '0', 'stale': '0', 'failed': '0', 'waiting': '0'}
+        'total': '2', 'fresh': '2', 'late': '0', 'stale': '0', 'failed': '0', 'withheld': '0',
+        'waiting': '0'}
     bench.point('level').update(bytes(4), NOW + 1.0)
     assert bench.says('mappings', NOW + 2.0) == (WARN, 'WARN: of 2 mappings 1 fresh, 1 late')
     assert details(bench.status('mappings', NOW + 2.0))['speed'] == \
@@ -382,7 +383,7 @@ def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
 
 def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
-    jobs: Any = bench.driver._reads.jobs
+    jobs: Any = bench.driver._reads._due.jobs
 
     class Part:
         """A job that has not been done yet."""

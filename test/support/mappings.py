@@ -26,6 +26,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import COLUMNS
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.scaling import Scaling
@@ -40,7 +41,9 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
                  topic: str | None = None, minimum: float = -math.inf,
                  maximum: float = math.inf, item: int = 1, word_order: str = 'Low',
                  scaling: Scaling | None = None, access: str | None = None,
-                 processor: str | None = None, via: int | None = None) -> Mapping:
+                 processor: str | None = None, heartbeat: Heartbeat | None = None,
+                 fallback: Fallback | None = None,
+                 publish_while: PublishWhile | None = None, via: int | None = None) -> Mapping:
     """Return what a row of these cells becomes; its name is the address unless told."""
     way = Access(access) if access else None
     address = parse_address(text, PlcType(plc), way)
@@ -50,7 +53,8 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
         item, item + 1, name, name, Command(command), address, station, PlcType(plc), length,
         ValueType(kind) if kind else natural, topic or name, period, Publish(publish),
         minimum, maximum, word_order=WordOrder(word_order), scaling=scaling,
-        access=way, processor=Processor(processor) if processor else None, via=via)
+        access=way, processor=Processor(processor) if processor else None, heartbeat=heartbeat,
+        fallback=fallback, publish_while=publish_while, via=via)
 
 
 def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:

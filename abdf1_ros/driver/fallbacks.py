@@ -1,0 +1,139 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Fallback values: what is written when nobody writes any more (rules 7 to 12 and 17).
+
+The numbers of rules are those of docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+import math
+
+from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.settings.mapping import Mapping
+
+# A PLC that refuses a fallback value is asked again so often (s).
+_PAUSE_AFTER_REFUSAL = 1.0
+
+
+class Cause(Enum):
+    """Why a fallback value is due (rule 17)."""
+
+    TIMEOUT = 'timeout'
+    START = 'start'
+    RETURN = 'return'
+    RUN = 'run'
+    END = 'end'
+
+
+class FallbackRow:
+    """
+    One row with Fallback, and what the PLC has of it.
+
+    ``cause`` says why the fallback is due, None where it is not: from then on it stays due until
+    the PLC has confirmed it. ``refreshed`` is when the last message was published that has been
+    confirmed. After ``sent`` nothing goes out that was published before. All are clock values (s).
+    ``stands`` tells that the PLC holds the fallback and nothing has gone out since, ``is_held_up``
+    that it waits for a message that is under way.
+    """
+
+    def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
+        assert mapping.fallback is not None
+        self.mapping = mapping
+        self.after = mapping.fallback.after / 1000
+        self.refreshed = -math.inf
+        self.sent = -math.inf
+        self.cause: Cause | None = None
+        self.is_under_way = False
+        self.is_held_up = False
+        self.stands = False
+        self._values = mapping.fallback.values
+        self._settle_time = 2 * cmd_timeout
+        self._due_since = 0.0
+        self._next_try = -math.inf
+        self._is_unsure = False  # a write has ended as unknown since the last message or fallback
+        self._again_at = math.inf
+
+    def demand(self, cause: Cause, now: float) -> None:
+        """Make the fallback due; the first cause is the one that is told."""
+        if self.cause is None:
+            self.cause, self._due_since = cause, now
+        self._next_try = -math.inf
+
+    def is_fresh(self, now: float) -> bool:
+        """Tell whether the last confirmed message is young enough."""
+        return now < self.refreshed + self.after
+
+    def deadline(self, youngest: float) -> float:
+        """
+        Return when the fallback becomes due (clock value in s), infinite for never.
+
+        ``youngest`` is when the youngest message was published that waits or is under way.
+        """
+        if self.cause is not None:
+            return self._due_since
+        return math.inf if self.stands else max(self.refreshed, youngest) + self.after
+
+    def judge(self, now: float, youngest: float) -> None:
+        """Make the fallback due when the time of the last message is up."""
+        if self.cause is None and now >= self.deadline(youngest):
+            self.demand(Cause.TIMEOUT, now)
+
+    def next_due(self, youngest: float) -> float:
+        """Return when it wants the line (clock value in s), infinite for never."""
+        if self.is_under_way or self.is_held_up:
+            return math.inf
+        if self.cause is not None:
+            return max(self._due_since, self._next_try)
+        return min(self.deadline(youngest), self._again_at)
+
+    def take(self, now: float) -> Write:
+        """Return the write of the fallback, which ends with ``ended``."""
+        self.is_under_way, self.sent = True, now
+        return Write(self.mapping, self._values, now)
+
+    def ended(self, outcome: Outcome, now: float) -> float | None:
+        """
+        Take note how it ended; return the seconds that it was due where that is to be told.
+
+        It is written once more where a gateway may still hold a message of the row (rule 10).
+        """
+        self.is_under_way = False
+        if outcome is not Outcome.WRITTEN:
+            refused = outcome in (Outcome.FAILED, Outcome.PARTLY)
+            self._next_try = now + _PAUSE_AFTER_REFUSAL if refused else now
+            if self.cause is None:
+                self._again_at = now + _PAUSE_AFTER_REFUSAL
+            return None
+        self.stands = True
+        self._again_at = now + self._settle_time if self._is_unsure else math.inf
+        self._is_unsure = False
+        if self.cause is None:
+            return None
+        self.cause = None
+        return now - self._due_since
+
+    def message_ended(self, requested: float, outcome: Outcome) -> None:
+        """Take note how a message of the row ended that had been sent (rule 7)."""
+        if outcome is Outcome.WRITTEN:
+            self.refreshed = max(self.refreshed, requested)
+            self._is_unsure, self._again_at = False, math.inf
+        elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
+            self._is_unsure = True
+        else:
+            return
+        self.stands = False

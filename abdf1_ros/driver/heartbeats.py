@@ -1,0 +1,125 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Heartbeats: a word that counts as long as all is well (rules 1 to 6).
+
+The numbers of rules are those of docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+import math
+
+from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.settings.mapping import Mapping
+
+LARGEST = 32_767
+
+_LEAST_LIFE_SIGN = 1.0  # s
+
+
+class HeartbeatRow:
+    """
+    One Heartbeat row, and what the PLC has of it.
+
+    ``value`` was sent last; ``confirmed`` is the clock value (s) of the last answer that took it.
+    ``reason`` says why it does not count, empty while it does; ``is_held`` tells that the PLC is
+    to be told so with 0.
+    """
+
+    def __init__(self, mapping: Mapping) -> None:
+        assert mapping.heartbeat is not None
+        assert mapping.period is not None
+        self.mapping = mapping
+        self.value = 0
+        self.confirmed: float | None = None
+        self.reason = ''
+        self.is_held = False
+        self.is_under_way = False
+        self._period = mapping.period / 1000
+        self._requires = mapping.heartbeat.requires
+        self._requires_timeout = (mapping.heartbeat.requires_timeout or 0) / 1000
+        self._is_confirmed = False
+        self._must_begin = True  # 0 has to be confirmed before it counts (rule 2)
+        self._next = -math.inf
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether the PLC has confirmed 0."""
+        return self.value == 0 and self._is_confirmed
+
+    def begin(self, now: float) -> None:
+        """Begin anew with 0: the PLC may be another one by now (rule 2)."""
+        self._must_begin, self._is_confirmed, self._next = True, False, now
+
+    def missing(self, messages: MappingType[str, float], now: float) -> str:
+        """
+        Return which topic has had no message in time, empty for none (rule 3 d).
+
+        ``messages`` tells when the last accepted message of each was published (clock value in s).
+        """
+        return next((topic for topic in self._requires
+                     if now >= messages.get(topic, -math.inf) + self._requires_timeout), '')
+
+    def topics_until(self, messages: MappingType[str, float]) -> float:
+        """Return until when it may count by rule 3 (d), if no further message comes."""
+        return min((messages.get(topic, -math.inf) + self._requires_timeout
+                    for topic in self._requires), default=math.inf)
+
+    def executor_until(self, executor: float) -> float:
+        """Return until when it may count by rule 3 (c); ``executor`` is when that ran last."""
+        return executor + max(self._period, _LEAST_LIFE_SIGN)
+
+    def wants_zero(self, is_held: bool, now: float) -> bool:
+        """Tell whether 0 is to be written now; ``is_held`` tells that it must not count."""
+        if self.is_under_way or self.is_at_rest and not self._must_begin:
+            return False
+        return (self._must_begin or is_held) and (now >= self._next or self.value != 0)
+
+    def wants_beat(self, now: float) -> bool:
+        """Tell whether the next value is due."""
+        return not self.is_under_way and not self._must_begin and now >= self._next
+
+    def put_off(self, until: float) -> None:
+        """Look again at that clock value (s): nothing is to be written before."""
+        self._next = until
+
+    def next_due(self, messages: MappingType[str, float]) -> float:
+        """Return when it wants the line (clock value in s), infinite for not by itself."""
+        if self.is_under_way or self.is_held and self.is_at_rest and not self._must_begin:
+            return math.inf
+        if self._must_begin or self.is_held or self.value == 0:
+            return self._next
+        return min(self._next, self.topics_until(messages))
+
+    def take(self, now: float, is_zero: bool) -> Write:
+        """Return the write of 0, or of the next value, which ends with ``ended``."""
+        self.is_under_way = True
+        if is_zero:
+            self.value, self._is_confirmed = 0, False
+        elif self._is_confirmed:  # otherwise the same once more (rule 3 a)
+            self.value, self._is_confirmed = self.value % LARGEST + 1, False
+        self._next = now + self._period
+        return Write(self.mapping, [self.value], now)
+
+    def ended(self, outcome: Outcome, now: float) -> None:
+        """Take note how it ended."""
+        self.is_under_way = False
+        if outcome is not Outcome.WRITTEN:
+            return
+        self._is_confirmed, self.confirmed = True, now
+        if self.value == 0 and self._must_begin:
+            self._must_begin, self._next = False, now

@@ -1,0 +1,304 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What we write by ourselves: heartbeats and fallback values, and which of them goes first.
+
+A PLC is told 0 at first contact; then come the fallback values that are due there, and only then
+do its heartbeats count. The rules are numbered in docs/heartbeats.md. Pure as all of the driver: a
+clock that counts while the host sleeps has to be given as ``now`` (rule 6). None of this is a
+safety function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.fallbacks import Cause, FallbackRow
+from abdf1_ros.driver.heartbeats import HeartbeatRow
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes import WriteQueue
+from abdf1_ros.settings.mapping import Mapping
+
+# While the executor stands still nobody wakes the link; so often (s) it looks by itself.
+_GLANCE = 0.1
+
+
+class Urgency(Enum):
+    """What goes before all messages, in this order (rule 11)."""
+
+    ZERO = 'heartbeat 0'
+    FALLBACK = 'fallback'
+    BEAT = 'heartbeat'
+
+
+@dataclass(eq=False, slots=True)
+class OwnWrite:
+    """
+    A write that nobody has asked for by a message.
+
+    After ``expires`` (clock value in s) it must not leave: what it says may be wrong by then.
+    """
+
+    urgency: Urgency
+    row: HeartbeatRow | FallbackRow
+    write: Write
+    expires: float = math.inf
+
+    @property
+    def station(self) -> int:
+        """Return the station to write to."""
+        return self.write.mapping.station
+
+
+class Interlocks:
+    """
+    All heartbeats and fallbacks of a line.
+
+    ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
+    row into our own table; ``report`` gets the result of each fallback that was written. Only
+    ``executor_ran`` and ``wind_down`` may be called from another thread.
+    """
+
+    def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
+                 writes: WriteQueue, cmd_timeout: float, store: Callable[[Write], None],
+                 report: Callable[[WriteResult], None]) -> None:
+        self.heartbeats = [HeartbeatRow(mapping) for mapping in mappings if mapping.heartbeat]
+        self.fallbacks = [FallbackRow(mapping, cmd_timeout)
+                          for mapping in mappings if mapping.fallback]
+        self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
+        self._stations = stations
+        self._writes = writes
+        self._store = store
+        self._report = report
+        self._messages: dict[str, float] = {}
+        self._executor = -math.inf
+        self._is_running: dict[int, bool] = {}
+        self._has_begun = False
+        self._is_ending = False
+        self._has_demanded_all = False
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to write by ourselves."""
+        return bool(self.heartbeats or self.fallbacks)
+
+    # What happens
+
+    def executor_ran(self, now: float) -> None:
+        """Take note that the executor runs: no thread vouches for a hung process (rule 3 c)."""
+        self._executor = now
+
+    def wind_down(self) -> None:
+        """Write 0, then every fallback, then nothing any more (rule 5)."""
+        self._is_ending = True
+
+    @property
+    def is_over(self) -> bool:
+        """Tell whether, after ``wind_down``, all stations that answer have confirmed all."""
+        return not self or self._has_demanded_all and not any(
+            self._stations[row.mapping.station].active for row in self._unconfirmed())
+
+    def unconfirmed(self) -> list[str]:
+        """Return the tags of what has still to be confirmed at the end."""
+        return [row.mapping.tag for row in self._unconfirmed()]
+
+    def _unconfirmed(self) -> list[HeartbeatRow | FallbackRow]:
+        beats = [row for row in self.heartbeats if not row.is_at_rest]
+        return [*beats, *(row for row in self.fallbacks if row.cause is not None)]
+
+    def begin(self, now: float) -> None:
+        """Take note that the port has been opened: a first contact with everybody (rule 2)."""
+        for row in self.heartbeats:
+            row.begin(now)
+        for fallback in self.fallbacks:
+            if not self._has_begun:
+                fallback.demand(Cause.START, now)
+            elif not fallback.mapping.serves:
+                self._demand_unless_fresh(fallback, now)
+        self._has_begun = True
+
+    def contact(self, station: int, now: float) -> None:
+        """Take note that a station is active again (rules 2, 8)."""
+        for row in self._heartbeats_of(station):
+            row.begin(now)
+        for fallback in self._fallbacks_of(station):
+            self._demand_unless_fresh(fallback, now)
+
+    def mode_seen(self, station: int, is_running: bool | None, now: float) -> None:
+        """Take note of a station's mode; a change to RUN is a first contact (rules 2, 8)."""
+        was_running = self._is_running.get(station)
+        if is_running is None:
+            return
+        self._is_running[station] = is_running
+        if is_running and was_running is False:
+            for row in self._heartbeats_of(station):
+                row.begin(now)
+            for fallback in self._fallbacks_of(station):
+                fallback.demand(Cause.RUN, now)
+
+    def _demand_unless_fresh(self, fallback: FallbackRow, now: float) -> None:
+        if not fallback.is_fresh(now):
+            fallback.demand(Cause.RETURN, now)
+
+    def message_came(self, write: Write) -> None:
+        """Take note of a message that was accepted (rule 3 d)."""
+        topic = write.mapping.topic
+        self._messages[topic] = max(write.requested, self._messages.get(topic, -math.inf))
+
+    def is_overruled(self, write: Write) -> bool:
+        """Tell whether a message was published before a fallback of its row went out (rule 9)."""
+        row = self._by_mapping.get(id(write.mapping))
+        return row is not None and write.requested <= row.sent
+
+    def message_ended(self, write: Write, outcome: Outcome) -> None:
+        """Take note how a message ended that had the line."""
+        row = self._by_mapping.get(id(write.mapping))
+        if row is not None:
+            row.message_ended(write.requested, outcome)
+            row.is_held_up = False
+
+    # Who goes next
+
+    def next(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:  # noqa: A003
+        """Return what has to be written next, None for nothing; it ends with ``ended``."""
+        if not self:
+            return None
+        self.expire(now)
+        return self._zero(now, busy) or self._fallback(now, busy) or self._beat(now, busy)
+
+    def _can_go(self, station: int, busy: Container[int]) -> bool:
+        """Tell whether a station may be written to: inactive ones are not probed (rule 4)."""
+        return station not in busy and self._stations[station].active
+
+    def _zero(self, now: float, busy: Container[int]) -> OwnWrite | None:
+        for row in self.heartbeats:
+            if self._can_go(row.mapping.station, busy):
+                self._judge(row, now)
+                if row.wants_zero(row.is_held, now):
+                    return OwnWrite(Urgency.ZERO, row, row.take(now, is_zero=True))
+        return None
+
+    def _judge(self, row: HeartbeatRow, now: float) -> None:
+        """Find out why a heartbeat must not count, if so (rule 3)."""
+        row.reason = self._why_held(row, now)
+        row.is_held = bool(row.reason)
+        if not row.is_held and now >= row.executor_until(self._executor):
+            row.reason = 'the executor of the node stands still'  # nothing is written then
+
+    def _why_held(self, row: HeartbeatRow, now: float) -> str:
+        if self._is_ending:
+            return 'the bridge ends'
+        for fallback in self._fallbacks_of(row.mapping.station):
+            if fallback.cause is not None:
+                return f'the fallback of {fallback.mapping.tag} is not confirmed'
+        topic = row.missing(self._messages, now)
+        return f'no message of {topic} in time' if topic else ''
+
+    def _fallback(self, now: float, busy: Container[int]) -> OwnWrite | None:
+        youngest = self._writes.youngest()
+        for row in self.fallbacks:
+            mapping = row.mapping
+            if mapping.serves or not self._can_go(mapping.station, busy) \
+                    or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
+                continue
+            write = row.take(now)
+            if self._writes.is_held_up(write):  # by one that is under way (rule 9)
+                row.is_under_way, row.is_held_up = False, True
+                continue
+            self._writes.drop('fallback', now, mapping)
+            return OwnWrite(Urgency.FALLBACK, row, write)
+        return None
+
+    def _beat(self, now: float, busy: Container[int]) -> OwnWrite | None:
+        for row in self.heartbeats:
+            if not self._can_go(row.mapping.station, busy) or not row.wants_beat(now) \
+                    or row.is_held:
+                continue
+            if row.reason:
+                row.put_off(now + _GLANCE)
+            else:
+                return OwnWrite(
+                    Urgency.BEAT, row, row.take(now, is_zero=False), self._good_until(row))
+        return None
+
+    def _good_until(self, row: HeartbeatRow) -> float:
+        """Return until when a heartbeat may leave (clock value in s): later it may be wrong."""
+        youngest = self._writes.youngest()
+        return min([
+            row.executor_until(self._executor), row.topics_until(self._messages), *(
+            fallback.deadline(youngest.get(id(fallback.mapping), -math.inf))
+            for fallback in self._fallbacks_of(row.mapping.station))])
+
+    def ended(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
+        """Take note how one of our writes ended."""
+        row = own.row
+        if isinstance(row, HeartbeatRow):
+            row.ended(outcome, now)
+        else:
+            self._fallback_ended(row, own.write, outcome, now)
+
+    def _fallback_ended(self, row: FallbackRow, write: Write, outcome: Outcome,
+                        now: float) -> None:
+        cause = row.cause
+        seconds = row.ended(outcome, now)
+        if seconds is not None and cause is not None:
+            self._report(WriteResult(
+                row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
+
+    def expire(self, now: float) -> None:
+        """Judge what has become due, and write what needs no line."""
+        if not self._has_begun:
+            return
+        youngest = self._writes.youngest()
+        for row in self.fallbacks:
+            row.judge(now, youngest.get(id(row.mapping), -math.inf))
+            if self._is_ending and row.cause is None and not row.stands:
+                row.demand(Cause.END, now)
+                row.is_held_up = False
+            if row.mapping.serves and row.cause is not None:
+                write = row.take(now)
+                self._store(write)
+                self._fallback_ended(row, write, Outcome.WRITTEN, now)
+        self._has_demanded_all = self._is_ending
+
+    def next_expiry(self) -> float:
+        """Return when a fallback of our own table is due (clock value in s)."""
+        if not self._has_begun:
+            return math.inf
+        return min((row.next_due(-math.inf) for row in self.fallbacks if row.mapping.serves),
+                   default=math.inf)
+
+    def next_due(self) -> float:
+        """Return when there is something to write (clock value in s), infinite for never."""
+        return min(self._moments(), default=math.inf)
+
+    def _moments(self) -> Iterator[float]:
+        youngest = self._writes.youngest()
+        for fallback in self.fallbacks:
+            if not fallback.mapping.serves and self._stations[fallback.mapping.station].active:
+                yield fallback.next_due(youngest.get(id(fallback.mapping), -math.inf))
+        for row in self.heartbeats:
+            if self._stations[row.mapping.station].active:
+                yield row.next_due(self._messages)
+
+    def _heartbeats_of(self, station: int) -> Iterable[HeartbeatRow]:
+        return (row for row in self.heartbeats if row.mapping.station == station)
+
+    def _fallbacks_of(self, station: int) -> Iterable[FallbackRow]:
+        return (row for row in self.fallbacks
+                if row.mapping.station == station and not row.mapping.serves)

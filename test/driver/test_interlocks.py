@@ -1,0 +1,542 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Heartbeats, fallback values and guarded reads on a virtual line.
+
+The numbers in the names are those of the rules in docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.driver.driver import MODE_PERIOD
+from abdf1_ros.driver.heartbeats import LARGEST
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.points import Freshness, Outcome
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network, POLLING_MODES
+import pytest
+from support.driver_bench import DriverBench, store
+from support.mappings import make_mapping
+
+AFTER = 0.5
+FALLBACK = Fallback((7,), int(AFTER * 1000))
+START, TIMEOUT, RETURN, RUN, END = (
+    f'fallback value written: {cause}' for cause in ('start', 'timeout', 'return', 'run', 'end'))
+
+
+def beat_row(period: int = 200, requires: Sequence[str] = (), timeout: int | None = None,
+             address: str = 'N10:0') -> Mapping:
+    """Return a Heartbeat row."""
+    return make_mapping(address, 'Heartbeat', tag='beat', period=period,
+                        heartbeat=Heartbeat(tuple(requires), timeout))
+
+
+def speed_row(fallback: Fallback | None = FALLBACK, address: str = 'N7:0', tag: str = 'speed',
+              length: int = 1) -> Mapping:
+    """Return a Write row with Fallback."""
+    return make_mapping(address, 'Write', tag=tag, fallback=fallback, length=length)
+
+
+class Cell:
+    """A driver, a PLC whose writes are kept, and a ROS executor that can stand still."""
+
+    def __init__(self, *rows: Mapping, polling: str = 'Message', start: bool = True,
+                 **settings: object) -> None:
+        self.bench = DriverBench(rows, network=Network(
+            baud=115200, timeout=200, cmd_timeout=500, nak_retries=1, enq_retries=1,
+            polling=polling), settings=DriverSettings(**settings), start=False)  # type: ignore
+        self.plc = self.bench.plc(1, 'PLC5', ('N7:0', 20), ('N10:0', 20), ('N11:0', 20),
+                                  ('B3:0', 4))
+        self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
+        self.is_alive = True
+        self.refused: set[str] = set()
+        self.writes: list[tuple[float, str, int]] = []
+        self._tick()
+        if start:
+            self.bench.open()
+
+    @property
+    def now(self) -> float:
+        """Return the clock."""
+        return self.bench.clock()
+
+    def _tick(self) -> None:
+        """Let the executor run, ten times a second."""
+        if self.is_alive:
+            self.bench.driver.interlocks.executor_ran(self.now)
+        self.bench.at(self.now + 0.1, self._tick)
+
+    def _serve(self, command: Packet) -> Packet:
+        before = self._words()
+        if command.cmd == 0x0F and command.data[0] == 0x67 and self.refused & self._named(command):
+            return command.reply(sts=0x10)
+        reply = self.plc.serve(command)
+        after = self._words()
+        if command.cmd == 0x0F and command.data[0] == 0x67:
+            for name in self._named(command):
+                self.writes.append((self.now, name, after[name]))
+        elif before != after:
+            for name in after:
+                if before[name] != after[name]:
+                    self.writes.append((self.now, name, after[name]))
+        return reply
+
+    def _named(self, command: Packet) -> set[str]:
+        """Return the word that a typed write goes to."""
+        files = {7: 'N7:0', 10: 'N10:0'}
+        return {files[number] for number in files if bytes((6, number)) in command.data[:9]
+                or bytes((7, 0, number)) in command.data[:10]}
+
+    def _words(self) -> dict[str, int]:
+        return {name: self.word(name) for name in ('N7:0', 'N10:0')}
+
+    def word(self, text: str) -> int:
+        """Return a word of the PLC."""
+        return int.from_bytes(
+            self.plc.table.read(parse_address(text, self.plc.table.plc_type), 1), 'little')
+
+    def written(self, text: str, since: float = 0.0) -> list[int]:
+        """Return what was written to a word."""
+        return [value for when, name, value in self.writes if name == text and when >= since]
+
+    def results(self) -> list[str]:
+        """Return the results of writes."""
+        return [str(result) for result in self.bench.listener.results]
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.bench.run(seconds)
+
+    def publish(self, row: Mapping, value: int, times: int = 1, gap: float = 0.1) -> None:
+        """Publish a value, so many times."""
+        for number in range(times):
+            self.bench.at(self.now + number * gap, lambda: self.bench.write(row, [value]))
+
+
+@pytest.mark.parametrize('polling', POLLING_MODES)
+def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> None:
+    cell = Cell(beat_row(), speed_row(), polling=polling)
+    store(cell.plc, 'N10:0', [123])
+    cell.run(1.0)
+    assert [(name, value) for _, name, value in cell.writes][:4] == [
+        ('N10:0', 0), ('N7:0', 7), ('N10:0', 1), ('N10:0', 2)]
+    assert cell.results() == [START]
+
+
+def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
+    cell = Cell(beat_row())
+    cell.run(0.5)
+    cell.bench.driver.interlocks.heartbeats[0].value = LARGEST - 1
+    since = cell.now
+    cell.run(0.7)
+    assert cell.written('N10:0', since)[:3] == [LARGEST, 1, 2]
+
+
+def test_rule_2_station_that_is_back_begins_with_0() -> None:
+    cell = Cell(beat_row())
+    cell.run(2.0)
+    cell.plc.faults.silent = True
+    cell.run(5.0)
+    cell.plc.faults.silent = False
+    since = cell.now
+    cell.run(10.0)
+    assert cell.written('N10:0', since)[:3] == [0, 1, 2]
+
+
+def test_rule_2_port_that_is_back_begins_with_0() -> None:
+    cell = Cell(beat_row(), speed_row())
+    cell.run(2.0)
+    cell.bench.lose_port()
+    cell.run(1.0)
+    since = cell.now
+    cell.bench.open()
+    cell.run(1.0)
+    assert cell.written('N10:0', since)[:3] == [0, 1, 2]
+    assert cell.results() == [START, RETURN]
+
+
+def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
+    cell = Cell(beat_row())
+    cell.run(1.05)
+    cell.refused = {'N10:0'}
+    cell.run(1.0)
+    last = cell.written('N10:0')[-1]
+    cell.refused = set()
+    since = cell.now
+    cell.run(0.5)
+    assert cell.written('N10:0', since)[0] == last + 1
+    assert cell.bench.driver.interlocks.heartbeats[0].value > last + 1
+
+
+def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(0.2)
+    cell.refused = {'N7:0'}
+    cell.run(AFTER)
+    since = cell.now
+    cell.run(2.0)
+    assert cell.word('N10:0') == 0
+    assert cell.written('N10:0', since) == []
+    cell.refused = set()
+    cell.run(2.0)
+    assert cell.word('N7:0') == 7
+    assert cell.word('N10:0') > 1
+
+
+@pytest.mark.parametrize('polling', POLLING_MODES)
+def test_rule_3c_hung_executor_stops_the_beat_where_it_is(polling: str) -> None:
+    cell = Cell(beat_row(), polling=polling)
+    cell.run(2.0)
+    cell.is_alive = False
+    cell.run(1.2)
+    last, count = cell.word('N10:0'), len(cell.writes)
+    cell.run(5.0)
+    assert last > 1
+    assert (cell.word('N10:0'), len(cell.writes)) == (last, count)
+    assert cell.bench.driver.interlocks.heartbeats[0].reason == \
+        'the executor of the node stands still'
+    cell.is_alive = True
+    cell.run(1.0)
+    assert cell.word('N10:0') > last
+
+
+@pytest.mark.parametrize('polling', POLLING_MODES)
+def test_rule_3d_required_topic_that_falls_silent_is_0_at_once(polling: str) -> None:
+    speed = speed_row(None)
+    cell = Cell(beat_row(period=1000, requires=['speed'], timeout=300), speed, polling=polling)
+    cell.run(1.0)
+    assert cell.written('N10:0') == [0]
+    cell.publish(speed, 5, times=40)
+    cell.run(4.0)
+    assert cell.word('N10:0') >= 3
+    begun = cell.now
+    cell.run(1.0)
+    assert cell.word('N10:0') == 0
+    zero = next(when for when, name, value in cell.writes if when >= begun - 0.1 and not value
+                and name == 'N10:0')
+    assert zero < begun + 0.3 + 0.05
+
+
+def test_rule_4_inactive_station_is_not_probed_with_heartbeats() -> None:
+    cell = Cell(beat_row())
+    cell.run(1.0)
+    cell.plc.faults.silent = True
+    cell.run(5.0)
+    sent = cell.bench.driver.counters.commands_sent
+    cell.run(30.0)
+    assert cell.bench.driver.counters.commands_sent == sent
+
+
+def test_rule_4_heartbeats_give_no_results() -> None:
+    cell = Cell(beat_row())
+    cell.run(3.0)
+    assert cell.results() == []
+
+
+def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed)
+    cell.publish(speed, 3, times=20)
+    cell.run(1.95)
+    since = cell.now
+    driver = cell.bench.driver
+    assert not driver.interlocks.is_over
+    driver.wind_down()
+    cell.bench.line.wake(driver.machine)
+    cell.bench.write(speed, [4])
+    cell.run(0.3)
+    assert [(name, value) for when, name, value in cell.writes if when >= since] == [
+        ('N10:0', 0), ('N7:0', 7)]
+    assert driver.interlocks.is_over
+    assert driver.interlocks.unconfirmed() == []
+    assert cell.results()[-2:] == ['not written: refused: this node ends', END]
+
+
+def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
+    cell = Cell(beat_row(), speed_row())
+    cell.run(1.0)
+    cell.refused = {'N10:0'}
+    cell.bench.driver.wind_down()
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(2.0)
+    assert not cell.bench.driver.interlocks.is_over
+    assert cell.bench.driver.interlocks.unconfirmed() == ['beat']
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.05, 0.12, 0.19])
+def test_rule_6_pause_of_the_process_lets_no_beat_out_that_vouches_for_the_past(
+        delay: float) -> None:
+    cell = Cell(beat_row())
+    cell.run(2.0 + delay)
+    cell.is_alive = False
+    resumed = cell.now + 3.0
+    cell.bench.line.pause(cell.bench.driver.machine, 3.0)
+    cell.run(6.0)
+    assert cell.written('N10:0', resumed) == []
+
+
+def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
+    speed = speed_row()
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.bench.driver.write([speed], [3], cell.now - 0.3)
+    cell.bench.line.wake(cell.bench.driver.machine)
+    begun = cell.now
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7, 3, 7]
+    when = cell.writes[-1][0]
+    assert begun - 0.3 + AFTER <= when < begun - 0.3 + AFTER + 0.05
+    assert cell.results() == [START, 'written', TIMEOUT]
+
+
+def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, maximum=10.0)
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(0.1)
+    cell.publish(speed, 99, times=20)
+    cell.run(2.0)
+    assert cell.word('N7:0') == 7
+    assert TIMEOUT in cell.results()
+
+
+def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
+    speed = speed_row()
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.bench.driver.write([speed], [3], cell.now - 0.6)
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7]
+    assert cell.results() == [
+        START, 'not written: not sent: waited longer than 0.5 s for the line']
+
+
+def test_rule_8_living_output_does_not_dip_in_a_short_outage() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(1.0)
+    cell.bench.lose_port()
+    cell.run(0.5)
+    cell.bench.open()
+    cell.run(2.0)
+    assert cell.written('N7:0') == [7, 3]
+
+
+def test_rule_8_change_to_run_is_a_first_contact() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(beat_row(), speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(1.0)
+    cell.plc.processor.setting = Setting.PROGRAM
+    cell.run(2 * MODE_PERIOD)
+    since = cell.now
+    cell.plc.processor.setting = Setting.RUN
+    cell.run(2 * MODE_PERIOD)
+    after = [(name, value) for when, name, value in cell.writes if when >= since]
+    at = after.index(('N10:0', 0))
+    assert after[at:at + 3] == [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)]
+    assert cell.results()[-1] == RUN
+
+
+def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(speed, start=False)
+    cell.bench.driver.is_online = True
+    cell.bench.driver._inbox.open()
+    cell.bench.driver.write([speed], [3], 0.0)
+    cell.bench.open()
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7]
+    assert cell.results() == ['not written: not sent: fallback', START]
+
+
+def test_rule_10_fallback_is_tried_until_it_is_confirmed() -> None:
+    cell = Cell(speed_row())
+    cell.refused = {'N7:0'}
+    cell.run(20.0)
+    assert cell.results() == []
+    cell.refused = set()
+    cell.run(2.0)
+    assert cell.written('N7:0') == [7]
+    assert cell.results() == [START]
+
+
+def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
+    speed = speed_row()
+    cell = Cell(speed)
+    cell.run(1.0)
+    say, cell.bench.far.say = cell.bench.far.say, lambda data: b''
+    cell.publish(speed, 3)
+    cell.run(0.05)
+    cell.run(1.0)
+    cell.bench.far.say = say
+    cell.run(15.0)
+    assert cell.written('N7:0')[0] == 7
+    assert cell.written('N7:0')[-2:] == [7, 7]
+    first, second = [when for when, name, value in cell.writes if name == 'N7:0'][-2:]
+    assert second == pytest.approx(first + 2 * 0.5, abs=0.2)
+    assert len([result for result in cell.results() if result.startswith('fallback')]) == 2
+
+
+def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
+    bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
+    cell = Cell(beat_row(period=200), bit, read)
+    cell.run(1.0)
+    for number in range(400):
+        cell.bench.write(bit, [number % 2])
+    since = cell.now
+    cell.run(3.0)
+    beats = [when for when, name, _ in cell.writes if name == 'N10:0' and when >= since]
+    assert max(after - before for before, after in zip(beats, beats[1:], strict=False)) < 0.25
+    assert len([when for when in cell.bench.listener.times(read) if when >= since]) > 20
+
+
+def test_rule_11_every_eighth_turn_is_a_reads() -> None:
+    beats = [make_mapping(f'N10:{number}', 'Heartbeat', tag=f'b{number}', period=100,
+                          heartbeat=Heartbeat()) for number in range(19)]
+    read = make_mapping('N11:0', period=0)
+    cell = Cell(*beats, read)
+    cell.run(5.0)
+    assert len(cell.bench.listener.times(read)) > 10
+
+
+def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
+    served = make_mapping('N9:0', 'Serve', station=5, fallback=FALLBACK)
+    cell = Cell(served)
+    cell.run(0.1)
+    words = cell.bench.driver._served.words_of
+    assert words(served) == b'\7\0'
+    cell.publish(served, 3)
+    cell.run(0.3)
+    assert words(served) == b'\3\0'
+    cell.run(0.3)
+    assert words(served) == b'\7\0'
+    assert cell.results() == [START, 'written', TIMEOUT]
+
+
+def test_rule_13_run_guards_a_row() -> None:
+    read = make_mapping('N11:0', period=100, publish_while=PublishWhile(None, None))
+    cell = Cell(read)
+    cell.run(3.0)
+    assert len(cell.bench.listener.reads) > 20
+    cell.plc.processor.setting = Setting.PROGRAM
+    cell.run(1.0)
+    since = cell.now
+    point = cell.bench.driver.points[read]
+    cell.run(2.0)
+    assert [when for when in cell.bench.listener.times(read) if when >= since] == []
+    assert point.freshness(cell.now) is Freshness.WITHHELD
+    assert point.withheld.startswith('not in RUN: it is in ')
+    assert cell.bench.listener.reasons[-1][1].startswith('withheld: not in RUN')
+    cell.plc.processor.setting = Setting.RUN
+    cell.run(2.0)
+    assert point.freshness(cell.now) is Freshness.FRESH
+
+
+def test_rule_13_initially_run_is_not_believed() -> None:
+    read = make_mapping('N11:0', period=100, publish_while=PublishWhile(None, None))
+    cell = Cell(read)
+    cell.plc.processor.setting = Setting.PROGRAM
+    cell.run(5.0)
+    assert cell.bench.listener.reads == []
+
+
+def counter_cell() -> tuple[Cell, Mapping]:
+    """Return a cell whose rows depend on a counter, which stands still."""
+    counter = make_mapping('N11:3', tag='alive', period=100)
+    read = make_mapping('N7:0', period=100, publish_while=PublishWhile('alive', 500))
+    return Cell(counter, read), read
+
+
+def count(cell: Cell, times: int, gap: float = 0.15) -> None:
+    """Let the PLC's program count."""
+    for number in range(times):
+        cell.bench.at(cell.now + number * gap,
+                      lambda number=number: store(cell.plc, 'N11:3', [number + 1]))  # type: ignore
+
+
+def test_rule_14_counter_has_to_change_twice_before_anything_is_published() -> None:
+    cell, read = counter_cell()
+    cell.run(3.0)
+    assert cell.bench.listener.times(read) == []
+    begun = cell.now
+    count(cell, 20)
+    cell.run(3.0)
+    times = cell.bench.listener.times(read)
+    assert times[0] > begun + 0.15
+    assert cell.bench.driver.points[read].freshness(cell.now) is Freshness.FRESH
+    ended = cell.now
+    cell.run(3.0)
+    times = cell.bench.listener.times(read)
+    assert ended < times[-1] < ended + 0.65
+    assert cell.bench.driver.points[read].withheld == 'alive has not changed twice within 0.5 s'
+
+
+def test_rule_14_one_change_is_no_life() -> None:
+    cell, read = counter_cell()
+    cell.run(1.0)
+    for _ in range(5):
+        store(cell.plc, 'N11:3', [int(cell.now * 10)])
+        cell.run(2.0)
+    assert cell.bench.listener.times(read) == []
+
+
+def test_rule_15_withholding_is_counted_and_told_once_a_cause() -> None:
+    cell, read = counter_cell()
+    for _ in range(3):
+        count(cell, 5)
+        cell.run(3.0)
+    point = cell.bench.driver.points[read]
+    assert point.withholdings == 4
+    assert len([reason for _, reason in cell.bench.listener.reasons
+                if reason.startswith('withheld')]) == 4
+
+
+def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
+    speed = speed_row()
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(0.1)
+    cell.refused = {'N7:0'}
+    cell.run(4.0)
+    cell.refused = set()
+    cell.run(3.0)
+    assert cell.results().count(TIMEOUT) == 1
+    result = cell.bench.listener.results[-1]
+    assert (result.outcome, result.value) == (Outcome.FALLBACK, '[7]')
+    assert result.latency > 3.0
+
+
+def test_rule_18_read_only_writes_nothing() -> None:
+    cell = Cell(beat_row(), speed_row(), read_only=True)
+    cell.run(3.0)
+    assert cell.writes == []
+    assert cell.bench.driver.interlocks.is_over
