@@ -15,8 +15,8 @@
 """
 The engine under every link procedure: bytes and a clock value in, bytes and a deadline out.
 
-A procedure is a generator with one effect. ``symbol = yield Step(frame, timeout)`` means "put
-this frame on the line, then give me the next symbol, or None when the time is up". What the
+A procedure is a generator with one effect. ``heard = yield Step(frame, timeout)`` means "put
+this frame on the line, then give me the next symbol, or a Silence when the time is up". What the
 manual writes as a program is written here as the same program, and composed with ``yield
 from``. The machine alone knows of TX_Delay and of the time that characters take.
 
@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 import math
-from typing import NamedTuple, Protocol
+from typing import cast, NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
@@ -54,13 +54,36 @@ class Step(NamedTuple):
     last byte has left (0: do not wait, None: no limit, KEEP: what is left of the time of the
     last step). ``delay`` seconds pass before the frame goes out, and TX_Delay at least, unless it
     is AT_ONCE. After ``expires`` (clock value in s) it does not go out any more: CommandExpired is
-    raised at the ``yield``.
+    raised at the ``yield``. ``reply_size`` is the bytes after the header of the reply that is
+    expected, if that tells no error; 0 where it is not known. ``is_echoed`` says that the line
+    gives back what is sent from now on, as two-wire adapters do; that ends by itself when a
+    time-out shows an echo missing.
     """
 
     frame: bytes | None
     timeout: float | None
     delay: float = 0.0
     expires: float = math.inf
+    reply_size: int = 0
+    is_echoed: bool = False
+
+
+class Silence(NamedTuple):
+    """
+    What was heard when the time of a step was up: no symbol.
+
+    ``last_byte`` is the last byte that was heard, 0 for none (where a transmission forgets what
+    was before it: since the last one). ``is_broken_off`` tells that a message had begun. The
+    line has been quiet for ``seconds``.
+    """
+
+    last_byte: int = 0
+    is_broken_off: bool = False
+    seconds: float = math.inf
+
+
+# After a step that was not to wait.
+_NOTHING = Silence()
 
 
 # What an operating system or a device server may hold bytes of a frame back (s).
@@ -82,7 +105,8 @@ KEEP = -1.0
 AT_ONCE = -1.0
 LISTEN_ON = Step(b'', KEEP)
 
-Procedure = Generator[Step, Symbol | None, None]
+Heard = Symbol | Silence
+Procedure = Generator[Step, Heard, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +157,7 @@ class Machine:
     ``send_at_once`` where that is set, so that it is on the line while the reply is made use of.
     All others come from ``data_to_send``.
 
-    ``reply_size`` is the bytes behind the header of the reply that is waited for, if it tells no
-    error; 0 where that is not known. ``unsent`` asks the port how many bytes have still to leave,
+    ``unsent`` asks the port how many bytes have still to leave,
     as far as it can tell; ``position`` counts the bytes given out so far. ``rate`` is what the
     line has shown of its speed. ``late`` is the sum of the seconds by which it was called after a
     deadline of its procedure: so long this process, or its host, has not run.
@@ -149,7 +172,6 @@ class Machine:
         self.deadline: float | None = None
         self.send_at_once: Callable[[bytes], None] | None = None
         self.unsent: Callable[[], int] = lambda: 0
-        self.reply_size = 0
         self.background: Background | None = None
         self.late = 0.0
         self.position = 0
@@ -165,7 +187,8 @@ class Machine:
         self._kept_deadline: float | None = None
         self._resting = False
         self._line_free = -math.inf
-        self.last_heard = -math.inf
+        self._reply_size = 0
+        self._last_heard = -math.inf
         self._echoes = False
         self._echo_due = 0
         self._due = -math.inf  # the deadline, before a message was heard out
@@ -209,13 +232,13 @@ class Machine:
 
         To read it in one go spares most of the wakings that its bytes cost, a few at a time.
         """
-        if not self.reply_size or not self.decoder.in_message:
+        if not self._reply_size or not self.decoder.in_message:
             return 0.0
         data = self.decoder.link_data
         is_faster = self.now - self._line_free < len(data) * self._timing.char_time
         if is_faster or not begins_good_reply(data):
             return 0.0  # it is no line of that speed, such as a simulator's; or no such reply
-        missing = HEADER_SIZE + self.reply_size - len(data) - _LAST_CHARACTERS
+        missing = HEADER_SIZE + self._reply_size - len(data) - _LAST_CHARACTERS
         return max(missing, 0) * self._timing.char_time
 
     def start(self, now: float) -> None:
@@ -258,9 +281,9 @@ class Machine:
         if self._forget_on_send and (self._out or not is_listening):
             return  # it was said before what it would have to answer
         is_idle = self._resting or self.deadline is None
-        if is_idle and is_listening and now - self.last_heard > self._pause_limit:
+        if is_idle and is_listening and now - self._last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
-        self.last_heard = now
+        self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
         if self.decoder.in_message:
@@ -291,17 +314,9 @@ class Machine:
             self._transmit(self._pending)
         else:
             self._echoes = self._echoes and not self._echo_due
-            self._resume(None)
+            decoder = self.decoder
+            self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
-
-    def expect_echo(self) -> None:
-        """
-        Drop as many characters as are sent from now on: the line gives them back.
-
-        Two-wire adapters do that. It ends by itself when a time-out shows an echo missing.
-        """
-        if not self._echoes:
-            self._echoes, self._echo_due = True, 0
 
     def wake(self, now: float) -> None:
         """End a rest early: there may be something new to do."""
@@ -309,7 +324,7 @@ class Machine:
         if self.background is not None and self._procedure is not None:
             self.background.expire(now)
         if self._resting:
-            self._resume(None)
+            self._resume(_NOTHING)
             self._deliver_symbols()
 
     def data_to_send(self) -> bytes:
@@ -353,16 +368,17 @@ class Machine:
         left = self.now + here * self._timing.char_time
         self._line_free = min(self._line_free, left)
 
-    def _resume(self, symbol: Symbol | None, error: CommandExpired | None = None) -> None:
-        """Run the procedure up to a step that has to wait."""
+    def _resume(self, heard: Heard | None, error: CommandExpired | None = None) -> None:
+        """Run the procedure up to a step that has to wait; None starts it."""
         procedure = self._procedure
         while procedure is not None:
             try:
-                step = procedure.throw(error) if error else procedure.send(symbol)
+                # None is what a generator is started with, and no procedure sees it.
+                step = procedure.throw(error) if error else procedure.send(cast(Heard, heard))
             except StopIteration:
                 self._procedure, self.deadline = None, None
                 return
-            symbol, error = None, None
+            heard, error = _NOTHING, None
             if self.now > step.expires:
                 error = CommandExpired()
             elif not self._take_step(step):
@@ -371,8 +387,10 @@ class Machine:
     def _take_step(self, step: Step) -> bool:
         """Carry out a step; return whether the procedure goes on at once."""
         self._resting = step.frame is None
+        if step.is_echoed and not self._echoes:
+            self._echoes, self._echo_due = True, 0
         if self._resting:
-            self._set_deadline(step.timeout, self.now)
+            self._set_deadline(step, self.now)
             return False
         delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
         if delay and step.delay != AT_ONCE:
@@ -392,7 +410,7 @@ class Machine:
             self._echo_due += size
             if self._forget_on_send:
                 self.decoder.reset()
-        self._set_deadline(step.timeout, free)
+        self._set_deadline(step, free)
         if step.timeout != 0:
             if step.frame:
                 self.rate.sent(len(step.frame), self._heard_with_sent, self.now)
@@ -404,12 +422,13 @@ class Machine:
     def _transmit(self, step: Step) -> None:
         self._pending, self.deadline = None, self._kept_deadline
         if self.now > step.expires:
-            self._resume(None, CommandExpired())
+            self._resume(_NOTHING, CommandExpired())
         elif self._put_on_line(step):
-            self._resume(None)
+            self._resume(_NOTHING)
 
-    def _set_deadline(self, timeout: float | None, start: float) -> None:
-        if timeout == KEEP:
+    def _set_deadline(self, step: Step, start: float) -> None:
+        if step.timeout == KEEP:
             return
-        self._due = start + (timeout or 0.0)
-        self.deadline = None if timeout is None else self._due
+        self._reply_size = step.reply_size
+        self._due = start + (step.timeout or 0.0)
+        self.deadline = None if step.timeout is None else self._due

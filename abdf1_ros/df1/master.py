@@ -41,8 +41,8 @@ from collections.abc import Callable, Generator
 import math
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.frames import Frame, Symbol
-from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.frames import Frame
+from abdf1_ros.df1.machine import Heard, Machine, Procedure, Step
 from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, Talk
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
@@ -99,7 +99,7 @@ class HalfDuplexMaster:
             task.reply(reply)
 
     def exchange(self, command: Packet, reply_size: int = 0, expires: float = math.inf
-                 ) -> Generator[Step, Symbol | None, Packet]:
+                 ) -> Generator[Step, Heard, Packet]:
         """
         Send ``command`` and return the reply to it.
 
@@ -138,7 +138,7 @@ class HalfDuplexMaster:
         self._line.take_unwanted(packet.dst, reply)
 
     def _collect(self, number: int, command: Packet, started: float,
-                 reply_size: int = 0) -> Generator[Step, Symbol | None, Packet]:
+                 reply_size: int = 0) -> Generator[Step, Heard, Packet]:
         """Poll until the reply to ``command`` is here (S0, "Network Reads"; M 3-13..3-15)."""
         pause, passed_over = 0.0, 0
         while True:

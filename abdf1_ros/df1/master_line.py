@@ -34,8 +34,8 @@ from typing import NoReturn, TypeGuard
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
-from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Symbol, Unknown
-from abdf1_ros.df1.machine import LISTEN_ON, Machine, Step
+from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Unknown
+from abdf1_ros.df1.machine import Heard, LISTEN_ON, Machine, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
@@ -65,8 +65,13 @@ MOST_QUEUED = 8
 _OTHERS_SHARE = 7
 
 # What answers a message and a poll, but for the frames that answer a poll too.
+_LISTEN_ON_ECHOED = LISTEN_ON._replace(is_echoed=True)
+
 _MESSAGE_ANSWERS = (Code.ACK, Code.NAK)
 _POLL_ANSWERS = (Code.EOT, Code.NAK)
+
+# Less time (s) than this is none: no wait ends so exactly.
+_MOMENT = 0.0001
 
 # So many characters, and what the equipment may hold back, make a pause after a message that has
 # broken off.
@@ -76,7 +81,7 @@ _ACK, _NAK, _EOT = Control(Code.ACK), Control(Code.NAK), Control(Code.EOT)
 
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
-Talk = Generator[Step, Symbol | None, None]
+Talk = Generator[Step, Heard, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +131,7 @@ class MasterLine:
         self._next_probe = 0.0
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf
-                ) -> Generator[Step, Symbol | None, float]:
+                ) -> Generator[Step, Heard, float]:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
@@ -143,7 +148,8 @@ class MasterLine:
             self.counters.messages_sent += 1
             begun = self.machine.now
             try:
-                answer = yield from self._ask(frame, number, _MESSAGE_ANSWERS, 0.0, expires)
+                answer = yield from self._ask(
+                    Step(frame, self._timeout, expires=expires), number, _MESSAGE_ANSWERS)
             except CommandExpired as error:
                 self.counters.messages_sent -= 1
                 error.sent = retry > 1
@@ -159,7 +165,7 @@ class MasterLine:
         self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
         self.fail_inactive(number)
 
-    def _note_cause(self, answer: Symbol | None, number: int, expected: Message) -> Message:
+    def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
         """Note why something has to be sent again, at worst what was ``expected``; return it."""
         if answer == _NAK:
             self.note(Message.NTC_RCVD_NAK_SYMBOL, station=number)
@@ -184,15 +190,15 @@ class MasterLine:
             if packet is not None:
                 self.take_unwanted(number, packet)
 
-    def probe(self, number: int) -> Generator[Step, Symbol | None, Symbol | None]:
+    def probe(self, number: int) -> Generator[Step, Heard, Heard]:
         """Poll an inactive station; of what is heard nothing is lost, but silence is no news."""
         answer = yield from self.poll(number)
-        if not is_good(answer) and (answer is not None or self._last_code):
+        if not is_good(answer) and (not isinstance(answer, Silence) or self._last_code):
             self._note_cause(answer, number, Message.NTC_EOT_STX_EXPECTED)
         return answer
 
     def poll_with_retries(self, number: int, pause: float, reply_size: int = 0
-                          ) -> Generator[Step, Symbol | None, Control | Frame]:
+                          ) -> Generator[Step, Heard, Control | Frame]:
         """
         Poll until EOT or a good message; a station that gives neither becomes inactive.
 
@@ -212,28 +218,28 @@ class MasterLine:
         self.fail_inactive(number)
 
     def poll(self, number: int, pause: float = 0.0,
-             reply_size: int = 0) -> Generator[Step, Symbol | None, Symbol | None]:
-        """Poll once; return EOT, NAK, a frame good or bad, or None for silence."""
-        self.machine.reply_size = reply_size
+             reply_size: int = 0) -> Generator[Step, Heard, Heard]:
+        """Poll once; return EOT, NAK, a frame good or bad, or silence."""
         self.counters.polls_sent += 1
-        answer = yield from self._ask(frames.poll_frame(number), number, _POLL_ANSWERS, pause)
+        answer = yield from self._ask(
+            Step(frames.poll_frame(number), self._timeout, pause, reply_size=reply_size), number,
+            _POLL_ANSWERS)
         if is_good(answer):
             self.stations.heard(number, self.machine.now)
         return answer
 
-    def _ask(self, frame: bytes, number: int, wanted: tuple[Code, ...],
-             delay: float = 0.0, expires: float = math.inf
-             ) -> Generator[Step, Symbol | None, Symbol | None]:
+    def _ask(self, question: Step, number: int,
+             wanted: tuple[Code, ...]) -> Generator[Step, Heard, Heard]:
         """
-        Send ``frame``; return a ``wanted`` control symbol, a frame of this station, or None.
+        Send a question; return a ``wanted`` control symbol, a frame of this station, or silence.
 
         Other symbols are counted and passed over while the time runs: noise, an answer that
         comes late, or our own frame coming back from a two-wire adapter. Such an echo is
         expected from then on, or that of our ACK would be taken for the next station's.
         """
         self._last_code = 0
-        step = Step(frame, self._timeout, delay, expires)
-        while (symbol := (yield step)) is not None:
+        step = question
+        while not isinstance(symbol := (yield step), Silence):
             step = LISTEN_ON
             if isinstance(symbol, Control):
                 self._count_control(symbol.code)
@@ -250,15 +256,15 @@ class MasterLine:
                     return (yield from self._hear_rest(symbol, number))
                 if symbol.fault is not None or not self._take_late(number, symbol):
                     return symbol
-            elif self._is_echo(symbol, frame):
-                self.machine.expect_echo()
-        if self.machine.decoder.in_message:
+            elif self._is_echo(symbol, question.frame):
+                step = _LISTEN_ON_ECHOED
+        if symbol.is_broken_off:
             return Frame(b'', fault=Fault.NO_ETX)
-        self._last_code = self._last_code or self.machine.decoder.last_byte
-        return None
+        self._last_code = self._last_code or symbol.last_byte
+        return symbol
 
     def _hear_rest(self, broken: Frame,
-                   number: int) -> Generator[Step, Symbol | None, Frame]:
+                   number: int) -> Generator[Step, Heard, Frame]:
         """
         Listen until the line is quiet; return the good frame that follows, or else ``broken``.
 
@@ -267,8 +273,11 @@ class MasterLine:
         """
         quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * self.machine.char_time
         end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.char_time
-        while (left := min(self.machine.last_heard + quiet, end) - self.machine.now) > 0:
+        left = quiet
+        while left > _MOMENT:
             symbol = yield Step(b'', left)
+            heard = symbol.seconds if isinstance(symbol, Silence) else 0.0
+            left = min(quiet - heard, end - self.machine.now)
             if isinstance(symbol, Unknown) and not symbol.is_misplaced:
                 self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
             elif isinstance(symbol, Frame) and symbol.station is None and symbol.fault is None:
@@ -299,7 +308,7 @@ class MasterLine:
         """Tell whether a message of ``src`` may come from station ``number`` of this line."""
         return self.stations.via(src) == number
 
-    def _is_echo(self, symbol: Frame | Poll, frame: bytes) -> bool:
+    def _is_echo(self, symbol: Frame | Poll, frame: bytes | None) -> bool:
         """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
         if isinstance(symbol, Poll):
             return frames.poll_frame(symbol.station) == frame
@@ -308,7 +317,7 @@ class MasterLine:
             symbol.station, symbol.data, self.settings.checksum) == frame
 
     def receive(self, number: int,
-                frame: Frame) -> Generator[Step, Symbol | None, Packet | None]:
+                frame: Frame) -> Generator[Step, Heard, Packet | None]:
         """
         Acknowledge a good message; return it, or None when it is a repetition.
 
@@ -381,7 +390,7 @@ class MasterLine:
         self._report(wrong_message(packet, number))
 
     def forward(self, busy: Container[int] = ()
-                ) -> Generator[Step, Symbol | None, Packet | None]:
+                ) -> Generator[Step, Heard, Packet | None]:
         """
         Deliver one message to be passed on, not to a ``busy`` station; return it if delivered.
 
@@ -466,6 +475,6 @@ class MasterLine:
         self._report(Event(message, args, station))
 
 
-def is_good(answer: Symbol | None) -> TypeGuard[Control | Frame]:
+def is_good(answer: Heard) -> TypeGuard[Control | Frame]:
     """Tell whether a poll was answered properly: with EOT or a good message."""
     return answer == _EOT or (isinstance(answer, Frame) and answer.fault is None)

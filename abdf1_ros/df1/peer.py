@@ -52,7 +52,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
-from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.machine import Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
@@ -85,7 +85,7 @@ _ENQ_LIMIT = 3
 # How often (s) a look is taken at what has become overdue while a response is waited for.
 _TICK = 0.25
 
-Hearing = Generator[Step, Symbol | None, None]
+Hearing = Generator[Step, Heard, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ class FullDuplexPeer:
             if self._replies:
                 continue
             symbol = yield Step(None, self._idle_time(source))
-            if symbol is not None:
+            if not isinstance(symbol, Silence):
                 yield Step(self._hear(symbol), 0)
 
     def _forget(self) -> None:
@@ -224,7 +224,7 @@ class FullDuplexPeer:
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
                   is_probe: bool, expires: float = math.inf
-                  ) -> Generator[Step, Symbol | None, float | None]:
+                  ) -> Generator[Step, Heard, float | None]:
         """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
         station = packet.dst
@@ -276,40 +276,48 @@ class FullDuplexPeer:
         return delivered
 
     def _response(self, sending: bytes, is_answered: Callable[[], bool],
-                  expires: float) -> Generator[Step, Symbol | None, Code | None]:
+                  expires: float) -> Generator[Step, Heard, Code | None]:
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
         machine = self._machine
-        machine.decoder.last_byte = 0
+        last_byte, begun = 0, machine.now
         symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires)
         end, position = machine.free_at + self._timeout, machine.position
-        while symbol is not None or self._left(end) > 0:
+        while not isinstance(symbol, Silence) or self._left(end) > 0:
             answer = b''
             if symbol in (Control(Code.ACK), Control(Code.NAK)) and machine.has_left(position):
                 assert isinstance(symbol, Control)
                 self._count_response(symbol.code)
                 return symbol.code
-            if symbol is not None:
+            if isinstance(symbol, Silence):
+                last_byte = self._heard_since(begun, symbol) or last_byte
+            else:
                 answer = self._hear(symbol)
             if is_answered():
                 yield Step(answer, 0)
                 return Code.STX
             symbol = yield from self._next(answer, end)
-        self._note(Message.NTC_ACK_EXPECTED, machine.decoder.last_byte, station=None)
+        self._note(Message.NTC_ACK_EXPECTED, self._heard_since(begun, symbol) or last_byte,
+                   station=None)
         return None
+
+    def _heard_since(self, begun: float, silence: Silence) -> int:
+        """Return the last byte that was heard since a moment, 0 for none."""
+        return silence.last_byte if self._machine.now - silence.seconds > begun else 0
 
     def _listen(self, seconds: float = _LATE_RESPONSE) -> Hearing:
         """Only receive for a while; responses that come now belong to nothing."""
         end = max(self._machine.now, self._machine.free_at) + seconds
         symbol = yield from self._next(b'', end)
-        while symbol is not None or self._left(end) > 0:
-            symbol = yield from self._next(self._hear(symbol) if symbol else b'', end)
+        while not isinstance(symbol, Silence) or self._left(end) > 0:
+            answer = b'' if isinstance(symbol, Silence) else self._hear(symbol)
+            symbol = yield from self._next(answer, end)
 
     def _left(self, end: float) -> float:
         """Return the seconds up to ``end`` in which nothing of ours is on the line."""
         return end - max(self._machine.now, self._machine.free_at)
 
     def _next(self, answer: bytes,
-              end: float) -> Generator[Step, Symbol | None, Symbol | None]:
+              end: float) -> Generator[Step, Heard, Heard]:
         """Send an answer, then return the next symbol up to ``end``, or up to the next tick."""
         self._expire()
         left = self._left(end)
@@ -317,7 +325,7 @@ class FullDuplexPeer:
             return (yield Step(answer, min(left, _TICK)))
         if answer:
             yield Step(answer, 0)
-        return None
+        return Silence()
 
     def _hear(self, symbol: Symbol) -> bytes:
         """Return what the receiver answers to a symbol (M 4-7..4-9)."""

@@ -32,7 +32,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol, Unknown
-from abdf1_ros.df1.machine import AT_ONCE, Machine, Procedure, Step
+from abdf1_ros.df1.machine import AT_ONCE, Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.replies import wrong_message
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
@@ -257,7 +257,7 @@ class Station(Protocol):
 
 
 def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
-           look: Callable[[], None] = lambda: None) -> Generator[Step, Symbol | None, None]:
+           look: Callable[[], None] = lambda: None) -> Generator[Step, Heard, None]:
     """
     Send what ``handle`` answers to ``symbol``, after TX_Delay; meanwhile ``look`` now and then.
 
@@ -281,12 +281,13 @@ def _wants_answer(symbol: Symbol) -> bool:
 
 
 def _next_within(machine: Machine, seconds: float,
-                 look: Callable[[], None]) -> Generator[Step, Symbol | None, Symbol | None]:
+                 look: Callable[[], None]) -> Generator[Step, Heard, Symbol | None]:
     """Return what is heard next, if it has been heard already or comes within ``seconds``."""
     end = machine.now + seconds
     symbol = machine.decoder.next_symbol()
     while symbol is None and (left := end - machine.now) > 0:
-        symbol = yield Step(None, min(left, TICK))
+        heard = yield Step(None, min(left, TICK))
+        symbol = None if isinstance(heard, Silence) else heard
         look()
     return symbol
 
@@ -299,6 +300,6 @@ def multidrop(stations: Sequence[Station]) -> Callable[[Machine], Procedure]:
     def listen(machine: Machine) -> Procedure:
         while True:
             symbol = yield Step(None, None)
-            if symbol is not None:
+            if not isinstance(symbol, Silence):
                 yield from answer(machine, symbol, handle)
     return listen

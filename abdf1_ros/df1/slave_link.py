@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.machine import Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
@@ -81,7 +81,7 @@ class SlaveLink:
         while True:
             # Not afresh after each symbol: the line may never be still.
             symbol = yield Step(None, max(0.0, next_look - self._machine.now))
-            if symbol is not None:
+            if not isinstance(symbol, Silence):
                 yield from answer(
                     self._machine, symbol, self._slave.handle, lambda: self._look_after(source))
             if self._machine.now >= next_look:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+import math
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
@@ -33,7 +34,16 @@ from abdf1_ros.df1.frames import (
     STX,
     Symbol,
 )
-from abdf1_ros.df1.machine import KEEP, LineTiming, LISTEN_ON, Machine, Procedure, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    KEEP,
+    LineTiming,
+    LISTEN_ON,
+    Machine,
+    Procedure,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandExpired
 import pytest
@@ -59,7 +69,8 @@ class Bench:
         assert machine is self.machine
         try:
             for step in self._steps:
-                self.got.append((yield step))
+                heard = yield step
+                self.got.append(None if isinstance(heard, Silence) else heard)
         except OSError as error:
             self.error = error
             raise
@@ -295,9 +306,9 @@ REPLY = Packet(1, 5, 0x0F, 0, 7).reply(bytes(94))  # with DLE STX, 102 bytes bef
     (8, 78), (28, 58), (85, 1), (86, 0), (101, 0)])
 def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
         size: int, characters: int) -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench = Bench(Step(FRAME, 1.0, reply_size=94), Step(FRAME, 1.0),
+                  timing=LineTiming(char_time=0.01))
     bench.machine.start(0.0)
-    bench.machine.reply_size = 94
     frame = message_frame(REPLY.encode(), Checksum.CRC)
     bench.machine.receive_data(frame[:size], 0.1 + 0.01 * size)  # as fast as the line goes
     assert bench.machine.spare_time == pytest.approx(0.01 * characters)
@@ -307,9 +318,8 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
 
 
 def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench = Bench(Step(FRAME, 1.0, reply_size=94), timing=LineTiming(char_time=0.01))
     bench.machine.start(0.0)
-    bench.machine.reply_size = 94
     bench.machine.receive_data(message_frame(REPLY.encode(), Checksum.CRC)[:20], 0.2)
     assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
@@ -320,12 +330,30 @@ def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
     (replace(REPLY, sts=0x10), 94),  # an error comes without data
     (replace(REPLY, cmd=0x0F), 94)])  # a command of the station's own
 def test_any_other_message_is_heard_as_it_comes(packet: Packet, reply_size: int) -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench = Bench(Step(FRAME, 1.0, reply_size=reply_size), timing=LineTiming(char_time=0.01))
     bench.machine.start(0.0)
-    bench.machine.reply_size = reply_size
     bench.machine.receive_data(message_frame(packet.encode(), Checksum.CRC)[:20], 0.5)
     assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
+
+
+def test_silence_tells_what_was_heard_and_since_when() -> None:
+    heard: list[Heard] = []
+
+    def procedure(machine: Machine) -> Procedure:
+        for _ in range(3):
+            heard.append((yield Step(FRAME, 1.0)))
+
+    machine = Machine(procedure, checksum=Checksum.CRC, timing=LineTiming(char_time=0.01))
+    machine.start(0.0)
+    machine.handle_timeout(1.1)
+    machine.receive_data(b'\x55\x77', 1.5)
+    machine.handle_timeout(2.2)
+    machine.receive_data(STX, 3.25)
+    machine.handle_timeout(3.55)
+    assert [silence._replace(seconds=round(silence.seconds, 9)) for silence in heard
+            if isinstance(silence, Silence)] == [
+        Silence(0, False, math.inf), Silence(0x77, False, 0.7), Silence(0x02, True, 0.3)]
 
 
 def test_listen_on_keeps_the_deadline() -> None:

@@ -26,7 +26,7 @@ import time
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, Symbol
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
@@ -54,7 +54,8 @@ class Script:
         try:
             yield Step(READY, 0)
             for step in self._steps:
-                self.heard.put((yield step))
+                heard = yield step
+                self.heard.put(None if isinstance(heard, Silence) else heard)
         except BaseException as error:
             self.ended.put(error)
             raise
@@ -321,8 +322,7 @@ def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> 
 
 def _script_of_a_reply() -> tuple[Script, bytes]:
     """Return a script that waits for a reply of 100 bytes, and the frame of that."""
-    script = Script(Step(b'', PATIENCE), timing=LineTiming(char_time=0.001))
-    script.machine.reply_size = 100
+    script = Script(Step(b'', PATIENCE, reply_size=100), timing=LineTiming(char_time=0.001))
     packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(100))
     return script, message_frame(packet.encode(), Checksum.CRC)
 
