@@ -41,6 +41,7 @@ setup(
         (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
         (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
+        (f'share/{PACKAGE}/wireshark', ['wireshark/abdf1.lua']),
     ],
     zip_safe=False,
     install_requires=['setuptools', 'pyserial'],

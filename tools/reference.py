@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Write the generated parts of the documentation, each between its two markers.
+Write the generated parts of documentation and dissector, each between its two markers.
 
 Run it from the root as ``python -m tools.reference``, or as ``make docs``.
 """
@@ -28,7 +28,7 @@ import sys
 
 from abdf1_ros.messages import Severity
 
-from tools import drawing, tables
+from tools import dissector, drawing, tables
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = 'docs/reference'
@@ -37,6 +37,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ('README.md', 'addresses'): tables.addresses,
     ('CONTRIBUTING.md', 'rooms'): tables.rooms,
     ('docs/architecture.md', 'drawing'): drawing.mermaid,
+    ('wireshark/abdf1.lua', 'tables'): dissector.lua,
     ('docs/protocol/framing.md', 'symbols'): tables.symbols,
     ('docs/protocol/addresses.md', 'file-codes'): tables.file_codes,
     ('docs/protocol/statuses.md', 'statuses'): tables.statuses,
@@ -56,8 +57,9 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
 
 def find(text: str, name: str) -> re.Match[str]:
     """Return where the part is in ``text``, markers included; LookupError where it is not."""
-    match = re.search(rf'(<!-- generated: {name} -->\n).*?(<!-- end: {name} -->)', text,
-                      re.DOTALL)
+    # A comment of Markdown, or one of Lua.
+    match = re.search(rf'((?:<!)?-- generated: {name}(?: -->)?\n).*?((?:<!)?-- end: {name}\b)',
+                      text, re.DOTALL)
     if match is None:
         raise LookupError(f'there are no markers "generated: {name}" and "end: {name}"')
     return match

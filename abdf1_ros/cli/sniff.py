@@ -56,6 +56,7 @@ from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.sniffer.capture import Chunk
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
+from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.session import Session
 from abdf1_ros.sniffer.summary import Summary
@@ -81,6 +82,7 @@ examples:
   sniff line.cap.1 line.cap
   sniff --json line.cap | jq 'select(.latency_ms > 100)'
   sniff --summary --binary recorded.bin
+  sniff --pcapng line.pcapng line.cap        for Wireshark, with share/abdf1_ros/wireshark
   sniff --report line.zip line.cap --settings net.csv map.csv
 """
 
@@ -93,6 +95,7 @@ class _Output:
         self._session: Session | None = None
         self._summary = Summary(options.baud)
         self._bundle = _bundle(options)
+        self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
         self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
         self._shows_progress = sys.stderr.isatty() and (
@@ -117,6 +120,8 @@ class _Output:
     def take(self, chunk: Chunk, settings: dict[str, str]) -> None:
         """Print what a chunk says."""
         session = self.begin(settings)
+        if self._packets:
+            self._packets.begin(settings.get('begun', ''))
         self._summary.take(chunk)
         for entry in session.feed(chunk):
             self._print(entry)
@@ -136,6 +141,8 @@ class _Output:
         """Print what is left, then the summary."""
         for entry in self.begin({}).finish():
             self._print(entry)
+        if self._packets:
+            self._packets.close()
         self.sum_up()
         if self._bundle:
             self._write_bundle(self._bundle)
@@ -165,6 +172,8 @@ class _Output:
         self._summary.add(entry)
         if self._bundle:
             self._bundle.add(entry)
+        if self._packets:
+            self._packets.write(entry)
         if self._options.json and not self._options.summary:
             print(json_line(entry))
         elif not self._options.summary:
@@ -189,7 +198,11 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _decode(options: argparse.Namespace) -> int:
-    output = _Output(options)
+    try:
+        output = _Output(options)
+    except OSError as error:
+        print(f'sniff: --pcapng: {reason_of(options.pcapng, error)}', file=sys.stderr)
+        return EXIT_USAGE
     try:
         if options.files:
             return _decode_files(options, output)
@@ -229,6 +242,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--summary', action='store_true', help='print the summary only')
     parser.add_argument('--save', metavar='FILE',
                         help='also write what a port or a tap hears into a capture')
+    parser.add_argument('--pcapng', metavar='FILE',
+                        help='also write what is heard as packets, for Wireshark')
     parser.add_argument('--report', metavar='ZIP',
                         help='make a bundle of captures for a report: bytes, words, summary, '
                              'processors, versions')

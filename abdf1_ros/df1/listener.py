@@ -19,12 +19,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, EOT, Frame, FrameDecoder, MORE, Poll, Result, SOH, STX
+from abdf1_ros.df1.frames import (
+    Control,
+    Duplex,
+    ENQ,
+    EOT,
+    Frame,
+    FrameDecoder,
+    MORE,
+    Poll,
+    Result,
+    SOH,
+    STX,
+    Symbol,
+)
 
 # One in 256 wrong frames has what looks like a good BCC, so one alone proves nothing.
 _BCC_FRAMES = 2
 # So many frames in a row that are right with the other check only: the guess was wrong.
 _CONTRARY_FRAMES = 3
+# Bytes that are kept of what is no message, or one that does not end.
+_MOST_KEPT = 2048
 
 
 @dataclass(slots=True)
@@ -49,6 +64,8 @@ class ListeningDecoder(FrameDecoder):
     for CRC, two with a right BCC settle it for BCC. Until then a frame is given out when the
     byte after its BCC is there, which may be the second byte of a CRC. When three frames in a row
     would be right with the other check only, the guess was wrong and is changed.
+
+    ``wire`` is what stood on the line for the last symbol, without noise before it.
     """
 
     def __init__(self, kind: LineKind) -> None:
@@ -57,11 +74,51 @@ class ListeningDecoder(FrameDecoder):
         self._duplex_given = kind.duplex is not None
         self._bcc_frames = 0
         self._contrary_frames = 0
+        self.wire = b''
+        self._heard = bytearray()  # since the last symbol
 
     @property
     def checksum(self) -> Checksum:
         """Return the check that the last frame was read with."""
         return self._checksum
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes from the line."""
+        before = len(self._buffer)
+        super().feed(data)
+        self._heard += data[:max(0, len(self._buffer) - before)]
+        del self._heard[:-_MOST_KEPT - len(self._buffer)]
+
+    def reset(self) -> None:
+        """Forget everything heard so far."""
+        super().reset()
+        self._heard.clear()
+
+    def next_symbol(self) -> Symbol | None:
+        """Return the next whole symbol, or None when more bytes are needed."""
+        symbol = super().next_symbol()
+        if symbol is not None:
+            self._keep(symbol)
+        elif not self.in_message and self._step == self._idle:
+            del self._heard[:len(self._heard) - len(self._buffer)]
+        return symbol
+
+    def _keep(self, symbol: Symbol) -> None:
+        """Put into ``wire`` what has been taken for a symbol."""
+        taken = len(self._heard) - len(self._buffer)
+        heard = bytes(self._heard[:taken])
+        del self._heard[:taken]
+        if isinstance(symbol, Frame):
+            starts = (SOH, STX) if symbol.station is not None else (STX,)
+        elif isinstance(symbol, Poll):
+            starts = (ENQ,)
+        else:
+            self.wire = heard[-2:]
+            if isinstance(symbol, Control) and self.in_message:
+                self._heard[:0] = heard[:-2]  # a response inside a message (M 4-3)
+            return
+        start = next((at for pair in starts if (at := heard.find(pair)) >= 0), 0)
+        self.wire = heard[start:]
 
     def finish(self) -> Frame | None:
         """Return a frame that waits for a second check byte which will not come."""
@@ -71,6 +128,7 @@ class ListeningDecoder(FrameDecoder):
         self._checksum = Checksum.BCC
         result = super()._check()
         assert isinstance(result, Frame)
+        self._keep(result)
         return result
 
     def _begin(self, pair: bytes) -> Result:

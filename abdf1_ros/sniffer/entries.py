@@ -65,7 +65,8 @@ class Entry:
     ``time`` is seconds, None where the recording has no times. ``station`` is the slave, or
     on a full-duplex line the node that commands go to and replies come from. ``valid`` is the
     verdict of the check of kind ``checksum``, None for what has none. ``latency`` is the
-    seconds from a command to its reply. ``size`` counts the bytes of noise.
+    seconds from a command to its reply. ``size`` counts the bytes of noise. ``wire`` is what
+    stood on the line, empty for what nobody said, and for noise.
     """
 
     time: float | None
@@ -79,3 +80,4 @@ class Entry:
     latency: float | None = None
     marks: tuple[Mark, ...] = ()
     size: int = 0
+    wire: bytes = b''

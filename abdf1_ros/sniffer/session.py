@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Duplex, Fault, Frame, Poll, Symbol, Unknown
@@ -92,7 +93,7 @@ class Session:
             wire.feed(chunk._replace(data=chunk.data[start:start + _PART]))
             while (symbol := wire.decoder.next_symbol()) is not None:
                 yield from self._noise(wire, chunk)
-                yield from self._entries(symbol, chunk, wire.decoder.checksum)
+                yield from self._entries(symbol, chunk, wire.decoder)
         for transaction in self._conversation.expired(chunk.time):
             yield self._unanswered(transaction, chunk.time)
 
@@ -104,7 +105,7 @@ class Session:
             wire.decoder.reset()
             yield from self._noise(wire, chunk)
             if symbol is not None:
-                yield from self._entries(symbol, chunk, wire.decoder.checksum)
+                yield from self._entries(symbol, chunk, wire.decoder)
         times = [wire.last_time for wire in self._wires.values() if wire.last_time is not None]
         for transaction in self._conversation.unanswered():
             yield self._unanswered(transaction, max(times, default=None))
@@ -121,17 +122,19 @@ class Session:
         return Entry(time, Direction.UNKNOWN, Kind.UNANSWERED,
                      f'{_route(command)}: {describe(command)}', command.dst, packet=command)
 
-    def _entries(self, symbol: Symbol, chunk: Chunk, checksum: Checksum) -> Iterator[Entry]:
+    def _entries(self, symbol: Symbol, chunk: Chunk,
+                 decoder: ListeningDecoder) -> Iterator[Entry]:
         direction = self._direction(symbol, chunk.direction)
         yield from self._silence(symbol, chunk.time, direction)
         if isinstance(symbol, Poll):
-            yield self._poll(symbol, chunk.time, direction)
+            entry = self._poll(symbol, chunk.time, direction)
         elif isinstance(symbol, Frame):
             if symbol.station is not None:
                 self._station = symbol.station
-            yield self._frame(symbol, chunk.time, direction, checksum)
+            entry = self._frame(symbol, chunk.time, direction, decoder.checksum)
         else:
-            yield self._control(symbol, chunk.time, direction)
+            entry = self._control(symbol, chunk.time, direction)
+        yield replace(entry, wire=decoder.wire)
 
     @property
     def _is_half(self) -> bool:

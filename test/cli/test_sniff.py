@@ -207,6 +207,12 @@ def test_missing_ports(capsys: Output, tmp_path: Path) -> None:
         capsys, '--port', 'pty', '--save', str(tmp_path))
 
 
+def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) -> None:
+    assert refused(capsys, '--pcapng', '/nowhere/x', capture).endswith(
+        'sniff: --pcapng: /nowhere/x: No such file or directory\n')
+    assert 'is there and is not pcapng' in refused(capsys, '--pcapng', capture, capture)
+
+
 @pytest.mark.parametrize('args', [
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
@@ -255,10 +261,11 @@ class Command:
 
 
 def test_tap_between_the_simulator_and_a_master(tmp_path: Path) -> None:
-    plc, tap, saved = (str(tmp_path / name) for name in ('plc', 'tap', 'saved'))
+    plc, tap, saved, packets = (str(tmp_path / name) for name in ('plc', 'tap', 'saved', 'pcapng'))
     with Command('simulator', '--pty', plc) as simulator:
         assert simulator.line(simulator.process.stdout).startswith('simulator: stations')
-        with Command('sniff', '--tap', f'pty:{tap}', plc, '--save', saved) as sniff:
+        with Command('sniff', '--tap', f'pty:{tap}', plc, '--save', saved,
+                     '--pcapng', packets) as sniff:
             assert sniff.line(sniff.process.stderr) == \
                 f'sniff: listening on {tap} and {plc}; Ctrl-C ends'
             line = os.open(tap, os.O_RDWR | os.O_NOCTTY)
@@ -278,9 +285,12 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path) -> None:
     assert (status, err) == (0, '')
     assert '  seen: 1 commands, 1 replies, 1 polls, 2 ACK' in out
     assert not os.path.lexists(tap)
-    again = subprocess.run([sys.executable, '-m', 'abdf1_ros', 'sniff', saved], text=True,
-                           capture_output=True, timeout=PATIENCE, check=True)
+    again = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros', 'sniff', saved, '--pcapng', f'{packets}2'], text=True,
+        capture_output=True, timeout=PATIENCE, check=True)
     assert again.stdout.splitlines()[:5] == live
+    for path in (packets, f'{packets}2'):  # but for microseconds that a capture rounds
+        assert all(entry in Path(path).read_bytes() for entry in (SAID[0], SAID[2], heard))
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
