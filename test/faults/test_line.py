@@ -25,11 +25,13 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 import pytest
+from support.fault_box import FaultBox
 from support.fault_rig import (
     boxed,
     is_unanswered,
     NO_ANSWER,
     NOT_SENT,
+    Rig,
     rigged,
     SETPOINT,
     UNKNOWN,
@@ -57,6 +59,8 @@ NOT_UNDERSTOOD = 'STS 10: illegal command, format or length, or the file does no
 
 US, OTHER_MASTER = 5, 6
 
+Boxed = tuple[Rig, FaultBox]
+
 
 @pytest.fixture(scope='module')
 def observer() -> Iterator[Observer]:
@@ -64,41 +68,54 @@ def observer() -> Iterator[Observer]:
         yield observer
 
 
+@pytest.fixture(scope='module')
+def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Boxed]:
+    with boxed(observer, tmp_path_factory.mktemp('line'), name='shared') as line:
+        yield line
+
+
+@pytest.fixture
+def line(shared: Boxed) -> Boxed:
+    """Return a rig that is well, with its box."""
+    shared[0].begin()
+    return shared
+
+
 @pytest.mark.parametrize('way', ['to_node', 'to_plc'])
-def test_only_one_direction_works(observer: Observer, tmp_path: Path, way: str) -> None:
-    with boxed(observer, tmp_path) as (rig, box):
-        setattr(box, way, False)
-        assert is_unanswered(rig.write(3.0))
-        rig.node.wait_for('[ERROR]', NO_ANSWER)
-        rig.status('link', ERROR, 'port open, but none of 2 stations answers')
-        rig.status('mappings', ERROR, '25 failed')
-        assert rig.write(4.0) == NOT_SENT + NO_ANSWER
-        setattr(box, way, True)
-        rig.recovers(3.0)
-        rig.node.wait_for('[INFO]', 'station 2 answers again')
-        assert rig.has_read_only(SETPOINT, 3.0)
+def test_only_one_direction_works(line: Boxed, way: str) -> None:
+    rig, box = line
+    setattr(box, way, False)
+    assert is_unanswered(rig.write(3.0))
+    rig.told('[ERROR]', NO_ANSWER)
+    rig.status('link', ERROR, 'port open, but none of 2 stations answers')
+    rig.status('mappings', ERROR, '25 failed')
+    assert rig.write(4.0) == NOT_SENT + NO_ANSWER
+    setattr(box, way, True)
+    rig.recovers(3.0)
+    rig.told('[INFO]', 'station 2 answers again')
+    assert rig.has_read_only(SETPOINT, 3.0)
 
 
-def test_adapter_begins_to_echo_and_ends(observer: Observer, tmp_path: Path) -> None:
-    with boxed(observer, tmp_path) as (rig, box):
-        for value, echoes in ((3.0, True), (4.0, False)):
-            box.echoes = echoes
-            rig.recovers(1.0)
-            assert rig.write(value) == 'written'
-            rig.setpoint.values([value])
-        assert 'ERROR' not in rig.node.text
+def test_adapter_begins_to_echo_and_ends(line: Boxed) -> None:
+    rig, box = line
+    for value, echoes in ((3.0, True), (4.0, False)):
+        box.echoes = echoes
+        rig.recovers(1.0)
+        assert rig.write(value) == 'written'
+        rig.setpoint.values([value])
+    assert 'ERROR' not in rig.said
 
 
-def test_line_babbles(observer: Observer, tmp_path: Path) -> None:
-    with boxed(observer, tmp_path) as (rig, box):
-        box.babbles = True
-        results = [rig.write(3.0 + number) for number in range(5)]
-        assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
-                   for text in results)
-        rig.node.wait_for('[INFO]', '2514 NTC_INVALID_SYMBOL')
-        box.babbles = False
-        rig.recovers(6.0)
-        assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
+def test_line_babbles(line: Boxed) -> None:
+    rig, box = line
+    box.babbles = True
+    results = [rig.write(3.0 + number) for number in range(5)]
+    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
+               for text in results)
+    rig.told('[INFO]', '2514 NTC_INVALID_SYMBOL')
+    box.babbles = False
+    rig.recovers(6.0)
+    assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 
 def foreign_traffic(random: Random) -> bytes:
@@ -112,48 +129,47 @@ def foreign_traffic(random: Random) -> bytes:
         *(frames.message_frame(reply, Checksum.CRC) for reply in replies)])
 
 
-def test_second_master_on_the_line(observer: Observer, tmp_path: Path) -> None:
-    with boxed(observer, tmp_path) as (rig, box):
-        random, said = Random(1), []
+def test_second_master_on_the_line(line: Boxed) -> None:
+    rig, box = line
+    random, said = Random(1), []
 
-        def talk(data: bytes) -> bytes:
-            if random.random() > 0.3:
-                return b''
-            said.append(foreign_traffic(random))
-            return said[-1]
-
-        box.overhear = talk
-        rig.node.wait_for('[ERROR]', '2510 ERR_WRONG_MESSAGE')
-        results = [rig.write(3.0 + number) for number in range(5)]
-        assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
-                   for text in results)
-        observer.until(lambda: len(said) > 100, 'more traffic')
-        assert 'unusable reply' not in rig.node.text  # no reply of others was taken for ours
-        assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
-        box.overhear = lambda data: b''
-        rig.recovers(6.0)  # after two late replies in a row a station is tried less often
-
-
-def test_plc_loses_power_in_the_middle_of_a_write(
-        observer: Observer, tmp_path: Path) -> None:
-    with boxed(observer, tmp_path) as (rig, box):
-        command = struct.pack('<f', 3.0)
-        sent: list[bytes] = []
-
-        def cut(data: bytes) -> bytes:
-            if sent:  # the poll for the reply, so the command was acknowledged
-                rig.kill_simulator()
-            elif command in data:
-                sent.append(data)
+    def talk(data: bytes) -> bytes:
+        if random.random() > 0.3:
             return b''
+        said.append(foreign_traffic(random))
+        return said[-1]
 
-        box.overhear = cut
-        assert rig.write(3.0).startswith(UNKNOWN + NO_ANSWER)
-        box.overhear = lambda data: b''
-        rig.status('link', ERROR, 'port open, but none of 2 stations answers')
-        rig.restart_simulator()
-        rig.recovers(3.0)
-        assert rig.has_read_only(SETPOINT)  # it is not written again
+    box.overhear = talk
+    rig.told('[ERROR]', '2510 ERR_WRONG_MESSAGE')
+    results = [rig.write(3.0 + number) for number in range(5)]
+    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
+               for text in results)
+    rig.observer.until(lambda: len(said) > 100, 'more traffic')
+    assert 'unusable reply' not in rig.said  # no reply of others was taken for ours
+    assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
+    box.overhear = lambda data: b''
+    rig.recovers(6.0)  # after two late replies in a row a station is tried less often
+
+
+def test_plc_loses_power_in_the_middle_of_a_write(line: Boxed) -> None:
+    rig, box = line
+    command = struct.pack('<f', 3.0)
+    sent: list[bytes] = []
+
+    def cut(data: bytes) -> bytes:
+        if sent:  # the poll for the reply, so the command was acknowledged
+            rig.kill_simulator()
+        elif command in data:
+            sent.append(data)
+        return b''
+
+    box.overhear = cut
+    assert rig.write(3.0).startswith(UNKNOWN + NO_ANSWER)
+    box.overhear = lambda data: b''
+    rig.status('link', ERROR, 'port open, but none of 2 stations answers')
+    rig.restart_simulator()
+    rig.recovers(3.0)
+    assert rig.has_read_only(SETPOINT)  # it is not written again
 
 
 def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
@@ -166,8 +182,9 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
         rig.diagnostics.clear()
         rig.simulator = Process('simulator', '--pty', str(rig.files.port), '--data',
                                 str(rig.files.simulator))
-        for name, processor in (('station 1', 'SLC '), ('station 2', 'PLC-5')):
-            until_status(rig.diagnostics, name, OK, lambda status, processor=processor: details(
+        for name, level, processor in (
+                ('station 1', WARN, 'SLC '), ('station 2', OK, 'PLC-5')):  # that knows SLC reads
+            until_status(rig.diagnostics, name, level, lambda status, processor=processor: details(
                 status)['processor'].startswith(processor))
         assert rig.write(3.0) == REFUSED + NOT_UNDERSTOOD
         rig.node.wait_for('[ERROR]', f'speeds (N7:0 at station 1): {NOT_UNDERSTOOD}')
@@ -184,30 +201,29 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
 @pytest.mark.parametrize('fault, text', [
     ('delay 2 300', 'written'),
     ('delay 2 3000', UNKNOWN + '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
-def test_station_is_slow(
-        observer: Observer, tmp_path: Path, fault: str, text: str) -> None:
-    with boxed(observer, tmp_path) as (rig, _):
-        rig.simulator.say(fault)
-        assert rig.write(3.0).startswith(text)
-        rig.status('mappings', ERROR)
-        rig.status('link', OK)  # it answers its polls
-        rig.speeds.next()  # the other goes on
-        rig.simulator.say('normal 2')
-        rig.recovers(6.0)  # a try takes Cmd_Timeout and leaves seven of them to the other
-        assert rig.has_read_only(SETPOINT, 3.0)
+def test_station_is_slow(line: Boxed, fault: str, text: str) -> None:
+    rig, _ = line
+    rig.simulator.say(fault)
+    assert rig.write(3.0).startswith(text)
+    rig.status('mappings', ERROR)
+    rig.status('link', OK)  # it answers its polls
+    rig.speeds.next()  # the other goes on
+    rig.simulator.say('normal 2')
+    rig.recovers(6.0)  # a try takes Cmd_Timeout and leaves seven of them to the other
+    assert rig.has_read_only(SETPOINT, 3.0)
 
 
-def test_sink_of_a_slave_is_full(observer: Observer, tmp_path: Path) -> None:
-    with boxed(observer, tmp_path) as (rig, _):
-        rig.simulator.say('full 2')
-        assert is_unanswered(rig.write(3.0))
-        rig.node.wait_for('[INFO]', '2519 NTC_NAK_LIMIT_EXCEEDED', '[station 2]')
-        rig.status('station 2', ERROR, 'inactive')
-        rig.status('link', WARN, '1 of 2 stations do not answer')
-        rig.speeds.next()  # the living go on
-        rig.simulator.say('normal 2')
-        rig.recovers(3.0)
-        assert rig.has_read_only(SETPOINT)
+def test_sink_of_a_slave_is_full(line: Boxed) -> None:
+    rig, _ = line
+    rig.simulator.say('full 2')
+    assert is_unanswered(rig.write(3.0))
+    rig.told('[INFO]', '2519 NTC_NAK_LIMIT_EXCEEDED', '[station 2]')
+    rig.status('station 2', ERROR, 'inactive')
+    rig.status('link', WARN, '1 of 2 stations do not answer')
+    rig.speeds.next()  # the living go on
+    rig.simulator.say('normal 2')
+    rig.recovers(3.0)
+    assert rig.has_read_only(SETPOINT)
 
 
 def test_sink_of_a_peer_is_full(observer: Observer, tmp_path: Path) -> None:

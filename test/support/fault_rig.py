@@ -62,6 +62,7 @@ class Rig:
     """Processes, and what is heard of the node."""
 
     observer: Observer
+    name: str  # of the node
     files: Files
     simulator: Process
     node: Process
@@ -70,6 +71,27 @@ class Rig:
     speeds: Inbox
     setpoint: Inbox
     publisher: Any = None
+    begun: int = 0  # so many lines the node had said when this test began
+
+    def begin(self) -> None:
+        """Begin a test where another may have ended: all is well, and as at the start."""
+        self.diagnostics.clear()
+        self.until_well()
+        assert self.write(SETPOINT) == 'written'
+        self.setpoint.clear()
+        self.setpoint.values([SETPOINT])
+        for inbox in (self.diagnostics, self.speeds, self.setpoint):
+            inbox.clear()
+        self.begun = len(self.node.lines)
+
+    @property
+    def said(self) -> str:
+        """Return what the node has said in this test."""
+        return '\n'.join(self.node.lines[self.begun:])
+
+    def told(self, *texts: str) -> str:
+        """Wait for a line of the node with these texts, said in this test; return it."""
+        return self.node.wait_for(*texts, after=self.begun)
 
     def until_well(self) -> None:
         """Wait until every mapping is read."""
@@ -98,7 +120,7 @@ class Rig:
         """Write the set point of station 2; return the text of the result."""
         if self.publisher is None:
             self.publisher = self.observer.publisher(
-                Float32MultiArray, '/abdf1/write/setpoint')
+                Float32MultiArray, f'/{self.name}/write/setpoint')
         self.results.clear()
         self.publisher.publish(Float32MultiArray(data=[value]))
         return str(self.results.first().message)
@@ -125,16 +147,21 @@ class Rig:
 
 @contextmanager
 def rigged(observer: Observer, files: Files, port: str, simulator: Process,
-           *assignments: str, program: str | Path = 'node') -> Iterator[Rig]:
-    """Run the node on ``port`` while the block runs, against a simulator that runs already."""
+           *assignments: str, program: str | Path = 'node',
+           name: str = 'abdf1') -> Iterator[Rig]:
+    """
+    Run the node on ``port`` while the block runs, against a simulator that runs already.
+
+    Two nodes at a time need different names.
+    """
     inboxes = {
-        'diagnostics': observer.diagnostics(port), 'results': observer.results(),
-        'speeds': observer.listen(Int16MultiArray, '/abdf1/read/speeds', EVERYTHING),
-        'setpoint': observer.listen(Float32MultiArray, '/abdf1/read/setpoint', EVERYTHING)}
+        'diagnostics': observer.diagnostics(port), 'results': observer.results(f'/{name}'),
+        'speeds': observer.listen(Int16MultiArray, f'/{name}/read/speeds', EVERYTHING),
+        'setpoint': observer.listen(Float32MultiArray, f'/{name}/read/setpoint', EVERYTHING)}
     arguments = ros_args(f'net_file:={files.net}', f'map_file:={files.map}', f'port:={port}',
                          OFTEN, *assignments)
-    with Process(program, *arguments) as node:
-        rig = Rig(observer, files, simulator, node, **inboxes)
+    with Process(program, *arguments, '-r', f'__node:={name}') as node:
+        rig = Rig(observer, name, files, simulator, node, **inboxes)
         try:
             yield rig
             rig.node.end()
@@ -147,12 +174,12 @@ def rigged(observer: Observer, files: Files, port: str, simulator: Process,
 
 
 @contextmanager
-def boxed(
-        observer: Observer, folder: Path, *assignments: str) -> Iterator[tuple[Rig, FaultBox]]:
+def boxed(observer: Observer, folder: Path, *assignments: str,
+          name: str = 'abdf1') -> Iterator[tuple[Rig, FaultBox]]:
     """Run simulator, box and node, all of them well when the block begins."""
     files = make_files(folder)
     simulator = files.start_simulator()
     with FaultBox(files.port, folder / 'line') as box, rigged(
-            observer, files, str(box.name), simulator, *assignments) as rig:
+            observer, files, str(box.name), simulator, *assignments, name=name) as rig:
         rig.until_well()
         yield rig, box
