@@ -159,9 +159,10 @@ class Planner:
     def _shortened(self, block: Block) -> list[Block]:
         words = max(request.words for request in block.requests)
         least = block.dialect.sure_read(block.start.file_type)
-        if words <= least:
+        limit = max(least, words // 2)
+        if words <= least or limit < _whole(block.mappings):
             return []
-        self._limits[block.place, block.span] = max(least, words // 2)
+        self._limits[block.place, block.span] = limit
         return [self._block(block.mappings, block.span)]
 
     def refuse(self, place: Place, span: Span) -> None:
@@ -221,8 +222,7 @@ class Planner:
         first = mappings[0]
         limit = min(_max_words(first), self._limits.get((_place(first), span), span.words))
         if span.words > limit:  # a long mapping: no packet ends within a value
-            limit -= limit % max(_per_element(first), *(
-                mapping.codec.element_words for mapping in mappings))
+            limit -= limit % _whole(mappings)
         requests = tuple(
             Request(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))
@@ -234,6 +234,11 @@ class Planner:
 
 def _place(mapping: Mapping) -> Place:
     return mapping.station, mapping.address.area, mapping.dialect
+
+
+def _whole(mappings: Sequence[Mapping]) -> int:
+    """Return the words of the longest value or element, which no packet may divide."""
+    return max(_per_element(mappings[0]), *(mapping.codec.element_words for mapping in mappings))
 
 
 def _max_words(mapping: Mapping) -> int:

@@ -364,6 +364,14 @@ def test_split_halves_a_block_until_all_its_mappings_are_the_same_words(
 # periods
 
 
+def test_string_that_is_refused_is_not_tried_in_packets_that_hold_no_string() -> None:
+    planner = Planner(LINE, 0.1)
+    for length, packets in ((1, []), (2, [42, 42])):
+        (block,) = planner.plan([make_mapping('ST9:1', plc='SLC', length=length)])
+        assert [request.words for half in planner.split(block)
+                for request in half.requests] == packets
+
+
 def test_slow_mapping_among_fast_ones_costs_nothing() -> None:
     fast = [make_mapping('N7:0', period=100), make_mapping('N7:9', period=100)]
     slow = make_mapping('N7:5', period=1000)
