@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from abdf1_ros.counters import Counters, numbered
 import pytest
-from support.vectors import load_json
+from support.vectors import load_tables
 
-SPECIFIED = [(number, name) for number, name in load_json('driver_tables.json')['counters']]
+SPECIFIED = [(number, name) for number, name in load_tables()['counters']]
 
 
 def test_exactly_the_specified_counters_exist_in_their_order() -> None:

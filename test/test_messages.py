@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from abdf1_ros.messages import Event, Message, Severity
 import pytest
-from support.vectors import load_json
+from support.vectors import load_tables
 
 SPECIFIED: list[tuple[int, str, str]] = [
-    tuple(row) for row in load_json('driver_tables.json')['messages']]
+    tuple(row) for row in load_tables()['messages']]
 
 
 def test_exactly_the_specified_messages_exist() -> None:

@@ -77,9 +77,9 @@ def decode(data: bytes, checksum: Checksum = CRC, duplex: Duplex = HALF,
 
 def expected_symbols(entry: Vector) -> list[Symbol]:
     """Return what a vector says about its frame."""
-    if entry.mode == 'control':
+    if entry.kind == 'symbol':
         return [Control(Code.EOT)]
-    if entry.mode == 'poll':
+    if entry.kind == 'poll':
         assert entry.station is not None
         return [Poll(entry.station, True)]
     received = int.from_bytes(entry.frame[-entry.checksum.size:], 'little')
@@ -104,7 +104,7 @@ def test_vector_decodes(entry: Vector, chunk: int | None) -> None:
     entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response],
     ids=lambda entry: entry.name)
 def test_vector_encodes(entry: Vector) -> None:
-    if entry.mode == 'half_duplex_master':
+    if entry.station is not None:
         assert entry.station is not None
         frame = master_frame(entry.station, entry.link_data, entry.checksum)
     else:
@@ -113,15 +113,16 @@ def test_vector_encodes(entry: Vector) -> None:
 
 
 @pytest.mark.parametrize(
-    'entry', [entry for entry in VECTORS if entry.mode == 'poll'], ids=lambda entry: entry.name)
+    'entry', [entry for entry in VECTORS if entry.kind == 'poll'], ids=lambda entry: entry.name)
 def test_poll_vector_encodes(entry: Vector) -> None:
     assert entry.station is not None
     assert poll_frame(entry.station) == entry.frame
 
 
 def test_vectors_cover_every_mode() -> None:
-    assert {entry.mode for entry in VECTORS} == {
-        'control', 'poll', 'half_duplex_master', 'half_duplex_slave', 'full_duplex'}
+    assert {(entry.kind, entry.duplex, entry.station is None) for entry in VECTORS} == {
+        ('symbol', HALF, True), ('poll', HALF, False), ('message', HALF, False),
+        ('message', HALF, True), ('message', FULL, True)}
     assert len(VECTORS) == 182
 
 

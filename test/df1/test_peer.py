@@ -21,7 +21,7 @@ from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, ENQ, EOT, ETX, MAX_LINK_DATA, message_frame, NAK, STX
+from abdf1_ros.df1.frames import ACK, Duplex, ENQ, EOT, ETX, MAX_LINK_DATA, message_frame, NAK, STX
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import MAX_WAITING_REPLIES, PeerSettings
@@ -949,7 +949,7 @@ def test_reply_is_sent_again_like_a_command_and_given_up_without_a_failure() -> 
 
 @pytest.mark.parametrize('entry', [
     entry for entry in MESSAGES
-    if entry.mode == 'full_duplex' and not entry.has_embedded_response],
+    if entry.duplex is Duplex.FULL and not entry.has_embedded_response],
     ids=lambda entry: entry.name)
 @pytest.mark.parametrize('chunk', [1, 3, 1000])
 def test_messages_of_the_vectors(entry: Vector, chunk: int) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What others and we have said to each other, said again: test/vectors/captures."""
+"""What others and we have said to each other, said again: vectors/captures."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Every command of every family, at both ends: the bytes of pccc_vectors.json.
+Every command of every family, at both ends: the bytes of vectors/exchanges.json.
 
-They begin at DST; frames around such bytes are those of df1_vectors.json.
+They begin at DST; frames around such bytes are those of vectors/frames.json.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ EXCHANGES = tuple(
         entry['name'], PlcType(entry['family']), entry['meaning'], _packet(entry['command']),
         _packet(entry['reply']), entry['before'], entry.get('after', entry['before']),
         _call(**entry['client']) if 'client' in entry else None)
-    for entry in load_json('pccc_vectors.json'))
+    for entry in load_json('exchanges.json')['exchanges'])
 CALLS = tuple(entry for entry in EXCHANGES if entry.call)
 
 

@@ -47,9 +47,9 @@ from support.ros import (
     WARN,
 )
 from support.simulator_process import make_files, READS, STATUSES, WRITES
-from support.vectors import load_json
+from support.vectors import load_tables
 
-COUNTERS = [name for _, name in load_json('driver_tables.json')['counters']]
+COUNTERS = [name for _, name in load_tables()['counters']]
 WORDS = {OK: 'OK: ', WARN: 'WARN: ', ERROR: 'ERROR: '}
 
 

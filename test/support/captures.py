@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The exchanges of our programs with others that were recorded: test/vectors/captures."""
+"""The exchanges of our programs with others that were recorded: vectors/captures."""
 
 from __future__ import annotations
 

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The recorded and computed frames of test/vectors, with types."""
+"""The frames of vectors/, with types, and the tables of the driver's specification."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 import json
 from pathlib import Path
@@ -25,22 +26,24 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import Packet
 
-VECTOR_FOLDER = Path(__file__).resolve().parent.parent / 'vectors'
+ROOT = Path(__file__).resolve().parents[2]
+VECTOR_FOLDER = ROOT / 'vectors'
 
 
 @dataclass(frozen=True, slots=True)
 class Vector:
     """
-    One frame of df1_vectors.json.
+    One frame of vectors/frames.json.
 
     ``station`` is the STN of a master frame or poll. ``header`` is DST, SRC, CMD, STS, TNS,
-    None where the file names none; ``fnc`` the function code of a command. ``expected`` is the
-    right check of a frame that carries a wrong one. Frames of one ``pair`` are a command and
-    its reply.
+    None where the message has less; ``fnc`` the function code of a command. ``valid`` tells
+    whether the check is right, ``expected`` is the right one of a frame with a wrong one.
+    Frames of one ``pair`` are a command and its reply.
     """
 
     name: str
-    mode: str
+    kind: str
+    duplex: Duplex
     checksum: Checksum
     valid: bool
     frame: bytes
@@ -52,14 +55,9 @@ class Vector:
     pair: str | None
 
     @property
-    def duplex(self) -> Duplex:
-        """Return the line discipline under which this frame was sent."""
-        return Duplex.FULL if self.mode == 'full_duplex' else Duplex.HALF
-
-    @property
     def is_message(self) -> bool:
         """Tell a message frame from a poll or a control symbol."""
-        return self.mode not in ('poll', 'control')
+        return self.kind == 'message'
 
     @property
     def has_embedded_response(self) -> bool:
@@ -77,25 +75,31 @@ def _vector(entry: dict[str, Any]) -> Vector:
     header = None
     if 'tns' in decoded:
         header = (decoded['dst'], decoded['src'], int(decoded['cmd'], 16),
-                  int(decoded['sts'], 16), int(decoded['tns'], 16))
-    expected = decoded.get('checksum_expected')
+                  int(decoded['sts'], 16), decoded['tns'])
+    expected = decoded.get('right_check')
     return Vector(
-        name=entry['name'], mode=entry['mode'], valid=entry['valid'],
-        checksum=Checksum.CRC if entry['checksum'] == 'crc' else Checksum.BCC,
-        frame=bytes.fromhex(entry['frame_hex']),
-        link_data=bytes.fromhex(decoded.get('link_data_hex', '')),
-        station=decoded.get('stn'), header=header,
+        name=entry['name'], kind=entry['kind'], duplex=Duplex(entry['discipline']),
+        checksum=Checksum.CRC if entry['check'] == 'CRC' else Checksum.BCC,
+        valid=entry['verdict'] != 'wrong check', frame=bytes.fromhex(entry['bytes']),
+        link_data=bytes.fromhex(decoded.get('link_data', '')),
+        station=decoded.get('station'), header=header,
         fnc=int(decoded['fnc'], 16) if 'fnc' in decoded else None,
         expected=None if expected is None else int.from_bytes(bytes.fromhex(expected), 'little'),
         pair=entry.get('pair'))
 
 
 def load_json(name: str) -> Any:
-    """Return the content of a file of test/vectors."""
+    """Return the content of a file of vectors/."""
     return json.loads((VECTOR_FOLDER / name).read_text(encoding='utf-8'))
 
 
-VECTORS = tuple(_vector(entry) for entry in load_json('df1_vectors.json'))
+def load_tables() -> Any:
+    """Return the counters and messages of the driver's specification."""
+    return json.loads((ROOT / 'test/vectors/driver_tables.json').read_text(encoding='utf-8'))
+
+
+_ENTRIES = load_json('frames.json')['frames']
+VECTORS = tuple(_vector(entry) for entry in _ENTRIES if 'time' not in entry)
 MESSAGES = tuple(vector for vector in VECTORS if vector.is_message)
 
 
@@ -132,7 +136,7 @@ def pair(name: str) -> tuple[Packet, Packet]:
 @dataclass(frozen=True, slots=True)
 class Captured:
     """
-    One line of racom_frames.json, a capture at a radio modem.
+    One frame of the trace at a radio modem, whose messages have a CRC.
 
     ``time`` is the wall-clock time of the capture, ``direction`` is seen from the modem.
     """
@@ -143,7 +147,14 @@ class Captured:
     frame: bytes
 
 
-CAPTURED = tuple(
-    Captured(entry['time'], entry['direction'], Checksum(entry['checksum']),
-             bytes.fromhex(entry['hex']))
-    for entry in load_json('racom_frames.json'))
+def _captured() -> Iterator[Captured]:
+    """Yield the frames; a symbol belongs to a trace with the check of the message before it."""
+    check = 'none'
+    for entry in _ENTRIES:
+        if 'time' in entry:
+            check = check if entry['check'] == 'none' else entry['check']
+            yield Captured(entry['time'], 'tx' if entry['direction'] == 'from the modem' else 'rx',
+                           Checksum(check), bytes.fromhex(entry['bytes']))
+
+
+CAPTURED = tuple(_captured())

@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: CC0-1.0
+"""
+Verify the DF1 and PCCC vectors of this folder: schema, hashes, checks, decoded fields.
+
+Plain Python, nothing to install: ``python3 verify.py`` prints what is wrong and ends with 1.
+``--update`` writes the hashes of the files into the manifest.
+"""
+
+import hashlib
+import json
+from pathlib import Path
+import re
+import sys
+
+TYPES = {'object': dict, 'array': list, 'string': str, 'integer': int}
+
+
+def check_schema(value, rule, rules, where):
+    """Yield where a value breaks its rule; only what schema.json uses of JSON Schema is known."""
+    if '$ref' in rule:
+        rule = rules[rule['$ref'].removeprefix('#/$defs/')]
+    if 'enum' in rule and value not in rule['enum']:
+        yield f'{where}: {value!r} is not one of {rule["enum"]}'
+    if 'type' not in rule:
+        return
+    if not isinstance(value, TYPES[rule['type']]):
+        yield f'{where}: {value!r} is not of type {rule["type"]}'
+    elif rule['type'] == 'object':
+        more = rule.get('additionalProperties', True)
+        yield from (f'{where}: {name} is missing' for name in rule.get('required', ())
+                    if name not in value)
+        for name, part in value.items():
+            part_rule = rule.get('properties', {}).get(name, more)
+            if part_rule is False:
+                yield f'{where}: {name} is not known'
+            elif part_rule is not True:
+                yield from check_schema(part, part_rule, rules, f'{where}.{name}')
+    elif rule['type'] == 'array':
+        for number, part in enumerate(value):
+            name = part.get('name', number) if isinstance(part, dict) else number
+            yield from check_schema(part, rule.get('items', {}), rules, f'{where}[{name}]')
+    elif rule['type'] == 'string' and not re.search(rule.get('pattern', ''), value):
+        yield f'{where}: {value!r} does not match {rule["pattern"]}'
+    elif rule['type'] == 'integer' and not (
+            rule.get('minimum', value) <= value <= rule.get('maximum', value)):
+        yield f'{where}: {value} is out of range'
+
+
+def bcc(data):
+    """Return the two's complement of the sum."""
+    return bytes((-sum(data) & 0xFF,))
+
+
+def crc(data):
+    """Return CRC-16 with polynomial A001, begun with 0, low byte first."""
+    value = 0
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ 0xA001 if value & 1 else value >> 1
+    return value.to_bytes(2, 'little')
+
+
+def parse(frame):
+    """Return STN (or None), link data, and the check that a message or poll ends with."""
+    station, at, data = None, 2, bytearray()
+    if frame[1] in (0x01, 0x05):  # DLE SOH or DLE ENQ: a station follows, doubled if it is DLE
+        station, at = frame[2], 4 if frame[2:4] == b'\x10\x10' else 3
+        if frame[1] == 0x05:
+            return station, b'', frame[at:]
+        at += 2  # DLE STX
+    while frame[at:at + 2] != b'\x10\x03':
+        if frame[at] == 0x10 and frame[at + 1] != 0x10:
+            at += 2  # an embedded response of the other direction
+            continue
+        data.append(frame[at])
+        at += 1 + (frame[at] == 0x10)
+    return station, bytes(data), frame[at + 2:]
+
+
+def right_check(kind, station, data):
+    """Return the check of a message: STN and STX count in a frame of a master."""
+    if kind == 'BCC':
+        return bcc(data if station is None else bytes((station,)) + data)
+    return crc((b'' if station is None else bytes((station, 0x02))) + data + b'\x03')
+
+
+def header(data):
+    """Return the fields of link data, as vectors show them."""
+    if len(data) < 6:
+        return {}
+    fields = {'dst': data[0], 'src': data[1], 'cmd': f'{data[2]:02X}', 'sts': f'{data[3]:02X}',
+              'tns': int.from_bytes(data[4:6], 'little')}
+    if data[2] & 0x5F in (0x06, 0x07, 0x0F) and len(data) > 6:
+        fields['fnc'] = f'{data[6]:02X}'
+    return fields
+
+
+def check_frame(entry):
+    """Yield what is wrong with a frame."""
+    frame, decoded = bytes.fromhex(entry['bytes']), entry['decoded']
+    if entry['kind'] == 'symbol':
+        names = {'DLE ACK': 0x06, 'DLE NAK': 0x15, 'DLE ENQ': 0x05, 'DLE EOT': 0x04}
+        if frame != bytes((0x10, names[decoded['symbol']])):
+            yield 'is not that symbol'
+        return
+    station, data, check = parse(frame)
+    right = bcc(bytes((station,))) if entry['kind'] == 'poll' \
+        else right_check(entry['check'], station, data)
+    verdict = 'wrong check' if check != right else \
+        'too short' if entry['kind'] == 'message' and len(data) < 6 else 'good'
+    if verdict != entry['verdict']:
+        yield f'the verdict is {verdict}'
+    found = {'station': station, 'link_data': data.hex(' ').upper() or None, **header(data),
+             'right_check': right.hex(' ').upper() if check != right else None}
+    for name in {**found, **decoded}:
+        if found.get(name) != decoded.get(name):
+            yield f'{name} is {found.get(name)!r}, not {decoded.get(name)!r}'
+    origin = entry['origin']
+    if origin['how'] == 'printed' and not re.search(r'\d-\d|ch\.', origin['source']):
+        yield 'a printed frame needs its page'
+
+
+def check_exchange(entry):
+    """Yield what is wrong with a command and its reply."""
+    command, reply = bytes.fromhex(entry['command']), bytes.fromhex(entry['reply'])
+    if reply[:3] != bytes((command[1], command[0], command[2] | 0x40)) \
+            or reply[4:6] != command[4:6] or command[3]:
+        yield 'is no reply to this command'
+    fields, sts = header(command), reply[3]
+    found = {'cmd': fields['cmd'], 'tns': fields['tns'], 'sts': f'{sts:02X}'}
+    if 'fnc' in fields:
+        found['fnc'] = fields['fnc']
+    if sts & 0xF0 == 0xF0 and len(reply) > 6:
+        found['ext_sts'] = f'{reply[6]:02X}'
+    if found != entry['decoded'] or entry['verdict'] != ('refused' if sts else 'good'):
+        yield f'says {found}'
+
+
+def hashes(folder):
+    """Return the SHA-256 of every file of the data set by its name."""
+    files = [*folder.glob('*.json'), *folder.glob('*.md'), *folder.glob('captures/*.*')]
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(files) if path.name != 'manifest.json'}
+
+
+def faults(folder):
+    """Yield everything that is wrong."""
+    def load(name):
+        return json.loads((folder / name).read_text(encoding='utf-8'))
+
+    rules, manifest, wrong = load('schema.json')['$defs'], load('manifest.json'), False
+    for name in ('frames.json', 'exchanges.json', 'captures/index.json'):
+        for text in check_schema(load(name), rules[name], rules, name):
+            wrong = True
+            yield text
+    known, found = manifest['files'], hashes(folder)
+    yield from (f'manifest.json: {name} differs' for name in sorted(known.keys() | found.keys())
+                if known.get(name) != found.get(name))
+    captures = {path.stem for path in folder.glob('captures/*.cap')}
+    yield from (f'captures: {name} is not in both places'
+                for name in sorted(captures ^ load('captures/index.json').keys()))
+    if wrong:
+        return
+    for name, check in (('frames', check_frame), ('exchanges', check_exchange)):
+        content = load(f'{name}.json')
+        entries = content[name]
+        if content['version'] != manifest['version']:
+            yield f'{name}.json: version {content["version"]}'
+        if len({entry['name'] for entry in entries}) < len(entries):
+            yield f'{name}.json: a name stands twice'
+        for entry in entries:
+            yield from (f'{name}.json: {entry["name"]}: {text}' for text in check(entry))
+
+
+def main(folder, update=False):
+    """Print what is wrong; return the exit status."""
+    if update:
+        version = json.loads((folder / 'frames.json').read_text(encoding='utf-8'))['version']
+        text = json.dumps({'version': version, 'license': 'CC0-1.0', 'files': hashes(folder)},
+                          indent=1)
+        (folder / 'manifest.json').write_text(text + '\n', encoding='utf-8')
+    found = list(faults(folder))
+    print('\n'.join(found) or 'all good')
+    return 1 if found else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(Path(__file__).resolve().parent, '--update' in sys.argv[1:]))
