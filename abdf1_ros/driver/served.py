@@ -22,7 +22,7 @@ from itertools import islice
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.errors import Place, Problem
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
@@ -33,17 +33,28 @@ from abdf1_ros.settings.values import ValueType
 
 
 class _MappedTable(DataTable):
-    """A data table that has only the mapped words, and tells what is written from outside."""
+    """
+    A data table that has only the mapped words, and remembers what was written.
+
+    ``changed`` has each place with what was there before. With ``is_guarded`` the words that are
+    ``read_only`` cannot be written.
+    """
 
     def __init__(self, plc_type: PlcType) -> None:
         super().__init__(plc_type)
-        self.changed: list[tuple[Address, int]] = []
+        self.changed: list[tuple[Address, bytes]] = []
+        self.read_only: set[Address] = set()
+        self.is_guarded = False
         self._mapped: set[Address] = set()
 
     def create(self, address: Address, words: int) -> None:
         """Map these words."""
         super().create(address, words)
         self._mapped.update(_words(address, words))
+
+    def protect(self, address: Address, words: int) -> None:
+        """Keep these words from being written while the table is guarded."""
+        self.read_only.update(_words(address, words))
 
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
         """Return where the words are, if all of them are mapped."""
@@ -66,9 +77,19 @@ class _MappedTable(DataTable):
         return all(any(list(islice(mapped, size))) for _ in range(words // size))
 
     def write(self, address: Address, data: bytes) -> None:
-        """Store whole words and remember which."""
+        """Store whole words and remember what was there; Protected where that is forbidden."""
+        words = len(data) // 2
+        if self.is_guarded and not self.read_only.isdisjoint(_words(address, words)):
+            raise Protected(f'{words} words at {address} may only be read')
+        before = self.read(address, words)
         super().write(address, data)
-        self.changed.append((address, len(data) // 2))
+        self.changed.append((address, before))
+
+    def take_back(self) -> None:
+        """Undo what has changed."""
+        for address, before in reversed(self.changed):
+            super().write(address, before)
+        self.changed.clear()
 
 
 def _words(address: Address, words: int) -> Iterable[Address]:
@@ -91,15 +112,25 @@ class Served:
         self._table = _MappedTable(plc_type)
         for mapping in self._mappings:
             self._table.create(_first_word(mapping), mapping.codec.words)
+            if mapping.is_read_only:
+                self._table.protect(_first_word(mapping), mapping.codec.words)
         processor = EmulatedProcessor(plc_type, is_full_duplex=is_full_duplex)
         self._server = Server(self._table, processor, counters)
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command from outside and return its reply."""
-        self._table.changed.clear()
-        reply = self._server.serve(command)
+        table = self._table
+        table.changed.clear()
+        table.is_guarded = True
+        try:
+            reply = self._server.serve(command)
+        finally:
+            table.is_guarded = False
+        if reply.sts:
+            table.take_back()  # all or nothing
         for mapping in self._mappings:
-            if any(_overlap(mapping, *change) for change in self._table.changed):
+            if any(_overlap(mapping, address, len(before) // 2)
+                   for address, before in table.changed):
                 self._on_write(mapping, self.words_of(mapping))
         return reply
 

@@ -31,6 +31,10 @@ class OutOfRange(Abdf1Error):
     """The file is shorter than what was asked for."""
 
 
+class Protected(Abdf1Error):
+    """The words are not to be written."""
+
+
 class DataTable:
     """
     Words by address, each low byte first.

@@ -25,7 +25,7 @@ from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address_errors import AddressRefusal
-from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.fields import Reader
@@ -69,6 +69,8 @@ class Server:
             raise Refusal(*self._family.no_such_file) from None
         except OutOfRange:
             raise Refusal(*self._family.out_of_range) from None
+        except Protected:
+            raise Refusal(*self._family.protected) from None
         except AddressRefusal as error:
             raise extended(error.ext_sts) from None
         except FormatError:

@@ -50,9 +50,14 @@ def extended(ext_sts: int) -> Refusal:
 
 
 class ServedFamily(Protocol):
-    """The commands of a family, and what it answers to addresses that are not there."""
+    """
+    The commands of a family, and what it answers to addresses that are not there.
+
+    ``protected`` is the answer to a write of words that may only be read.
+    """
 
     commands: Commands
     basic_commands: BasicCommands
     no_such_file: Codes
     out_of_range: Codes
+    protected: Codes

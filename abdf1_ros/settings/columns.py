@@ -62,7 +62,7 @@ MAP_COLUMNS = (
     Column('Offset', '0', 'see Scale'),
     Column('Access', 'the first of them',
            'how words are reached. PLC5: Typed, WordRange. SLC: Slot, Flat. PLC2: Unprotected, '
-           'Protected, CIF'),
+           'Protected, CIF. Serve: Read, so that the other end cannot write'),
     Column('Processor', '5/03',
            'of an SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
            'limits packets and files; the same in all rows of a station'),

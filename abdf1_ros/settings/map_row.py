@@ -40,7 +40,7 @@ from abdf1_ros.settings.heartbeats import (
     read_heartbeat,
     read_publish_while,
 )
-from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import row_remarks
 from abdf1_ros.settings.scaling import Scaling
@@ -126,7 +126,8 @@ class RowReader:
         mapping = Mapping(
             self._row.item, self._row.line, self._row.get('Tag'), name, command, address,
             station, plc_type, length, value_type or _natural_type(address), topic,
-            period, publish, minimum, maximum, word_order, scaling, access, processor, via)
+            period, publish, minimum, maximum, word_order, scaling, access, processor, via,
+            self._is_read_only(command))
         self._check(mapping)
         mapping = self._with_conditions(mapping)
         if self.faults:
@@ -245,15 +246,20 @@ class RowReader:
     def _access(self, plc_type: PlcType, command: Command | None) -> Access | None:
         text = self._row.get('Access')
         ways = accesses_of(plc_type)
-        if not text:
+        if not text or self._is_read_only(command):
             return ways[0]
         access = next((way for way in ways if way.value.lower() == text.lower()), None)
-        if access is None:
+        if command is Command.SERVE:
+            self._bad_value('Access', f'of a Serve row should be {READ_ONLY}, for words that the '
+                                      'other end cannot write, or empty')
+        elif access is None:
             right = ', '.join(way.value for way in ways)
             self._bad_value('Access', f'of a {plc_type.value} should be one of {right}')
-        elif command is Command.SERVE:
-            self._fault('Access', 'a Serve row answers every access', is_superfluous=True)
         return access
+
+    def _is_read_only(self, command: Command | None) -> bool:
+        """Tell whether others may only read the words of a Serve row."""
+        return command is Command.SERVE and self._row.get('Access').lower() == READ_ONLY.lower()
 
     def _processor(self, plc_type: PlcType, command: Command | None,
                    address: Address | None) -> Processor | None:

@@ -32,6 +32,9 @@ from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, val
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.values import Codec, ValueType, WordOrder
 
+# Access of a Serve row that the other end may only read.
+READ_ONLY = 'Read'
+
 
 def _or_empty(value: int | None) -> str:
     return '' if value is None else str(value)
@@ -74,7 +77,8 @@ class Mapping:
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
-    is the gateway that the station is behind, None for a station of the line itself.
+    is the gateway that the station is behind, None for a station of the line itself. With
+    ``is_read_only`` the words of a Serve row may not be written by the other end.
     ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
     ``remarks`` say what is odd about the row.
     """
@@ -99,6 +103,7 @@ class Mapping:
     access: Access | None = None
     processor: Processor | None = None
     via: int | None = None
+    is_read_only: bool = False
     heartbeat: Heartbeat | None = None
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None
@@ -171,6 +176,8 @@ class Mapping:
         if column in ('Scale', 'Offset'):
             scaling = self.scaling
             return '' if scaling is None else f'{getattr(scaling, column.lower()):.15g}'
+        if column == 'Access' and self.is_read_only:
+            return READ_ONLY
         if column in _DEPENDENT_CELLS:
             part, text = _DEPENDENT_CELLS[column]
             entry = getattr(self, part)

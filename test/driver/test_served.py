@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import tracemalloc
 
 from abdf1_ros.df1.packet import Packet
@@ -510,6 +511,48 @@ def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> 
 def test_problems_go_with_their_rows() -> None:
     good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
     assert [mapping for mapping, _ in line_problems([good, bad], PEER, 'm')] == [bad]
+
+
+PROTECTED = {'PLC5': (0xF0, b'\x0B'), 'SLC': (0x50, b''), 'PLC3': (0xF0, b'\x1E'),
+             'PLC2': (0x50, b'')}
+
+
+@pytest.mark.parametrize('plc', PROTECTED)
+def test_row_that_the_other_end_may_only_read(plc: str) -> None:
+    first, second = ('020', '021') if plc == 'PLC2' else ('N7:0', 'N7:1')
+    mine = replace(row(first, plc), is_read_only=True)
+    bench = Bench(plc, mine, row(second, plc))
+    bench.served.store(mine, [5])
+    assert bench.write(first, 9) == PROTECTED[plc]
+    assert bench.write_bits(first, 0xFFFF, 1) == PROTECTED[plc]
+    # All or nothing, in either order.
+    assert bench.write(first, 9, 9) == PROTECTED[plc]
+    assert bench.read(first, 2) == b'\5\0\0\0'
+    assert bench.heard() == []
+    assert bench.write(second, 7) == (0, b'')
+    assert bench.heard() == [(row(second, plc).name, [7])]
+    bench.served.store(mine, [6])
+    assert bench.read(first, 2) == b'\6\0\7\0'
+
+
+@pytest.mark.parametrize('plc', ['PLC5', 'SLC', 'PLC3'])
+def test_write_that_ends_in_a_protected_row_changes_nothing(plc: str) -> None:
+    bench = Bench(plc, row('N7:0', plc), replace(row('N7:1', plc), is_read_only=True))
+    assert bench.write('N7:0', 9, 9) == PROTECTED[plc]
+    assert bench.read('N7:0', 2) == bytes(4)
+    assert bench.heard() == []
+
+
+def test_access_of_a_serve_row() -> None:
+    mappings, problems = loaded(
+        'a,Serve,N7:50,5,PLC5,4,,,,,,,,,,read', 'b,Serve,N7:60,5,PLC5,4,,,,,,',
+        'c,Serve,N7:70,5,PLC5,4,,,,,,,,,,Typed', 'd,Read,N7:0,1,PLC5,4,,,,,,,,,,Read')
+    assert [mapping.is_read_only for mapping in mappings] == [True, False]
+    assert [mapping.cell('Access') for mapping in mappings] == ['Read', 'Typed']
+    assert problems == [
+        'Item: 3, Access = "Typed" of a Serve row should be Read, for words that the other end '
+        'cannot write, or empty',
+        'Item: 4, Access = "Read" of a PLC5 should be one of Typed, WordRange']
 
 
 def loaded(*rows: str) -> tuple[Sequence[Mapping], list[str]]:

@@ -366,7 +366,8 @@ def test_access(plc: str, text: str, access: str) -> None:
     ({'Access': 'x', 'PLC_Type': 'PLC2', 'Address': '020'},
      'Access = "x" of a PLC2 should be one of Unprotected, Protected, CIF'),
     ({'Access': 'Typed', 'Command': 'Serve', 'Station': '5'},
-     'a Serve row answers every access; leave the cell empty')])
+     'Access = "Typed" of a Serve row should be Read, for words that the other end cannot write, '
+     'or empty')])
 def test_access_that_does_not_fit(cells: dict[str, str], text: str) -> None:
     assert fault(**cells) == f'2:{COLUMNS.index("Access") + 1} (Access): Item: 1, {text}'
 

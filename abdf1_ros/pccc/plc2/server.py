@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc2 import commands as plc2
@@ -69,7 +69,7 @@ class BasicService:
         def execute(reader: Reader, source: int) -> bytes:
             try:
                 return function(reader, self._window(source))
-            except (NoSuchFile, OutOfRange):
+            except (NoSuchFile, OutOfRange, Protected):
                 raise Refusal(status.STS_ADDRESS) from None
         return execute
 
@@ -112,6 +112,7 @@ class Plc2Commands:
 
     no_such_file: Codes = status.STS_ADDRESS, None
     out_of_range: Codes = status.STS_ADDRESS, None
+    protected: Codes = status.STS_ADDRESS, None
 
     def __init__(self, table: DataTable) -> None:
         everything = Window(Address(ADDRESSING, FileType.BINARY, 0, 0))

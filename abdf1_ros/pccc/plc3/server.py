@@ -41,6 +41,7 @@ class Plc3Commands:
 
     no_such_file: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
     out_of_range: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
+    protected: Codes = status.EXTENDED, status.EXT_PROTECTED
 
     def __init__(self, table: DataTable) -> None:
         words = WordRangeService(table, ExtendedAddress.read, _place, _CODES)

@@ -122,6 +122,7 @@ class Plc5Commands:
 
     no_such_file = _NO_SUCH_FILE
     out_of_range = _OUT_OF_RANGE
+    protected: Codes = status.EXTENDED, status.EXT_NO_PRIVILEGE
 
     def __init__(self, table: DataTable) -> None:
         self._table = table

@@ -40,6 +40,7 @@ class SlcCommands:
 
     no_such_file: Codes = status.STS_ILLEGAL_COMMAND, None
     out_of_range: Codes = status.STS_ADDRESS, None
+    protected: Codes = status.STS_ADDRESS, None
 
     def __init__(self, table: DataTable) -> None:
         self._table = table
