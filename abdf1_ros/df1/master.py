@@ -48,7 +48,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive, WrongCommandCode
-from abdf1_ros.messages import Event, Message
+from abdf1_ros.messages import Event
 
 
 class HalfDuplexMaster:
@@ -159,9 +159,7 @@ class HalfDuplexMaster:
 
     def _give_up(self, number: int) -> Talk:
         """Account for a reply that did not come in time (S0, counter 2545)."""
-        self._line.counters.command_timeouts += 1
-        self._stations[number].overdue += 1
-        self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
+        self._line.accounting.late(number, keeps_others_waiting=True)
         if self._settings.nak_on_command_timeout:
             self._line.counters.naks_sent += 1
             yield Step(frames.NAK, 0)

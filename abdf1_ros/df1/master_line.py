@@ -32,13 +32,13 @@ import math
 from typing import NoReturn, TypeGuard
 
 from abdf1_ros.df1 import frames
+from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Unknown
 from abdf1_ros.df1.machine import Heard, LISTEN_ON, Machine, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
 
@@ -123,6 +123,8 @@ class MasterLine:
         self.polled: Container[int] = ()  # stations that somebody else polls all the time
         # Takes a reply that came too late for its poll; tells whether it was waited for.
         self.take_reply: Callable[[int, Packet], bool] = lambda number, reply: False
+        self.accounting = Accounting(machine.counters, stations, report)
+        self.note = self.accounting.note
         self._report = report
         self._serve = serve
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
@@ -138,7 +140,7 @@ class MasterLine:
         Return when the transmission began that was acknowledged (clock value in s).
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
-        self._count_sent(packet)
+        self.accounting.sent(packet)
         if number == BROADCAST:
             self.counters.messages_sent += 1
             begun = self.machine.now
@@ -299,7 +301,7 @@ class MasterLine:
         self.counters.messages_received += 1
         self.stations.heard(packet.src, self.machine.now)
         if packet.is_reply and packet.dst == self.settings.station and station.accepts(packet):
-            self._count_received(packet)
+            self.accounting.received(packet)
             if not self.take_reply(packet.src, packet):
                 self.take_unwanted(packet.src, packet)
         return True
@@ -346,15 +348,8 @@ class MasterLine:
             self.counters.duplicate_messages += 1
             self.note(Message.NTC_DUPLICATE_MSG_RCVD, number, station=number)
             return None
-        self._count_received(packet)
+        self.accounting.received(packet)
         return packet
-
-    def _count_received(self, packet: Packet) -> None:
-        if packet.is_reply:
-            self.counters.replies_received += 1
-            self.counters.error_messages_received += packet.sts != 0
-        else:
-            self.counters.commands_received += 1
 
     def answers(self, packet: Packet, command: Packet) -> bool:
         """Tell whether a message is the reply to ``command``; a gateway may fill in its DST."""
@@ -362,11 +357,19 @@ class MasterLine:
             packet = replace(packet, dst=command.src)
         return packet.answers(command)
 
-    def check_reply(self, reply: Packet, command: Packet) -> None:
-        """Account for the reply to ``command``; WrongCommandCode when it is another's."""
+    def complete(self, task: Task, reply: Packet) -> None:
+        """End a task with the reply to its command."""
+        self._heard_from(reply)
+        self.accounting.complete(task, reply)
+
+    def _heard_from(self, reply: Packet) -> None:
         if reply.sts == 0 or reply.sts & 0xF0:  # else a gateway has sent it in its place (M 8-2)
             self.stations.heard(reply.src, self.machine.now)
-        check_reply(reply, command, self.stations[reply.src], self.counters, self._report)
+
+    def check_reply(self, reply: Packet, command: Packet) -> None:
+        """Account for the reply to ``command``; WrongCommandCode when it is another's."""
+        self._heard_from(reply)
+        self.accounting.check(reply, command)
 
     def take_unwanted(self, number: int, packet: Packet) -> None:
         """
@@ -446,13 +449,6 @@ class MasterLine:
     def _is_to_forward(self, packet: Packet) -> bool:
         return self.settings.accept_slave_messages and packet.dst != self.settings.station
 
-    def _count_sent(self, packet: Packet) -> None:
-        if packet.is_reply:
-            self.counters.replies_sent += 1
-            self.counters.error_messages_sent += packet.sts != 0
-        else:
-            self.counters.commands_sent += 1
-
     def fail_inactive(self, number: int) -> NoReturn:
         """Take a station out of the active ones, and say so."""
         self.stations.lost(number, self.machine.now)
@@ -469,10 +465,6 @@ class MasterLine:
         event = count_fault(frame, self.settings.checksum, self.counters, number)
         self._report(event)
         return event.message
-
-    def note(self, message: Message, *args: int, station: int) -> None:
-        """Report a numbered error or notice at a station."""
-        self._report(Event(message, args, station))
 
 
 def is_good(answer: Heard) -> TypeGuard[Control | Frame]:

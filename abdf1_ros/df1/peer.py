@@ -49,19 +49,16 @@ import math
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
+from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.df1.tasks import Task, TaskSource
+from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
 from abdf1_ros.errors import (
     CommandExpired,
-    CommandTimeout,
     StationInactive,
-    WrongCommandCode,
 )
 from abdf1_ros.messages import Event, Message
 
@@ -106,14 +103,6 @@ class PeerSettings:
 
 
 @dataclass(slots=True)
-class _Outstanding:
-    """A command that waits for its reply; ``deadline`` (clock value in s) runs from its ACK."""
-
-    task: Task
-    deadline: float | None = None
-
-
-@dataclass(slots=True)
 class _Accepted:
     """
     The last message accepted: its key (M 4-4), and when (clock value in s) it came.
@@ -144,6 +133,8 @@ class FullDuplexPeer:
         self._stations = stations
         self._serve = serve
         self._report = report
+        self._accounting = Accounting(machine.counters, stations, report)
+        self._note = self._accounting.note
         self._timeout = max(settings.timeout, _MIN_RESPONSE_TIME)
         self._forget()
 
@@ -173,7 +164,7 @@ class FullDuplexPeer:
 
     def _forget(self) -> None:
         self._replies: deque[Packet] = deque()
-        self._outstanding: dict[tuple[int, int], _Outstanding] = {}
+        self._outstanding: dict[tuple[int, int], Outstanding] = {}
         self._last_response = frames.NAK
         self._accepted: _Accepted | None = None
         self._noise = 0
@@ -186,7 +177,7 @@ class FullDuplexPeer:
 
     def _idle_time(self, source: TaskSource) -> float | None:
         """Return the seconds until a reply is overdue or, with room for it, a task is due."""
-        moments = [entry.deadline for entry in self._outstanding.values()]
+        moments: list[float | None] = [entry.deadline for entry in self._outstanding.values()]
         if len(self._outstanding) < self._settings.max_outstanding:
             moments.append(source.next_due())
         known = [moment for moment in moments if moment is not None]
@@ -195,8 +186,8 @@ class FullDuplexPeer:
     def _send_command(self, task: Task) -> Hearing:
         number = task.command.dst
         key = number, task.command.tns
-        entry = self._outstanding[key] = _Outstanding(task)
-        self._counters.commands_sent += 1
+        entry = self._outstanding[key] = Outstanding(task)
+        self._accounting.sent(task.command)
         task.sent = True
         # A station that did not answer last time gets one try, not a whole cycle of them.
         try:
@@ -216,8 +207,7 @@ class FullDuplexPeer:
             task.fail(StationInactive(number))
 
     def _send_reply(self, reply: Packet) -> Hearing:
-        self._counters.replies_sent += 1
-        self._counters.error_messages_sent += reply.sts != 0
+        self._accounting.sent(reply)
         delivered = yield from self._transfer(reply, lambda: False, is_probe=False)
         if self._accepted is not None and self._accepted.key == reply.key_of_command:
             self._accepted.is_answered = delivered is not None
@@ -394,33 +384,22 @@ class FullDuplexPeer:
     def _take_reply(self, packet: Packet) -> None:
         """Hand a reply to the command it belongs to, if it is still waited for."""
         self._expire()
-        self._counters.replies_received += 1
-        self._counters.error_messages_received += packet.sts != 0
+        self._accounting.received(packet)
         entry = self._outstanding.pop((packet.src, packet.tns), None)
         if entry is None:
-            self._counters.stale_messages += 1
-            self._report(wrong_message(packet, packet.src))
+            self._accounting.stale(packet)
             return
         self._stations.heard(packet.src, self._machine.now)
-        try:
-            check_reply(packet, entry.task.command, self._stations[packet.src],
-                        self._counters, self._report)
-        except WrongCommandCode as error:
-            entry.task.fail(error)
-        else:
-            entry.task.reply(packet)
+        self._accounting.complete(entry.task, packet)
 
     def _expire(self) -> None:
         """End the commands whose reply is overdue (S0, counter 2545)."""
         now = self._machine.now
         overdue = [key for key, entry in self._outstanding.items()
-                   if entry.deadline is not None and entry.deadline <= now]
+                   if entry.deadline <= now]
         for key in overdue:
-            entry = self._outstanding.pop(key)
-            self._counters.command_timeouts += 1
-            self._stations[key[0]].overdue += 1
-            self._note(Message.ERR_COMMAND_TIMEOUT, station=key[0])
-            entry.task.fail(CommandTimeout())
+            self._accounting.overdue(
+                self._outstanding.pop(key).task, keeps_others_waiting=True)
 
     def _respond(self, response: bytes) -> bytes:
         if response == frames.NAK:
@@ -434,6 +413,3 @@ class FullDuplexPeer:
     def _count_response(self, code: Code) -> None:
         self._counters.acks_received += code is Code.ACK
         self._counters.naks_received += code is Code.NAK
-
-    def _note(self, message: Message, *args: int, station: int | None) -> None:
-        self._report(Event(message, args, station))

@@ -38,7 +38,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-import math
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.machine import Machine, Procedure, Step
@@ -51,15 +50,13 @@ from abdf1_ros.df1.master_line import (
 )
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.df1.tasks import Task, TaskSource
+from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
 from abdf1_ros.errors import (
     CommandExpired,
-    CommandTimeout,
     LinkError,
     StationInactive,
-    WrongCommandCode,
 )
-from abdf1_ros.messages import Event, Message
+from abdf1_ros.messages import Event
 
 # "At least four" may leave between two polls (1766-RM001).
 COMMANDS_BETWEEN_POLLS = 4
@@ -129,24 +126,6 @@ class _PollList:
         return None
 
 
-@dataclass(slots=True)
-class _Outstanding:
-    """
-    A command; ``deadline`` (clock value in s) is when its reply is overdue, once it is delivered.
-
-    ``passed_over`` counts other messages that came in its place.
-    """
-
-    task: Task
-    deadline: float = math.inf
-    passed_over: int = 0
-
-    def is_over(self, now: float, is_message: bool) -> bool:
-        """Tell whether to give up after an answer; behind a message the reply may be next."""
-        self.passed_over += is_message
-        return now >= self.deadline and not (is_message and self.passed_over <= MOST_QUEUED)
-
-
 class StandardPollingMaster:
     """
     Poll all stations and carry out tasks on the line of ``machine``.
@@ -165,7 +144,7 @@ class StandardPollingMaster:
         self._line = MasterLine(machine, settings, stations, report, serve)
         self._priority = _PollList(polling.priority)
         self._normal = _PollList(polling.normal)
-        self._outstanding: dict[int, _Outstanding] = {}
+        self._outstanding: dict[int, Outstanding] = {}
         self._listed = frozenset((*polling.priority, *polling.normal))
         self._polled = self._listed - {settings.station}
         self._line.polled = self._listed
@@ -277,7 +256,7 @@ class StandardPollingMaster:
                 yield from self._pace(begun)
                 return
 
-    def _waiting_for(self, number: int) -> list[tuple[int, _Outstanding]]:
+    def _waiting_for(self, number: int) -> list[tuple[int, Outstanding]]:
         """Return the commands whose replies a station of the line has for us."""
         return [(station, self._outstanding[station]) for station in self._stations.behind(number)
                 if station in self._outstanding]
@@ -305,7 +284,7 @@ class StandardPollingMaster:
         if packet is not None:
             self._line.take_unwanted(number, packet)
         for station, entry in self._waiting_for(number):
-            if entry.is_over(self._machine.now, isinstance(answer, Frame)):
+            if self._is_over(entry, isinstance(answer, Frame)):
                 self._overdue(station)
 
     def _take_reply(self, number: int, packet: Packet) -> bool:
@@ -314,22 +293,20 @@ class StandardPollingMaster:
         if entry is None or not self._line.answers(packet, entry.task.command):
             return False
         del self._outstanding[packet.src]
-        self._complete(packet, entry.task)
+        self._line.complete(entry.task, packet)
         return True
 
-    def _overdue(self, number: int) -> None:
-        """End the command whose reply has not come in time (S0, counter 2545)."""
-        self._line.counters.command_timeouts += 1
-        self._line.note(Message.ERR_COMMAND_TIMEOUT, station=number)
-        self._end(number, CommandTimeout())
+    def _is_over(self, entry: Outstanding, is_message: bool) -> bool:
+        """Tell whether to give up after an answer; after a message the reply may be next."""
+        entry.passed_over += is_message
+        return self._machine.now >= entry.deadline and not (
+            is_message and entry.passed_over <= MOST_QUEUED)
 
-    def _complete(self, reply: Packet, task: Task) -> None:
-        try:
-            self._line.check_reply(reply, task.command)
-        except WrongCommandCode as error:
-            task.fail(error)
-        else:
-            task.reply(reply)
+    def _overdue(self, number: int) -> None:
+        """End the command whose reply has not come in time."""
+        # It keeps nobody waiting: others are polled meanwhile.
+        self._line.accounting.overdue(
+            self._outstanding.pop(number).task, keeps_others_waiting=False)
 
     def _end(self, number: int, error: LinkError) -> None:
         """End the command that waits for a reply of a station, if there is one."""
@@ -374,7 +351,7 @@ class StandardPollingMaster:
             task.fail(StationInactive(number))  # it is polled in its turn
             return
         task.sent = True
-        entry = self._outstanding[station] = _Outstanding(task)
+        entry = self._outstanding[station] = Outstanding(task)
         now = self._machine.now
         try:
             begun = yield from self._line.deliver(number, task.command, task.expires)

@@ -29,12 +29,11 @@ from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
+from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import AT_ONCE, Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.replies import wrong_message
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
 from abdf1_ros.messages import Event, Message
 

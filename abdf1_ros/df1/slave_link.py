@@ -23,30 +23,15 @@ what it wanted to send, so that no old command is sent when the polls come back.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.machine import Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.replies import check_reply, wrong_message
 from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, WrongCommandCode
-from abdf1_ros.messages import Event, Message
-
-
-@dataclass(slots=True)
-class _Outstanding:
-    """
-    The command on its way.
-
-    ``deadline`` (clock value in s) runs from the master's ACK, and before that from its last
-    poll: a command that is no longer repeated must not wait for a master to come back.
-    """
-
-    task: Task
-    deadline: float
-    is_delivered: bool = False
+from abdf1_ros.df1.tasks import Outstanding, TaskSource
+from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError
+from abdf1_ros.messages import Event
 
 
 class SlaveLink:
@@ -66,10 +51,10 @@ class SlaveLink:
         self._stations = stations
         self._cmd_timeout = cmd_timeout
         self._poll_timeout = poll_timeout
-        self._report = report
+        self._accounting = Accounting(machine.counters, stations, report)
         self._slave = HalfDuplexSlave(settings, serve, machine.counters, self, report)
         self._source: TaskSource | None = None
-        self._outstanding: _Outstanding | None = None
+        self._outstanding: Outstanding | None = None
         self.last_poll = 0.0
 
     def run(self, source: TaskSource) -> Procedure:
@@ -94,6 +79,7 @@ class SlaveLink:
         entry = self._outstanding
         if entry is None or entry.is_delivered:
             return
+        # A command that is not repeated any more must not wait for a master to come back.
         entry.deadline = self.last_poll + self._cmd_timeout
         if self.last_poll > entry.task.expires:
             self._outstanding = None
@@ -109,7 +95,7 @@ class SlaveLink:
         if task is None:
             return None
         task.sent = True
-        self._outstanding = _Outstanding(task, now + self._cmd_timeout)
+        self._outstanding = Outstanding(task, now + self._cmd_timeout)
         return task.command
 
     def delivered(self, command: Packet) -> None:
@@ -134,19 +120,12 @@ class SlaveLink:
         """Take a reply; one that fits nothing is stale."""
         entry = self._outstanding
         if entry is None or not reply.answers(entry.task.command):
-            self._machine.counters.stale_messages += 1
-            self._report(wrong_message(reply, reply.src))
+            self._accounting.stale(reply)
             return
         self._outstanding = None
         if reply.sts == 0 or reply.sts & 0xF0:  # else a node on the way has sent it (M 8-2)
             self._stations.heard(reply.src, self._machine.now)
-        try:
-            check_reply(reply, entry.task.command, self._stations[reply.src],
-                        self._machine.counters, self._report)
-        except WrongCommandCode as error:
-            entry.task.fail(error)
-        else:
-            entry.task.reply(reply)
+        self._accounting.complete(entry.task, reply)
 
     def _look_after(self, source: TaskSource) -> None:
         """End what is overdue."""
@@ -168,10 +147,5 @@ class SlaveLink:
 
     def _fail(self) -> None:
         entry, self._outstanding = self._outstanding, None
-        if entry is None:
-            return
-        number = entry.task.command.dst
-        self._machine.counters.command_timeouts += 1
-        self._stations[number].overdue += entry.is_delivered
-        self._report(Event(Message.ERR_COMMAND_TIMEOUT, (), number))
-        entry.task.fail(CommandTimeout())
+        if entry is not None:
+            self._accounting.overdue(entry.task, keeps_others_waiting=entry.is_delivered)

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Container
+from dataclasses import dataclass
+import math
 from typing import Protocol
 
 from abdf1_ros.df1.packet import Packet
@@ -43,6 +45,22 @@ class Task(Protocol):
 
     def fail(self, error: LinkError) -> None:
         """Take note that there will be no reply."""
+
+
+@dataclass(slots=True)
+class Outstanding:
+    """
+    A task whose command is on its way or waits for its reply.
+
+    ``deadline`` (clock value in s) is when the reply is overdue; it runs from the delivery
+    (``is_delivered``), and what counts before that is the link's matter. ``passed_over`` counts
+    other messages that came in its place.
+    """
+
+    task: Task
+    deadline: float = math.inf
+    is_delivered: bool = False
+    passed_over: int = 0
 
 
 class TaskSource(Protocol):

@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from abdf1_ros.counters import Counters
+from abdf1_ros.df1.accounting import count_fault
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.faults import count_fault
 from abdf1_ros.df1.frames import Duplex, Fault, Frame, FrameDecoder
 import pytest
 from support.vectors import vector

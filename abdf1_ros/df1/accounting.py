@@ -1,0 +1,121 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a link counts and reports, and how its commands end; the same at every kind of node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Fault, Frame, MAX_LINK_DATA
+from abdf1_ros.df1.packet import HEADER_SIZE, Packet, REPLY_BIT
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import Task
+from abdf1_ros.errors import CommandTimeout, WrongCommandCode
+from abdf1_ros.messages import Event, Message
+
+Report = Callable[[Event], None]
+
+
+def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
+                station: int | None = None) -> Event:
+    """Count the fault of ``frame``, heard from ``station``; return the event that names it."""
+    if frame.fault is Fault.BAD_CHECK:
+        values = (*divmod(frame.received, 256), *divmod(frame.expected, 256))
+        if checksum is Checksum.BCC:
+            counters.bcc_errors += 1
+            return Event(Message.ERR_BAD_BCC, values, station)
+        counters.crc_errors += 1
+        return Event(Message.ERR_BAD_CRC, values, station)
+    counters.invalid_messages += 1
+    if frame.fault is Fault.NO_ETX:
+        return Event(Message.NTC_NO_ETX_RCVD, (), station)
+    if frame.fault is Fault.TOO_SHORT:
+        return Event(Message.NTC_RCVD_MSG_TOO_SHORT, (HEADER_SIZE,), station)
+    return Event(Message.NTC_RCVD_MSG_TOO_LONG, (MAX_LINK_DATA,), station)
+
+
+def wrong_message(packet: Packet, station: int) -> Event:
+    """Return the event of a message from ``station`` that answers nothing outstanding."""
+    return Event(Message.ERR_WRONG_MESSAGE, (packet.src, packet.dst, packet.tns), station)
+
+
+class Accounting:
+    """The accounts of one link: its counters, the records of stations, what it reports."""
+
+    def __init__(self, counters: Counters, stations: ActiveStationList, report: Report) -> None:
+        self.counters = counters
+        self.report = report
+        self._stations = stations
+
+    def note(self, message: Message, *args: int, station: int | None) -> None:
+        """Report a numbered error or notice at a station."""
+        self.report(Event(message, args, station))
+
+    def sent(self, packet: Packet) -> None:
+        """Count a message of ours, once however often it is sent."""
+        if packet.is_reply:
+            self.counters.replies_sent += 1
+            self.counters.error_messages_sent += packet.sts != 0
+        else:
+            self.counters.commands_sent += 1
+
+    def received(self, packet: Packet) -> None:
+        """Count a good message that is not a repetition."""
+        if packet.is_reply:
+            self.counters.replies_received += 1
+            self.counters.error_messages_received += packet.sts != 0
+        else:
+            self.counters.commands_received += 1
+
+    def stale(self, reply: Packet) -> None:
+        """Count and report a reply to nothing outstanding."""
+        self.counters.stale_messages += 1
+        self.report(wrong_message(reply, reply.src))
+
+    def check(self, reply: Packet, command: Packet) -> None:
+        """Count the reply to ``command``; WrongCommandCode when it is another command's (S0)."""
+        station = self._stations[reply.src]
+        expected = command.cmd | REPLY_BIT
+        if reply.cmd != expected:
+            self.counters.invalid_messages += 1
+            details = station.number, reply.cmd, expected
+            self.note(Message.ERR_BAD_FUNCTION_CODE, *details, station=station.number)
+            raise WrongCommandCode(*details)
+        station.replies += 1
+        station.overdue = 0
+        station.last_tns = reply.tns
+        self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
+
+    def complete(self, task: Task, reply: Packet) -> None:
+        """End a task with the reply to its command."""
+        try:
+            self.check(reply, task.command)
+        except WrongCommandCode as error:
+            task.fail(error)
+        else:
+            task.reply(reply)
+
+    def late(self, station: int, *, keeps_others_waiting: bool) -> None:
+        """Account for a reply that has not come within Cmd_Timeout (S0, counter 2545)."""
+        self.counters.command_timeouts += 1
+        self._stations[station].overdue += keeps_others_waiting
+        self.note(Message.ERR_COMMAND_TIMEOUT, station=station)
+
+    def overdue(self, task: Task, *, keeps_others_waiting: bool) -> None:
+        """End a task whose reply has not come within Cmd_Timeout."""
+        self.late(task.command.dst, keeps_others_waiting=keeps_others_waiting)
+        task.fail(CommandTimeout())
