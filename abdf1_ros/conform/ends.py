@@ -176,7 +176,7 @@ class PeerEnd:
     def settle(self) -> None:
         """Acknowledge what the other still wants to be rid of."""
         end = self.wire.now + 10 * self.wire.answer_time
-        while self.wire.now < end and (symbol := self.wire.hear(0.2)) is not None:
+        while self.wire.now < end and (symbol := self.wire.hear()) is not None:
             if symbol.kind in (SymbolKind.MESSAGE, SymbolKind.ENQ):
                 self.wire.send(codec.ACK)
 
