@@ -1,0 +1,215 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Heartbeats and fallbacks on a line with noise and faults, with publishers that come and go.
+
+Every value that is published is another one, so what the PLC executes tells who asked for it and
+when. Three things have to hold in every mode, whatever happens (docs/heartbeats.md).
+"""
+
+from __future__ import annotations
+
+import itertools
+from random import Random
+
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.errors import PortLost
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.plan.forecast import longest_transaction
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+from support.driver_bench import Recorder, simulated_plc
+from support.mappings import make_mapping
+from support.virtual_line import Noise, QUIET, VirtualLine
+
+AFTER = 0.6
+SAFE = 32_000
+SECONDS = 30.0
+STEP = 0.05
+FLIGHT = 0.05  # s that a frame takes to the PLC, at most
+SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
+MODES = {'Message': {'polling': 'Message'}, 'Standard': {'polling': 'Standard'},
+         'Peer': {'mode': 'Peer'}}
+
+
+class World:
+    """A driver, a PLC, the line between them, and two publishers."""
+
+    def __init__(self, mode: str, seed: int) -> None:
+        self.dice = Random(seed)
+        fallback = Fallback((SAFE,), int(AFTER * 1000))
+        self.rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}', fallback=fallback)
+                     for number in range(2)]
+        beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=300, heartbeat=Heartbeat())
+        read = make_mapping('N9:0', period=100)
+        self.network = Network(
+            baud=38400, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
+            **MODES[mode])  # type: ignore[arg-type]
+        self.listener = Recorder(self.clock)
+        self.driver = Driver(self.network, [*self.rows, beat, read], DriverSettings(),
+                             self.listener)
+        self.plc = simulated_plc(1, 'PLC5', self.clock, ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
+        far = self._peer() if mode == 'Peer' else self._slave()
+        self.line = VirtualLine(self.driver.machine, far, baud=38400, chunk=8, seed=seed)
+        self.published: dict[int, float] = {}
+        self.beats: list[tuple[float, int]] = []
+        self.executed: list[tuple[float, int, int, float]] = []
+        self.is_alive = True
+        self.silent = self.refuses = False
+        self.troubled = 0.0  # when something was wrong last
+        self._values = itertools.count(1)
+
+    def _slave(self) -> Machine:
+        self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
+        return Machine(multidrop([self.plc]), checksum=self.network.checksum)
+
+    def _peer(self) -> Machine:
+        self.plc.be_full_duplex()
+        return Machine(
+            lambda machine: FullDuplexPeer(
+                machine, PeerSettings(self.network.checksum), ActiveStationList(),
+                self._serve).run(self.plc),
+            checksum=self.network.checksum, duplex=Duplex.FULL)
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.line.now if hasattr(self, 'line') else 0.0
+
+    def _serve(self, command: Packet) -> Packet:
+        if self.refuses and command.cmd == 0x0F and command.data[:1] == b'\x67':
+            return command.reply(sts=0x10)
+        before = self.words()
+        reply = self.plc.serve(command)
+        after = self.words()
+        if after[2] != before[2]:
+            self._beaten(after[2])
+        for number in range(2):
+            if after[number] != before[number]:
+                sent = self.driver.interlocks.fallbacks[number].sent
+                self.executed.append((self.line.now, number, after[number], sent))
+        return reply
+
+    def words(self) -> list[int]:
+        """Return both outputs and the heartbeat."""
+        return [int.from_bytes(self.plc.table.read(
+            parse_address(text, self.plc.table.plc_type), 1), 'little')
+            for text in ('N7:0', 'N7:1', 'N10:0')]
+
+    def _beaten(self, value: int) -> None:
+        """Check that no fallback was due when a counting heartbeat left (rule 3 b)."""
+        self.beats.append((self.line.now, value))
+        for row in self.driver.interlocks.fallbacks:
+            is_due = row.cause is not None and row._due_since < self.line.now - FLIGHT
+            assert not (value and is_due), (self.line.now, row.cause)
+
+    def publish(self, row: Mapping) -> None:
+        """Publish a value that nobody has published before."""
+        value = next(self._values) % 31_000 + 1
+        self.published[value] = self.line.now
+        self.driver.write([row], [value], self.line.now)
+        self.line.wake(self.driver.machine)
+
+    def run(self) -> None:
+        """Let time pass, with all that can happen."""
+        self.line.start()
+        rates = [0.0, 0.0]
+        until = 0.0
+        for _ in range(int(SECONDS / STEP)):
+            if self.is_alive:
+                self.driver.interlocks.executor_ran(self.line.now)
+            if self.line.now >= until:
+                rates = [self.dice.choice([0.0, 0.2, 0.9]) for _ in range(2)]
+                until = self.line.now + self.dice.uniform(1.0, 4.0)
+                self._trouble()
+            for row, rate in zip(self.rows, rates, strict=True):
+                if self.dice.random() < rate:
+                    self.publish(row)
+            self.line.run_for(STEP)
+            self._check_outputs()
+
+    def _trouble(self) -> None:
+        """End what is wrong, and let something else go wrong."""
+        machine = self.driver.machine
+        self.plc.faults.silent = self.refuses = False
+        self.plc.processor.setting = Setting.RUN
+        self.is_alive = True
+        self.line.noise = QUIET
+        what = self.dice.randrange(9)
+        if what < 2:
+            self.line.noise = SMALL
+        elif what == 2:
+            self.plc.faults.silent = True
+        elif what == 3:
+            self.refuses = True
+        elif what == 4:
+            machine.stop(PortLost('unplugged'))
+            machine.start(self.line.now)
+        elif what == 5:
+            self.line.pause(machine, self.dice.uniform(0.2, 3.0))
+        elif what == 6:
+            self.is_alive = False
+        elif what == 7:
+            self.plc.processor.setting = Setting.PROGRAM
+
+    @property
+    def is_sound(self) -> bool:
+        """Tell whether station and bridge work."""
+        is_quiet = self.line.noise is QUIET and not self.plc.faults.silent and not self.refuses
+        return is_quiet and self.driver.is_online and self.driver.stations[1].active \
+            and self.line._away[0] <= self.line.now
+
+    def _check_outputs(self) -> None:
+        """Check that nothing but the fallback stands for long (rules 7, 8)."""
+        if not self.is_sound:
+            self.troubled = self.line.now
+            return
+        bound = AFTER + longest_transaction(self.network)
+        if self.line.now < self.troubled + bound:
+            return
+        for number, value in enumerate(self.words()[:2]):
+            if value not in (SAFE, 0):
+                assert self.line.now - self.published[value] < bound, (self.line.now, number)
+
+
+@pytest.mark.parametrize('mode', MODES)
+@settings(max_examples=4)
+@given(seed=st.integers(0, 2**32))
+def test_whatever_happens_no_beat_vouches_for_it_and_no_output_stands(
+        mode: str, seed: int) -> None:
+    world = World(mode, seed)
+    world.run()
+    assert len(world.beats) > 5
+    for (when, number, value, sent) in world.executed:
+        if value != SAFE:  # nothing that was published before a fallback is executed after it
+            assert world.published[value] > sent, (when, number)
+    outcomes = [result.outcome for result in world.listener.results]
+    assert Outcome.FALLBACK in outcomes
+    assert Outcome.WRITTEN in outcomes
+    asked = len(world.published)
+    told = len([outcome for outcome in outcomes if outcome is not Outcome.FALLBACK])
+    assert asked - told <= 2 * len(world.rows)  # those that wait or are being read back
