@@ -23,10 +23,10 @@ from dataclasses import dataclass
 import os
 import select
 import threading
-import time
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.errors import PortLost
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 
 # Between attempts to open a port (s). They cost next to nothing, and whoever has plugged a
@@ -127,7 +127,7 @@ class LinkThread(threading.Thread):
                  on_fault: Callable[[Exception], None] = lambda error: None,
                  while_sending: Callable[[], None] = lambda: None,
                  retry_period: float = _RETRY_PERIOD,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+                 clock: Callable[[], float] = line_time) -> None:
         super().__init__(name='df1 link')
         self.state = PortState(False, 'not opened yet')
         self.has_failed = False

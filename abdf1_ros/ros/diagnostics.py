@@ -20,7 +20,6 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean
-import time
 
 from abdf1_ros.df1.polling import StandardPollingMaster
 from abdf1_ros.df1.slave_link import SlaveLink
@@ -30,6 +29,7 @@ from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
 from abdf1_ros.ros.station_health import health_values, trouble, wrong_type
 from abdf1_ros.settings.mapping import Mapping
@@ -403,7 +403,7 @@ class _Rate:
     def __init__(self) -> None:
         self.transactions = 0.0
         self.load = 0.0
-        self._seen = (time.monotonic(), 0, 0)
+        self._seen = (line_time(), 0, 0)
 
     def update(self, driver: Driver, now: float) -> None:
         before, transactions, characters = self._seen

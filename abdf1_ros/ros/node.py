@@ -42,6 +42,7 @@ from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.paths import package_version
 from abdf1_ros.plan.report import setting_remarks
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
@@ -149,8 +150,8 @@ class BridgeNode(Node):
             self.destroy_node()
             raise
         self._tell(configuration)
-        self._log = EventLog(self.get_logger(), time.monotonic)
-        self._lines = LineLog(self.get_logger(), time.monotonic)
+        self._log = EventLog(self.get_logger(), line_time)
+        self._lines = LineLog(self.get_logger(), line_time)
         self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
         self._active = self.create_publisher(
             UInt16MultiArray, '~/active_stations', latched_qos())
@@ -253,12 +254,12 @@ class BridgeNode(Node):
         """End the link thread, then tell the last state; the node may be destroyed after it."""
         self.link.stop()
         self._opener.close()
-        self._publish_diagnostics(time.monotonic())
+        self._publish_diagnostics(line_time())
         # Without a publisher, what is still under way would not arrive.
         self._diagnostics_publisher.wait_for_all_acked(_LAST_WORDS)
 
     def _lost(self, topic: str, count: int) -> None:
-        self._diagnostics.lost(topic, count, time.monotonic())
+        self._diagnostics.lost(topic, count, line_time())
         self._lines.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
                             'lost on their way here, and have no result: they come faster than '
                             'they can be taken')
@@ -270,7 +271,7 @@ class BridgeNode(Node):
 
     def written(self, result: WriteResult) -> None:
         """Publish the result of a write."""
-        self._diagnostics.written(result, time.monotonic())
+        self._diagnostics.written(result, line_time())
         mapping = result.mapping
         level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
         if level == DiagnosticStatus.ERROR:
@@ -286,7 +287,7 @@ class BridgeNode(Node):
 
     def happened(self, event: Event) -> None:
         """Log a numbered event and remember it for the diagnostics."""
-        self._diagnostics.happened(event, time.monotonic())
+        self._diagnostics.happened(event, line_time())
         is_change = event.message is Message.ERR_INACTIVE_STATION \
             and event.station in self.driver.stations
         if not is_change:  # that is logged by station_changed
@@ -321,7 +322,7 @@ class BridgeNode(Node):
 
     def check(self) -> None:
         """Publish diagnostics when they are due or a level has changed; end what waits."""
-        now = time.monotonic()
+        now = line_time()
         self._look_at_files(now)
         self._link_counters.check(now)
         if self._duplicate_names.look(now):

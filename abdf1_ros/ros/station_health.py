@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-import time
 
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.task import Future
@@ -102,7 +102,7 @@ class LinkCounterService:
         for station in self._asked:
             self._driver.request_counters(station)
         self._link.wake()
-        self._give_up = time.monotonic() + _PATIENCE
+        self._give_up = line_time() + _PATIENCE
         self._done = Future()
         await self._done
         response.success = all(self._has_told(station) for station in self._asked)

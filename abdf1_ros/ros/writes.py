@@ -30,6 +30,7 @@ from typing import Any
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.errors import FormatError
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
@@ -118,7 +119,7 @@ class WriteTopic:
         now = time.time_ns()
         stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
         waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
-        requested = time.monotonic() - waited
+        requested = line_time() - waited
         request = _request(message, info)
         try:
             self._check_age(waited)

@@ -1,0 +1,29 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The clock of everything that runs on a line."""
+
+from __future__ import annotations
+
+import time
+
+
+def line_time() -> float:
+    """
+    Return seconds that never go back, and that count also while the host sleeps.
+
+    A monotonic clock stands still during a suspend: what was said to a PLC before would look
+    young after it. Values of this clock are compared with each other only.
+    """
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
