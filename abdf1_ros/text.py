@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Text from outside, made safe to show."""
+"""Text from outside, made safe to show, and values as text."""
 
 from __future__ import annotations
 
@@ -29,3 +29,8 @@ def printable(text: str) -> str:
         return text
     return ''.join(
         character if character.isprintable() else ascii(character)[1:-1] for character in text)
+
+
+def value_text(value: float) -> str:
+    """Return a value as text, with as many digits as a float32 is good for."""
+    return str(value) if isinstance(value, int) else f'{value:.7g}'

@@ -23,9 +23,10 @@ from enum import Enum
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
-from abdf1_ros.settings.limits import raw_values, value_text
+from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, Publish
 from abdf1_ros.settings.values import Values, ValueType
+from abdf1_ros.text import value_text
 
 _SHOWN_VALUES = 16
 _SHOWN_CHARACTERS = 100  # more than a PLC string has
@@ -196,9 +197,7 @@ class Write:
     def bit_change(self, packet: int) -> tuple[Address, int, int]:
         """Return word, mask and bits of a packet that changes bits."""
         assert not isinstance(self.raw, str)
-        address = self.mapping.address
-        mask, bits = self.mapping.codec.bit_changes(self.raw)[packet]
-        return address.at_offset(address.offset + packet), mask, bits
+        return self.mapping.codec.bit_changes(self.mapping.address, self.raw)[packet]
 
     @property
     def is_pulse(self) -> bool:
@@ -245,8 +244,7 @@ def _commands(mapping: Mapping, values: Sequence[float] | str) -> list[Request]:
     dialect = mapping.dialect
     if mapping.type is ValueType.BOOL:
         assert not isinstance(values, str)
-        return [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
-                for n, (mask, bits) in enumerate(codec.bit_changes(values))]
+        return [dialect.write_bits(*change) for change in codec.bit_changes(address, values)]
     data = codec.encode(values)
     whole = Transfer(address, len(data) // 2)
     return [dialect.write(address.at_offset(address.offset + first),

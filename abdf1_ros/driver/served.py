@@ -143,8 +143,8 @@ class Served:
         start = _first_word(mapping)
         if mapping.type is ValueType.BOOL:
             assert not isinstance(values, str)
-            for number, (mask, bits) in enumerate(mapping.codec.bit_changes(values)):
-                self._table.write_bits(start.at_offset(start.offset + number), mask, bits)
+            for change in mapping.codec.bit_changes(start, values):
+                self._table.write_bits(*change)
         else:
             self._table.write(start, mapping.codec.encode(values))
         self._table.changed.clear()  # nobody has to be told of what we write ourselves

@@ -34,6 +34,7 @@ from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING as SLC
 from abdf1_ros.pccc.slc.files import BY_CODE
 from abdf1_ros.pccc.typed_data import TypedData
+from abdf1_ros.text import value_text
 
 _BY_PLC5_FILE = {
     kind.default_file: kind for kind in FileType
@@ -139,7 +140,7 @@ def _longs(data: bytes) -> str:
 
 def _floats(data: bytes) -> str:
     return hexadecimal(data) if len(data) % 4 else ' '.join(
-        f'{value:.7g}' for value in _unpack('f', data))
+        map(value_text, _unpack('f', data)))
 
 
 def _unpack(code: str, data: bytes) -> tuple[Any, ...]:

@@ -22,11 +22,7 @@ from collections.abc import Sequence
 from abdf1_ros.errors import FormatError
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import ValueType
-
-
-def value_text(value: float) -> str:
-    """Return a value as text, with as many digits as a float32 is good for."""
-    return str(value) if isinstance(value, int) else f'{value:.7g}'
+from abdf1_ros.text import value_text
 
 
 def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[float] | str:

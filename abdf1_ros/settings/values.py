@@ -187,12 +187,13 @@ class Codec:
         mask = (1 << 8 * size) - 1
         return b''.join((int(value) & mask).to_bytes(size, 'little') for value in values)
 
-    def bit_changes(self, values: Sequence[float]) -> list[tuple[int, int]]:
-        """Return mask and bits for each word that bits touch."""
+    def bit_changes(self, start: Address,
+                    values: Sequence[float]) -> list[tuple[Address, int, int]]:
+        """Return word, mask and bits for each word that bits from ``start`` on touch."""
         number = sum(int(value) << n for n, value in enumerate(values)) << self.bit
         mask = (1 << self.length) - 1 << self.bit
-        return [(mask >> at & 0xFFFF, number >> at & 0xFFFF)
-                for at in range(0, 16 * self.words, 16)]
+        return [(start.at_offset(start.offset + n), mask >> 16 * n & 0xFFFF,
+                 number >> 16 * n & 0xFFFF) for n in range(self.words)]
 
 
 def _from_bcd(word: int) -> int:

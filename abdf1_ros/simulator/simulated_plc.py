@@ -246,8 +246,8 @@ class SimulatedPlc:
         codec.check(values)
         dialect = dialect_of(address.plc_type)
         if codec.type is ValueType.BOOL:
-            requests = [dialect.write_bits(address.at_offset(address.offset + n), mask, bits)
-                        for n, (mask, bits) in enumerate(codec.bit_changes(values))]
+            requests = [dialect.write_bits(*change)
+                        for change in codec.bit_changes(address, values)]
         else:
             requests = [dialect.write(address, codec.encode(values))]
         for cmd, body in requests:
@@ -400,5 +400,5 @@ def _store(table: DataTable, address: Address, codec: Codec,
         table.write(address, codec.encode(values))
         return
     assert not isinstance(values, str)
-    for number, (mask, bits) in enumerate(codec.bit_changes(values)):
-        table.write_bits(address.at_offset(address.offset + number), mask, bits)
+    for change in codec.bit_changes(address, values):
+        table.write_bits(*change)

@@ -111,8 +111,8 @@ class PlcEnd:
             self._plc.table.write(address, codec.encode(wanted(values, codec.type)))
             return
         assert not isinstance(values, str)
-        for mask, bits in codec.bit_changes(values):
-            self._plc.table.write_bits(address, mask, bits)
+        for change in codec.bit_changes(address, values):
+            self._plc.table.write_bits(*change)
 
     def take(self, case: Case, expected: Values) -> Values:
         """Return what is in the PLC's table."""

@@ -148,8 +148,8 @@ class Df1dSlave:
             self._table.write(address, codec.encode(wanted(values, codec.type)))
         else:
             assert not isinstance(values, str)
-            for mask, bits in codec.bit_changes(values):
-                self._table.write_bits(address, mask, bits)
+            for change in codec.bit_changes(address, values):
+                self._table.write_bits(*change)
         return {'done': True}
 
     def close(self) -> None:

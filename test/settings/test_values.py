@@ -63,10 +63,12 @@ def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
         values: list[int], bit: int, words: bytes) -> None:
     codec = Codec(ValueType.BOOL, len(values), bit)
     before = int.from_bytes(words[:2 * codec.words], 'little')
-    changes = codec.bit_changes(values)
+    start = parse_address('B3:7', PlcType.SLC)
+    changes = codec.bit_changes(start, values)
     assert len(changes) == codec.words
     after = before
-    for number, (mask, bits) in enumerate(changes):
+    for number, (address, mask, bits) in enumerate(changes):
+        assert address == start.at_offset(7 + number)
         after = after & ~(mask << 16 * number) | (bits & mask) << 16 * number
         assert bits & ~mask == 0
     ours = (1 << len(values)) - 1 << bit
@@ -207,7 +209,10 @@ def test_words_of_one_value(codec: Codec, words: int) -> None:
 def test_bits_across_words() -> None:
     codec = Codec(ValueType.BOOL, 4, 14)
     assert list(codec.decode(bytes.fromhex('00 40 02 00'))) == [1, 0, 0, 1]
-    assert codec.bit_changes([1, 0, 0, 1]) == [(0xC000, 0x4000), (0x0003, 0x0002)]
+    start = parse_address('B3:0/14', PlcType.SLC)
+    assert [(str(address), mask, bits)
+            for address, mask, bits in codec.bit_changes(start, [1, 0, 0, 1])] == [
+        ('B3:0', 0xC000, 0x4000), ('B3:1', 0x0003, 0x0002)]
 
 
 @pytest.mark.parametrize('text, family, natural', [

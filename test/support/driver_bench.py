@@ -108,9 +108,9 @@ def store(plc: SimulatedPlc, text: str, values: Sequence[float] | str) -> None:
         plc.table.write(address, codec.encode(values))
         return
     assert not isinstance(values, str)
-    changes = Codec(ValueType.BOOL, len(values), address.bit).bit_changes(values)
-    for number, (mask, bits) in enumerate(changes):
-        plc.table.write_bits(address.at_offset(address.offset + number), mask, bits)
+    codec = Codec(ValueType.BOOL, len(values), address.bit)
+    for change in codec.bit_changes(address, values):
+        plc.table.write_bits(*change)
 
 
 def stored(plc: SimulatedPlc, text: str, words: int = 1) -> bytes:

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 import textwrap
 
-from abdf1_ros.text import printable
+from abdf1_ros.text import printable, value_text
 
 # Seconds without diagnostics from which on this is said; by default they come every second.
 _SILENCE = 3.0
@@ -146,7 +146,7 @@ def show(values: Sequence[float] | str, width: int) -> str:
     if isinstance(values, str):
         return _cut(f'"{printable(values)}"', width)
     # An element takes two characters or more: no need to write out what cannot fit.
-    texts = [_number(value) for value in values[:width // 2 + 1]]
+    texts = [value_text(value) for value in values[:width // 2 + 1]]
     for count in range(len(texts), 0, -1):
         rest = len(values) - count
         text = ' '.join(texts[:count]) + (f' and {rest} more' if rest else '')
@@ -256,10 +256,6 @@ def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[Line
 
 def _pairs(values: Mapping[str, str], keys: Sequence[str]) -> str:
     return ', '.join(f'{key} {values[key]}' for key in keys if key in values)
-
-
-def _number(value: float) -> str:
-    return str(value) if isinstance(value, int) else f'{value:.7g}'  # what a float32 is good for
 
 
 def _cut(text: str, width: int) -> str:

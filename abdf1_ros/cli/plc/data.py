@@ -36,6 +36,7 @@ from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import Fault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.values import Values, ValueType
+from abdf1_ros.text import value_text
 
 # What stands on the command line for a column of a map CSV.
 _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
@@ -176,14 +177,10 @@ def rows(mapping: Mapping, values: Values) -> Iterator[tuple[str, str]]:
         yield str(mapping.address), repr(values)
         return
     step = _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
-    width = max(len(_show(value)) for value in values)
+    width = max(len(value_text(value)) for value in values)
     for first in range(0, len(values), step):
-        shown = (_show(value).rjust(width) for value in values[first:first + step])
+        shown = (value_text(value).rjust(width) for value in values[first:first + step])
         yield str(element(mapping, first)), '  '.join(shown)
-
-
-def _show(value: float) -> str:
-    return str(value) if isinstance(value, int) else f'{value:.7g}'
 
 
 def element(mapping: Mapping, number: int) -> Address:
