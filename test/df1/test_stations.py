@@ -26,6 +26,8 @@ REPLY = Packet(dst=5, src=7, cmd=0x4F, sts=0, tns=0x0102)
 def test_every_station_counts_as_active_at_start() -> None:
     stations = ActiveStationList([9, 3, 3])
     assert [(station.number, station.active) for station in stations] == [(3, True), (9, True)]
+    assert [(station.replies, station.failures, station.remote_errors, station.overdue)
+            for station in stations] == 2 * [(0, 0, 0, 0)]
 
 
 def test_stations_can_be_added() -> None:

@@ -98,6 +98,9 @@ def test_plc5_ignores_the_address_of_counters(counters: Counters) -> None:
 
 def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None:
     served = ServedCounters(counters, Layout.SLC_SLAVE)
+    before = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
+    assert answer(PlcType.SLC, RESET_REQUEST + b'\1', served) == reply(sts=REFUSED)
+    assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == before != reply(bytes(26))
     assert answer(PlcType.SLC, RESET_REQUEST, served) == reply()
     assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == reply(bytes(26))
     assert counters.messages_sent == 300
