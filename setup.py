@@ -44,12 +44,13 @@ setup(
         (f'share/{PACKAGE}/wireshark', ['wireshark/abdf1.lua']),
     ],
     zip_safe=False,
-    install_requires=['setuptools', 'pyserial'],
+    install_requires=['setuptools', 'pyserial', 'PyYAML'],
     # Not tests_require: newer setuptools ignores it, and colcon test would then run no pytest.
     extras_require={'test': ['hypothesis', 'pytest', 'pytest-timeout']},
     entry_points={
         'console_scripts': [
             f'node = {PACKAGE}.cli.main:node',
+            f'lines = {PACKAGE}.cli.main:lines',
             f'simulator = {PACKAGE}.cli.main:simulator',
             f'sniff = {PACKAGE}.cli.main:sniff',
             f'check = {PACKAGE}.cli.main:check',

@@ -36,6 +36,7 @@ _INTERRUPTED = 130  # of the commands whose status tells whether they have done 
 
 COMMANDS = {
     'node': 'abdf1_ros.ros.node',
+    'lines': 'abdf1_ros.ros.lines',
     'monitor': 'abdf1_ros.cli.monitor.command',
     'demo': 'abdf1_ros.cli.demo',
     'simulator': 'abdf1_ros.cli.simulator',
@@ -59,6 +60,11 @@ def run(name: str) -> int:
 def node() -> int:
     """Run the node."""
     return run('node')
+
+
+def lines() -> int:
+    """Run many lines."""
+    return run('lines')
 
 
 def monitor() -> int:

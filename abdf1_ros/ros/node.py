@@ -106,8 +106,8 @@ _LAST_WORDS = Duration(seconds=0.5)
 
 # Nothing that came before the end is still waiting when nothing comes for so long (s), and a
 # publisher that never rests is not waited for any longer than the other.
-_QUIET = 0.05
-_LAST_WRITES = 0.5
+QUIET = 0.05
+LAST_WRITES = 0.5
 
 _MOST_NAMES = 5  # in a line of the log
 _MOST_REMARKS = 20  # about both files, in the log
@@ -181,12 +181,16 @@ class BridgeNode(Node):
         self._diagnostics = self._make_diagnostics(None)
         self._writes = WriteTopics(self, parameters.write_timeout, self._lost, self.link.wake)
         self._writes.use(self.driver)
-        self._link_counters = LinkCounterService(self.driver, self.link)
+        self._link_counters = LinkCounterService(self.driver, self.link, self._wake_executor)
         self._create_services()
         if has_timer:
             # Not the node's clock: that may be a simulation's, which need not run.
             self.create_timer(LEVEL_CHECK_PERIOD, self.check,
                               clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _wake_executor(self) -> None:
+        if self.executor is not None:
+            self.executor.wake()
 
     @property
     def _port(self) -> str:
@@ -246,17 +250,26 @@ class BridgeNode(Node):
             self.get_logger().warning(
                 f'and {len(remarks) - _MOST_REMARKS} more remarks; "check" has them all')
 
+    @property
+    def writes_taken(self) -> int:
+        """Return how many messages to write topics have come."""
+        return self._writes.taken
+
     def start(self) -> None:
         """Open the port and begin to read."""
         self.link.start()
 
-    def stop(self) -> None:
-        """End the link thread, then tell the last state; the node may be destroyed after it."""
+    def stop(self, patience: Duration = _LAST_WORDS) -> None:
+        """
+        End the link thread, then tell the last state; the node may be destroyed after it.
+
+        ``patience`` is for a subscriber that is stuck.
+        """
         self.link.stop()
         self._opener.close()
         self._publish_diagnostics(line_time())
         # Without a publisher, what is still under way would not arrive.
-        self._diagnostics_publisher.wait_for_all_acked(_LAST_WORDS)
+        self._diagnostics_publisher.wait_for_all_acked(patience)
 
     def _lost(self, topic: str, count: int) -> None:
         self._diagnostics.lost(topic, count, line_time())
@@ -440,6 +453,19 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors and
     where ROS does not start for a reason that may pass.
     """
+    return run_ros(NODE_NAME, args, _parse, _run)
+
+
+def run_ros(name: str, args: Sequence[str] | None,
+            parse: Callable[[Sequence[str], Sequence[str]], None],
+            run: Callable[[Sequence[str], threading.Event], int]) -> int:
+    """
+    Call ``run`` in a ROS context; what keeps it from starting is told as ``name``.
+
+    ``parse`` gets the arguments without, and with, those of ROS. ``run`` is to end soon after its
+    event has been set, by a signal, and returns the exit status; that of faults is as in
+    ``main``.
+    """
     ended = threading.Event()
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -451,27 +477,30 @@ def main(args: Sequence[str] | None = None) -> int:
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # not under nohup
         signal.signal(signal.SIGHUP, end)
     try:
-        _parse(remove_ros_args(given)[1:])
+        parse(remove_ros_args(given)[1:], given)
         _check_log_directory()
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
-        node = BridgeNode()
+        return run(given, ended)
     except ConfigurationError as error:
         for problem in error.problems:
-            get_logger(NODE_NAME).fatal(str(problem))
-        rclpy.try_shutdown()
+            get_logger(name).fatal(str(problem))
         return EXIT_CONFIGURATION
     except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
         status, text = _refusal(error)
-        print(f'{NODE_NAME}: {text}', file=sys.stderr)
-        rclpy.try_shutdown()
+        print(f'{name}: {text}', file=sys.stderr)
         return status
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run(given: Sequence[str], ended: threading.Event) -> int:
+    node = BridgeNode()
     try:
         _spin(node, ended)
     finally:
         node.stop()
     failed = node.link.has_failed
     node.destroy_node()
-    rclpy.try_shutdown()
     return EXIT_FAULT if failed else 0
 
 
@@ -506,7 +535,7 @@ def _refusal(error: Exception) -> tuple[int, str]:
     return EXIT_CONFIGURATION, f'bad arguments: {text}'
 
 
-def _parse(args: Sequence[str]) -> None:
+def _parse(args: Sequence[str], ros_args: Sequence[str]) -> None:
     """Tell who asks for help; all that the node takes are ROS arguments."""
     parser = argparse.ArgumentParser(
         prog='node', description=_HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -525,9 +554,9 @@ def _spin(node: BridgeNode, ended: threading.Event) -> None:
         executor.spin_once(timeout_sec=0.1)
     node.link.stop()
     # Writes that have come already are refused now; whoever waits for a result gets it.
-    give_up = time.monotonic() + _LAST_WRITES
+    give_up = time.monotonic() + LAST_WRITES
     is_idle = False
     while not is_idle and (begun := time.monotonic()) < give_up:
-        executor.spin_once(timeout_sec=_QUIET)
-        is_idle = time.monotonic() - begun >= _QUIET
+        executor.spin_once(timeout_sec=QUIET)
+        is_idle = time.monotonic() - begun >= QUIET
     executor.shutdown()

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
@@ -78,11 +78,14 @@ class LinkCounterService:
 
     ``answer`` is the callback. It waits without holding up the executor, in a callback group of
     its own, and goes on when ``check`` finds that all have answered, or after five seconds.
+    ``check`` may be called by another thread; it calls ``wake_executor`` then.
     """
 
-    def __init__(self, driver: Driver, link: LinkThread) -> None:
+    def __init__(self, driver: Driver, link: LinkThread,
+                 wake_executor: Callable[[], None] = lambda: None) -> None:
         self._driver = driver
         self._link = link
+        self._wake_executor = wake_executor
         self._asked: list[int] = []
         self._give_up = 0.0
         self._done: Future | None = None
@@ -115,6 +118,7 @@ class LinkCounterService:
             return
         if now >= self._give_up or not any(map(self._is_waited_for, self._asked)):
             self._done.set_result(None)
+            self._wake_executor()
 
     def _is_waited_for(self, station: int) -> bool:
         return self._driver.is_online and station in self._driver.health.counters_wanted

@@ -141,7 +141,7 @@ class WriteTopics:
     """
     The write topics of a node; ``use`` may be called again, in the thread of the executor.
 
-    ``on_loss``, ``wake`` and ``patience`` are those of ``WriteTopic``.
+    ``on_loss``, ``wake`` and ``patience`` are those of ``WriteTopic``. ``taken`` counts messages.
     """
 
     def __init__(self, node: Node, patience: float, on_loss: Callable[[str, int], None],
@@ -151,6 +151,7 @@ class WriteTopics:
         self._on_loss = on_loss
         self._wake = wake
         self._topics: dict[str, tuple[Any, WriteTopic, Any]] = {}
+        self.taken = 0
 
     def use(self, driver: Driver) -> None:
         """Have a subscription for each topic of a driver; those that there are stay."""
@@ -176,5 +177,10 @@ class WriteTopics:
         writer = WriteTopic(
             topic, mappings, driver, self._patience, on_loss=self._on_loss, wake=self._wake,
             losses=LossCounter(partial(self._node.count_publishers, name)))
-        callback: Any = writer.take
+
+        def take(message: Any, info: Any) -> None:
+            self.taken += 1
+            writer.take(message, info)
+
+        callback: Any = take
         return kind, writer, self._node.create_subscription(kind, name, callback, write_qos())

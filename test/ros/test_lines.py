@@ -1,0 +1,264 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Many lines in one process: their names, their faults, and their end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+import signal
+import threading
+import time
+
+from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.ros import lines as module
+from abdf1_ros.ros.lines import chosen, LineName, main, parameter_files, sections
+from abdf1_ros.ros.node import BridgeNode
+import pytest
+from rclpy.utilities import get_default_context
+from std_msgs.msg import Int16MultiArray
+from std_srvs.srv import Trigger
+from support.ptys import PATIENCE
+from support.ros import (
+    details,
+    ERROR,
+    EVERYTHING,
+    get_parameters,
+    Observer,
+    OK,
+    Plcs,
+    until_status,
+    values_in,
+    write_csv,
+)
+
+PRESS, PAINT = LineName('/press', 'press_plc'), LineName('/paint', 'paint_plc')
+
+
+def yaml_file(folder: Path, text: str) -> str:
+    path = folder / 'lines.yaml'
+    path.write_text(text)
+    return str(path)
+
+
+# Names
+
+
+@pytest.mark.parametrize(('text', 'expected'), [
+    ('/press/press_plc:\n  ros__parameters: {a: 1}', ['/press/press_plc']),
+    ('press:\n  press_plc:\n    ros__parameters: {a: 1}\n  other:\n    ros__parameters: {}',
+     ['/press/press_plc', '/press/other']),
+    ('abdf1:\n  ros__parameters: {a: 1}', ['/abdf1']),
+    ('/**:\n  ros__parameters: {a: 1}\n/*/x:\n  ros__parameters: {}', []),
+    ('lines:\n  ros__parameters: {lines: [x]}\nx:\n  ros__parameters: {}', ['/x']),
+    ('', []), ('5', [])])
+def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str]) -> None:
+    assert [str(name) for name in sections(yaml_file(tmp_path, text))] == expected
+
+
+@pytest.mark.parametrize('text', [None, '{', '\x00'])
+def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) -> None:
+    path = str(tmp_path / 'nothing') if text is None else yaml_file(tmp_path, text)
+    with pytest.raises(ConfigurationError, match=path):
+        list(sections(path))
+
+
+def test_parameter_files_of_the_arguments() -> None:
+    assert parameter_files(['lines', '--ros-args', '--params-file', 'a', '-p', 'x:=1',
+                            '--params-file', 'b', '--params-file']) == ['a', 'b']
+
+
+def test_lines_are_chosen_by_name() -> None:
+    assert chosen([PRESS, PAINT], []) == [PRESS, PAINT]
+    assert chosen([PRESS, PAINT], ['paint_plc']) == [PAINT]
+    assert chosen([PRESS, PAINT], ['/press/press_plc', 'paint_plc']) == [PRESS, PAINT]
+
+
+def test_line_that_is_not_there_is_named() -> None:
+    with pytest.raises(ConfigurationError, match='no section is called glue; there are /press/'):
+        chosen([PRESS, PAINT], ['press_plc', 'glue'])
+
+
+def test_no_line_at_all() -> None:
+    with pytest.raises(ConfigurationError, match='no line to run: give a parameter file'):
+        chosen([], [])
+
+
+# A process with three lines
+
+
+class Plant:
+    """Simulated PLCs on lines of their own, and ``lines`` in a thread of this process."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self.folder = folder
+        self.observer = stack.enter_context(Observer())
+        rows = ['1,PLC5,N7:0,16,7 8']
+        self.plcs = {}
+        for name in ('a', 'b', 'c'):
+            (folder / name).mkdir()
+            data = write_csv(
+                folder / name / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
+            self.plcs[name] = stack.enter_context(Plcs(data))
+        self.status = 0
+        self._thread = threading.Thread()
+        self._end: Callable[..., None] = lambda *arguments: None
+        for name in self.plcs:
+            self.write_map(name, 'speed,Read,N7:0,1,PLC5,2')
+            write_csv(folder / f'{name}_net.csv', 'Baud,Timeout', ['115200,100'])
+
+    def write_map(self, name: str, row: str) -> None:
+        """Write the map of a line."""
+        write_csv(self.folder / f'{name}_map.csv',
+                  'Tag,Command,Address,Station,PLC_Type,Length', [row])
+
+    def start(self, *arguments: str) -> None:
+        """Run the process."""
+        text = ''.join(
+            f'/hall/{name}:\n  ros__parameters:\n    port: {plcs.port}\n'
+            f'    net_file: {self.folder}/{name}_net.csv\n'
+            f'    map_file: {self.folder}/{name}_map.csv\n' for name, plcs in self.plcs.items())
+        given = ['lines', '--ros-args', '--params-file', yaml_file(self.folder, text), *arguments]
+        self._thread = threading.Thread(target=lambda: setattr(self, 'status', main(given)))
+        self._thread.start()
+
+    def speeds(self, name: str) -> list[float] | str:
+        """Return the next value of a line."""
+        inbox = self.observer.listen(Int16MultiArray, f'/hall/{name}/read/speed', EVERYTHING)
+        value = values_in(inbox.first())
+        self.observer.forget(inbox)
+        return value
+
+    def end(self, handlers: dict[int, Callable[..., None]]) -> int:
+        """End the process as SIGTERM does; return its exit status."""
+        if self._thread.is_alive():
+            handlers[signal.SIGTERM](signal.SIGTERM, None)
+            self._thread.join(PATIENCE)
+            assert not self._thread.is_alive()
+        return self.status
+
+
+@pytest.fixture
+def handlers(monkeypatch: pytest.MonkeyPatch) -> dict[int, Callable[..., None]]:
+    """Return the handlers that are set: only the main thread could really set them."""
+    found: dict[int, Callable[..., None]] = {}
+    monkeypatch.setattr(signal, 'signal', found.__setitem__)
+    return found
+
+
+@pytest.fixture
+def plant(tmp_path: Path, handlers: dict[int, Callable[..., None]]) -> Iterator[Plant]:
+    with ExitStack() as stack:
+        plant = Plant(tmp_path, stack)
+        yield plant
+        plant.end(handlers)
+        assert not get_default_context().ok()
+
+
+def line_status(plant: Plant, level: bytes) -> dict[str, str]:
+    """Wait for the status of all lines; return its values."""
+    return details(until_status(plant.observer.diagnostics(''), 'lines', level))
+
+
+def test_each_line_is_a_node_of_its_own(
+        plant: Plant, handlers: dict[int, Callable[..., None]]) -> None:
+    plant.start()
+    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    assert get_parameters(plant.observer, 'port', node='/hall/b') == [plant.plcs['b'].port]
+    diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
+    assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
+    assert line_status(plant, OK)['running'] == '3'
+    response = plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request())
+    assert response.success
+    assert plant.end(handlers) == 0
+    assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
+
+
+def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None:
+    (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
+    plant.start()
+    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    values = line_status(plant, ERROR)
+    assert values['running'] == '2'
+    assert values['/hall/b'].startswith(f'{plant.folder}/b_net.csv:2:1 (Baud): Baud = "9601"')
+    (plant.folder / 'b_net.csv').write_text('Baud,Timeout\n115200,100\n')
+    plant.write_map('b', 'speed,Read,N7:0,1,PLC5,2')
+    plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
+    assert plant.speeds('b') == [7, 8]
+    assert line_status(plant, OK)['running'] == '3'
+
+
+def test_faulty_line_ends_all_where_that_is_asked_for(
+        plant: Plant, handlers: dict[int, Callable[..., None]]) -> None:
+    (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
+    plant.start('-p', 'strict_lines:=true')
+    plant._thread.join(PATIENCE)
+    assert plant.end(handlers) == 2
+
+
+def test_lines_that_are_named_run_alone(plant: Plant) -> None:
+    plant.start('-p', 'lines:=[c]')
+    assert plant.speeds('c') == [7, 8]
+    assert line_status(plant, OK)['lines'] == '1'
+
+
+def test_internal_error_restarts_its_line_only(
+        plant: Plant, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
+    made = []
+    monkeypatch.setattr(module, 'BridgeNode', lambda *names, **named: made.append(
+        BridgeNode(*names, **named)) or made[-1])
+    plant.start()
+    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    others = [node for node in made if node.get_name() != 'b']
+    next(node for node in made if node.get_name() == 'b')._reads._topics = {}  # a bug
+    plant.observer.until(lambda: len(made) == 4, 'another node')
+    assert plant.speeds('b') == [7, 8]
+    assert [node.link.is_alive() for node in others] == [True, True]
+    assert line_status(plant, OK)['restarts'] == '1'
+    assert 'ends by an internal error and begins again' in capfd.readouterr().err
+
+
+def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
+        plant: Plant, handlers: dict[int, Callable[..., None]],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    never = threading.Event()
+
+    def resolve(*arguments: object, **named: object) -> None:
+        never.wait(PATIENCE)
+        raise OSError('no answer')
+
+    monkeypatch.setattr('socket.getaddrinfo', resolve)
+    plant.plcs['b'].port = 'socket://device.server:4001'
+    plant.start()
+    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    began = time.monotonic()
+    assert plant.end(handlers) == 0
+    assert time.monotonic() - began < 5
+    never.set()
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['map.csv'], 'parameters follow --ros-args'),
+    (['--ros-args', '-r', '__node:=x'], 'the sections of the parameter file name the nodes')])
+def test_arguments_that_cannot_be_meant(
+        arguments: list[str], text: str, handlers: dict[int, Callable[..., None]],
+        capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ending:
+        main(['lines', *arguments])
+    assert ending.value.code == 2
+    assert text in capsys.readouterr().err
