@@ -16,13 +16,17 @@
 Start the bridges of a cell with three serial lines, each in the namespace of its machine.
 
 What differs between them stands in config/three_lines.yaml; copy both files and change them. A
-bridge that ends by itself is started again, unless its files or parameters are faulty.
+bridge that ends by itself is started again, unless its files or parameters are faulty. With
+one_process:=true all of them run in one process, the command "lines".
 """
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription
+from launch.conditions import IfCondition, UnlessCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterFile
 from launch_ros.substitutions import FindPackageShare
 
 # The namespaces: values are on /press/abdf1/read/... and so on.
@@ -35,7 +39,16 @@ def line(namespace: str) -> GroupAction:
     arguments = {'namespace': namespace, 'respawn': 'true',
                  'params_file': LaunchConfiguration('lines_file')}
     return GroupAction([IncludeLaunchDescription(
-        PythonLaunchDescriptionSource(bridge), launch_arguments=arguments.items())])
+        PythonLaunchDescriptionSource(bridge), launch_arguments=arguments.items())],
+        condition=UnlessCondition(LaunchConfiguration('one_process')))
+
+
+def all_lines() -> Node:
+    """Return all bridges in one process."""
+    sections = ParameterFile(LaunchConfiguration('lines_file'), allow_substs=True)
+    return Node(package='abdf1_ros', executable='lines', output='screen', parameters=[sections],
+                respawn=True, respawn_delay=2.0,
+                condition=IfCondition(LaunchConfiguration('one_process')))
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -46,5 +59,9 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'lines_file', default_value=lines_file,
             description='YAML file with the parameters of the three bridges'),
+        DeclareLaunchArgument(
+            'one_process', default_value='false',
+            description='true: all bridges in one process'),
         *map(line, LINES),
+        all_lines(),
     ])

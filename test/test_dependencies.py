@@ -32,7 +32,7 @@ KEYS = dict(line.split() for line in
 PINNED = ('ros.txt', 'test.txt', 'tools.txt', 'fuzz.txt', 'audit.txt')
 
 # The key that brings a module which has another name.
-BRINGS = {'serial': 'python3-serial'}
+BRINGS = {'serial': 'python3-serial', 'yaml': 'python3-yaml'}
 
 
 def keys(kind: str) -> set[str]:

@@ -34,6 +34,8 @@ from support.ros_tools import SOURCE
 
 DEPLOY = SOURCE / 'deploy'
 UNIT = DEPLOY / 'abdf1@.service'
+LINES_UNIT = DEPLOY / 'abdf1-lines.service'
+UNITS = pytest.mark.parametrize('path', [UNIT, LINES_UNIT], ids=['line', 'lines'])
 RULES = DEPLOY / '99-abdf1.rules'
 DOCKERFILE = DEPLOY / 'Dockerfile'
 SETUP = (SOURCE / 'setup.py').read_text(encoding='utf-8')
@@ -43,10 +45,10 @@ EXECUTABLES = set(re.findall(r"f'(\w+) = \{PACKAGE\}", SETUP))
 # systemd
 
 
-def unit() -> dict[str, dict[str, list[str]]]:
+def unit(path: Path = UNIT) -> dict[str, dict[str, list[str]]]:
     """Return the settings of the unit by section; each may be there several times."""
     sections: dict[str, dict[str, list[str]]] = {}
-    for line in UNIT.read_text(encoding='utf-8').splitlines():
+    for line in path.read_text(encoding='utf-8').splitlines():
         if line.startswith('['):
             section = sections.setdefault(line.strip('[]'), {})
         elif line and not line.startswith('#'):
@@ -55,10 +57,11 @@ def unit() -> dict[str, dict[str, list[str]]]:
     return sections
 
 
-def test_unit_has_the_syntax_of_systemd() -> None:
+@UNITS
+def test_unit_has_the_syntax_of_systemd(path: Path) -> None:
     parser = configparser.ConfigParser(strict=False, interpolation=None)
     parser.optionxform = str  # type: ignore[assignment,method-assign]
-    parser.read_string(UNIT.read_text(encoding='utf-8'))
+    parser.read_string(path.read_text(encoding='utf-8'))
     assert parser.sections() == ['Unit', 'Service', 'Install']
 
 
@@ -70,16 +73,18 @@ def test_systemd_finds_nothing_wrong(tmp_path: Path) -> None:
     assert (result.returncode, result.stderr) == (0, '')
 
 
-def test_unit_starts_again_after_what_may_pass_only() -> None:
-    service = unit()['Service']
+@UNITS
+def test_unit_starts_again_after_what_may_pass_only(path: Path) -> None:
+    service = unit(path)['Service']
     assert service['Restart'] == ['on-failure']
     assert service['RestartPreventExitStatus'] == ['2']  # faulty files
     assert service['KillSignal'] == ['SIGINT']
-    assert unit()['Unit']['StartLimitIntervalSec'] == ['0']
+    assert unit(path)['Unit']['StartLimitIntervalSec'] == ['0']
 
 
-def test_unit_may_open_serial_ports_only() -> None:
-    service = unit()['Service']
+@UNITS
+def test_unit_may_open_serial_ports_only(path: Path) -> None:
+    service = unit(path)['Service']
     assert service['DevicePolicy'] == ['closed']
     assert set(service['DeviceAllow']) == {
         'char-ttyS rw', 'char-ttyUSB rw', 'char-ttyACM rw'}
@@ -88,25 +93,29 @@ def test_unit_may_open_serial_ports_only() -> None:
     assert service['CapabilityBoundingSet'] == ['']
 
 
-def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(tmp_path: Path) -> None:
+@pytest.mark.parametrize(('path', 'command', 'file', 'section'), [
+    (UNIT, 'node', 'press.yaml', '/**'), (LINES_UNIT, 'lines', 'lines.yaml', '/press')],
+    ids=['line', 'lines'])
+def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(
+        tmp_path: Path, path: Path, command: str, file: str, section: str) -> None:
     """Run ExecStart as it stands, with an installation and an /etc/abdf1 of our own."""
     install, etc = tmp_path / 'install', tmp_path / 'etc'
-    node = install / 'lib' / 'abdf1_ros' / 'node'
-    node.parent.mkdir(parents=True)
-    node.write_text(f'#!/bin/sh\nexec {sys.executable} -m abdf1_ros node "$@"\n')
-    node.chmod(0o755)
+    executable = install / 'lib' / 'abdf1_ros' / command
+    executable.parent.mkdir(parents=True)
+    executable.write_text(f'#!/bin/sh\nexec {sys.executable} -m abdf1_ros {command} "$@"\n')
+    executable.chmod(0o755)
     (install / 'setup.bash').write_text(f'cd {SOURCE}\n')
     etc.mkdir()
     files = ', '.join(f'{name}_file: {SOURCE}/config/{name}.csv' for name in ('net', 'map'))
-    (etc / 'press.yaml').write_text(
-        f'/**: {{ros__parameters: {{{files}, port: /dev/ttyS99, stale_after: 9.0}}}}\n')
-    service = unit()['Service']
-    (command,) = service['ExecStart']
+    (etc / file).write_text(
+        f'{section}: {{ros__parameters: {{{files}, port: /dev/ttyS99, stale_after: 9.0}}}}\n')
+    service = unit(path)['Service']
+    (start,) = service['ExecStart']
     settings = dict(entry.split('=', 1) for entry in service['Environment'])
     assert settings['ABDF1_INSTALL'] == '/opt/abdf1'
     assert settings['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     words = [word.replace('%i', 'press').replace('/etc/abdf1', str(etc))
-             for word in shlex.split(command)]
+             for word in shlex.split(start)]
     environment = os.environ | settings | {
         'ABDF1_INSTALL': str(install), 'ROS_LOG_DIR': str(tmp_path)}
     with Observer() as observer, subprocess.Popen(words, env=environment) as process:

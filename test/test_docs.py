@@ -44,9 +44,10 @@ OURS = re.compile(rf'(?:ros2 run abdf1_ros |python3? -m abdf1_ros\.|^(?:\$ )?)'
                   rf'({"|".join(COMMANDS)})\b(.*)')
 LAUNCH_ARGUMENTS = set(re.findall(
     r"DeclareLaunchArgument\(\s*'(\w+)'",
-    (documents.ROOT / 'launch' / 'bridge.launch.py').read_text('utf-8')))
+    ''.join(path.read_text('utf-8') for path in (documents.ROOT / 'launch').glob('*.py'))))
 PARAMETERS = {entry.name for entry in fields(Parameters)} | {
-    entry.parameter for entry in FIELDS.values()}
+    entry.parameter for entry in FIELDS.values()} | set(re.findall(
+        r"declare_parameter\('(\w+)'", (ROOT / 'abdf1_ros' / 'ros/lines.py').read_text('utf-8')))
 TOPICS = {'read', 'write', *re.findall(r"'~/(\w+)'", (
     ROOT / 'abdf1_ros' / 'ros/node.py').read_text('utf-8'))}
 AT_HOME = {'fuzz'}  # folders that a page puts into the user's home
@@ -131,7 +132,7 @@ def test_rows_of_a_table_have_as_many_cells_as_its_head(name: str) -> None:
 def test_commands_and_their_options_exist(name: str) -> None:
     for line in code(name):
         match = OURS.search(line)
-        if match is None or match[1] == 'node':
+        if match is None or match[1] in ('node', 'lines'):  # all theirs are ROS arguments
             continue
         command, rest = match[1], match[2].partition('#')[0]
         words = rest.split()

@@ -178,11 +178,12 @@ def test_demo_runs_the_example_on_its_simulator_and_passes_arguments_on(launch: 
 # Three lines
 
 
-def test_three_lines_run_side_by_side(launch: Starter) -> None:
+@pytest.mark.parametrize('one_process', ['false', 'true'])
+def test_three_lines_run_side_by_side(launch: Starter, one_process: str) -> None:
     sections = yaml.safe_load((SOURCE / 'config' / 'three_lines.yaml').read_text('utf-8'))
     with Observer() as observer:
         diagnostics = observer.listen(DiagnosticArray, '/diagnostics', EVERYTHING)
-        process = launch('three_lines.launch.py')
+        process = launch('three_lines.launch.py', f'one_process:={one_process}')
         for namespace in ('press', 'paint', 'packing'):
             process.wait_for(f'/dev/abdf1-{namespace}: cannot open the port')
         observer.until(

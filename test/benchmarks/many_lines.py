@@ -196,7 +196,8 @@ def measure(rig: Rig, commands: Sequence[tuple[str, Sequence[str], str]],
         running = [Running(stack.enter_context(Process(name, *arguments)), 0.0)
                    for name, arguments, _ in commands]
         for one, (_, _, text) in zip(running, commands, strict=True):
-            one.process.wait_for(text)
+            while one.process.is_running and text not in one.process.text:
+                time.sleep(0.05)
         start = time.monotonic() - begun
         time.sleep(options.settle)
         rig.pipe.send('reset')

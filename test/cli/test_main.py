@@ -27,7 +27,7 @@ from abdf1_ros.cli.main import COMMANDS
 import pytest
 
 # Each with a module that it imports, and its status when it is interrupted.
-NAMES = {'node': ('rclpy', 0), 'monitor': ('rclpy', 0), 'demo': ('rclpy', 0),
+NAMES = {'node': ('rclpy', 0), 'lines': ('yaml', 0), 'monitor': ('rclpy', 0), 'demo': ('rclpy', 0),
          'simulator': ('serial', 0), 'sniff': ('serial', 0), 'check': ('difflib', 130),
          'plc': ('serial', 130)}
 
