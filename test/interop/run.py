@@ -44,7 +44,7 @@ from abdf1_ros.df1.checksum import Checksum  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.pccc.access import Access  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
-from abdf1_ros.pccc.dialects import dialect_of  # noqa: E402
+from abdf1_ros.pccc.families import dialect_of  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.server import Server  # noqa: E402
 from abdf1_ros.settings.values import ValueType  # noqa: E402

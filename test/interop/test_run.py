@@ -1,0 +1,98 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The programs of this folder still fit the package: an exchange with ourselves."""
+
+from __future__ import annotations
+
+import ast
+from contextlib import ExitStack
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+import sys
+from types import ModuleType
+from typing import Any
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.pccc.families import dialect_of
+from abdf1_ros.pccc.file_types import PlcType
+import pytest
+
+_HERE = Path(__file__).resolve().parent
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return run.py, which looks for its own parts beside it."""
+    monkeypatch.setattr(sys, 'path', list(sys.path))
+    spec = spec_from_file_location('interop_run', _HERE / 'run.py')
+    assert spec and spec.loader
+    module = module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, 'interop_run', module)  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module
+
+
+class Client:
+    """A client of our own on the line, in place of a product."""
+
+    def __init__(self, module: ModuleType, setup: Any, port: str) -> None:
+        self._codec_of = module.codec_of
+        self._wanted = module.wanted
+        self._family = setup.family
+        self._dialect = dialect_of(setup.family)
+        self._line = module.DuplexLine(port, setup.check)
+        self._tns = 0
+
+    def read(self, case: Any) -> dict[str, Any]:
+        address, codec = self._codec_of(case, self._family)
+        data = self._execute(*self._dialect.read(address, codec.words))
+        values = codec.decode(self._dialect.read_data(address, codec.words, data))
+        return {'values': values if isinstance(values, str) else list(values)}
+
+    def write(self, case: Any, values: Any) -> dict[str, Any]:
+        if '/' in case.address:
+            return {'cannot': 'bits'}
+        address, codec = self._codec_of(case, self._family)
+        data = codec.encode(self._wanted(values, codec.type))
+        self._execute(*self._dialect.write(address, data))
+        return {'done': True}
+
+    def _execute(self, cmd: int, data: bytes) -> bytes:
+        self._tns += 1
+        reply: bytes = self._line.execute(bytes((cmd, 0)) + self._tns.to_bytes(2, 'little') + data)
+        assert reply[1] == 0
+        return reply[4:]
+
+    def close(self) -> None:
+        self._line.close()
+
+
+def test_every_value_goes_to_and_fro(run: ModuleType) -> None:
+    def start(setup: Any, port: str, stack: ExitStack) -> Client:
+        return Client(run, setup, port)
+
+    told = run.carry_out(run.Run('ourselves', PlcType.SLC, Checksum.BCC, 'plc', start), None)
+    assert [entry for entry in told if not entry[2]] == []
+    assert len(told) == len(run.CASES)
+
+
+@pytest.mark.parametrize('path', sorted((_HERE / 'players').glob('*.py')),
+                         ids=lambda path: path.name)
+def test_players_are_programs_that_need_nothing_of_this_package(path: Path) -> None:
+    imported = {
+        name.partition('.')[0] for node in ast.walk(ast.parse(path.read_text('utf-8')))
+        for name in ([node.module or ''] if isinstance(node, ast.ImportFrom) else
+                     [alias.name for alias in node.names] if isinstance(node, ast.Import) else [])}
+    assert 'abdf1_ros' not in imported
