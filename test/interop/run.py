@@ -290,6 +290,23 @@ def carry_out(run: Run, save: Path | None) -> list[tuple[str, str, bool]]:
         return [server_case(ours, partner, case) for case in cases]
 
 
+def judge(run: Run, case: str) -> None:
+    """Let conform judge who answers us, by all of its cases or by one."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        mine, theirs = stack.enter_context(tapped(folder, None))
+        cases = [entry for entry in CASES if not run.only or entry.address in run.only]
+        partner = run.start(Setup(run.family, run.check, mine, cases, folder), theirs, stack)
+        stack.callback(partner.close)
+        for entry in cases:
+            partner.write(entry, entry.before)
+        subprocess.run(
+            [sys.executable, '-m', 'abdf1_ros', 'conform', 'peer', '--port', mine, '--check',
+             run.check.value, '--station', str(THEIRS), '--family', run.family.value, '--words',
+             'N7:30', '--yes', '--answer-time', '4', *(('--only', case) if case else ())],
+            check=False)
+
+
 def server_case(ours: End, partner: Partner, case: Case) -> tuple[str, str, bool]:
     """Let the other end read, write and read words of ours."""
     told, good = [], True
@@ -454,6 +471,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--save', type=Path, help='a folder for the captures')
     parser.add_argument('--python', default=sys.executable, help='that has the product')
+    parser.add_argument('--conform', metavar='CASE', nargs='?', const='',
+                        help='let conform judge those that answer us, by one case or all')
     parser.add_argument('--only', default='', help='only runs whose name has this in it')
     products = parser.add_subparsers(dest='product', required=True)
     products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
@@ -476,11 +495,16 @@ def main() -> int:
         options.save.mkdir(parents=True, exist_ok=True)
     all_good = True
     for run in options.runs(options):
-        if options.only in run.text:
+        if options.only not in run.text:
+            continue
+        if options.conform is None:
             print(f'{run.text}:', flush=True)
             for address, text, good in carry_out(run, options.save):
                 print(f'  {"good" if good else "BAD "} {address:<10} {text}', flush=True)
                 all_good &= good
+        elif run.ours == 'client':
+            print(f'{run.text}:', flush=True)
+            judge(run, options.conform)
     return not all_good
 
 
