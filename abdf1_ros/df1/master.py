@@ -42,6 +42,7 @@ import math
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
+from abdf1_ros.df1.link import LinkStatus, NO_STATUS
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Step
 from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, Talk
 from abdf1_ros.df1.packet import BROADCAST, Packet
@@ -66,6 +67,10 @@ class HalfDuplexMaster:
         self._settings = settings
         self._stations = stations
         self._line = MasterLine(machine, settings, stations, report, serve)
+
+    def status(self) -> LinkStatus:
+        """Return that there is nothing to tell."""
+        return NO_STATUS
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source``, one after the other, for ever."""
@@ -112,7 +117,7 @@ class HalfDuplexMaster:
         number = self._stations.via(command.dst)  # on this line (M 3-7)
         self.command_sent = False
         if number != BROADCAST and not self._stations[number].active:
-            yield from self._line.revive(number)
+            yield from self._line.probe(number)
         self.command_sent = True
         started = yield from self._line.deliver(number, command, expires)
         if number == BROADCAST:

@@ -178,13 +178,13 @@ class MasterLine:
         self.note(expected, self._last_code, station=number)
         return expected
 
-    def revive(self, number: int) -> Talk:
+    def probe(self, number: int) -> Talk:
         """
         Poll an inactive station once (S0, "Active Station List").
 
         Any proper answer makes it active; StationInactive when there is none.
         """
-        answer = yield from self.probe(number)
+        answer = yield from self.poll_inactive(number)
         if not is_good(answer):
             self.fail_inactive(number)
         if isinstance(answer, Frame):
@@ -192,7 +192,7 @@ class MasterLine:
             if packet is not None:
                 self.take_unwanted(number, packet)
 
-    def probe(self, number: int) -> Generator[Step, Heard, Heard]:
+    def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
         """Poll an inactive station; of what is heard nothing is lost, but silence is no news."""
         answer = yield from self.poll(number)
         if not is_good(answer) and (not isinstance(answer, Silence) or self._last_code):
@@ -405,7 +405,7 @@ class MasterLine:
         try:
             number = self.stations.via(packet.dst)
             if number != BROADCAST and not self.stations[number].active:
-                yield from self._revive_for_others(number)
+                yield from self._probe_for_others(number)
             yield from self.deliver(number, packet)
         except StationInactive:
             if not packet.is_reply and packet.src != self.settings.station:
@@ -413,13 +413,13 @@ class MasterLine:
             return None
         return packet
 
-    def _revive_for_others(self, number: int) -> Talk:
+    def _probe_for_others(self, number: int) -> Talk:
         """Poll an inactive station, but not where it has its turn, nor beyond an eighth."""
         if number in self.polled or not self.may_probe:
             raise StationInactive(number)
         begun = self.machine.now
         try:
-            yield from self.revive(number)
+            yield from self.probe(number)
         finally:
             self.probed(begun)
 

@@ -52,6 +52,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
+from abdf1_ros.df1.link import LinkStatus, NO_STATUS
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
@@ -141,6 +142,10 @@ class FullDuplexPeer:
     @property
     def _counters(self) -> Counters:
         return self._machine.counters
+
+    def status(self) -> LinkStatus:
+        """Return that there is nothing to tell."""
+        return NO_STATUS
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve the other end, for ever."""

@@ -40,6 +40,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from abdf1_ros.df1.frames import Control, Frame
+from abdf1_ros.df1.link import LinkStatus, ScanTimes
 from abdf1_ros.df1.machine import Machine, Procedure, Step
 from abdf1_ros.df1.master_line import (
     is_good,
@@ -83,19 +84,6 @@ class PollingSettings:
     group_size: int = 0
     multiple: bool = False
     in_sequence: bool = False
-
-
-@dataclass(slots=True)
-class ScanTimes:
-    """Seconds that the last and the longest scan of a poll list took, None before the first."""
-
-    last: float | None = None
-    longest: float | None = None
-
-    def add(self, seconds: float) -> None:
-        """Take the time of a scan."""
-        self.last = seconds
-        self.longest = max(self.longest or 0.0, seconds)
 
 
 @dataclass(slots=True)
@@ -159,15 +147,10 @@ class StandardPollingMaster:
         self._doubtful: set[int] = set()
         self._last_probed: _PollList | None = None
 
-    @property
-    def priority_scan(self) -> ScanTimes:
-        """Return the scan times of the priority list."""
-        return self._priority.times
-
-    @property
-    def normal_scan(self) -> ScanTimes:
-        """Return the scan times of the normal list."""
-        return self._normal.times
+    def status(self) -> LinkStatus:
+        """Return the scan times of both lists."""
+        return LinkStatus(
+            scans={'normal': self._normal.times, 'priority': self._priority.times})
 
     def run(self, source: TaskSource) -> Procedure:
         """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
@@ -226,7 +209,7 @@ class StandardPollingMaster:
         self._last_probed = polled
         yield from self._between_polls(source)
         begun = self._machine.now
-        answer = yield from self._line.probe(number)
+        answer = yield from self._line.poll_inactive(number)
         if is_good(answer):
             yield from self._answered(number, answer)
             self._doubtful.add(number)

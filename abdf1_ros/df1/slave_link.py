@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from abdf1_ros.df1.accounting import Accounting
+from abdf1_ros.df1.link import LinkStatus
 from abdf1_ros.df1.machine import Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
@@ -56,6 +57,10 @@ class SlaveLink:
         self._source: TaskSource | None = None
         self._outstanding: Outstanding | None = None
         self.last_poll = 0.0
+
+    def status(self) -> LinkStatus:
+        """Return when the master has polled us."""
+        return LinkStatus(last_poll=self.last_poll)
 
     def run(self, source: TaskSource) -> Procedure:
         """Answer the master for ever."""

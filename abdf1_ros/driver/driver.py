@@ -28,7 +28,7 @@ import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
@@ -38,7 +38,7 @@ from abdf1_ros.driver.guards import Guards
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks import Interlocks, OwnWrite, Urgency
 from abdf1_ros.driver.job_tasks import JobTask, JobTasks, Steps
-from abdf1_ros.driver.links import DriverSettings, make_link
+from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
 from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
@@ -113,10 +113,7 @@ class Driver:
             (mapping.station for mapping in mappings
              if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
             _routes(network, mappings))
-        self.machine = Machine(
-            lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
-            timing=network.timing, counters=self.counters,
-            forget_on_send=network.mode == 'Master')
+        self.machine = make_machine(network, self._run, self.counters)
         self.is_online = False
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._is_ending = False

@@ -25,13 +25,13 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import JobTasks, Steps
-from abdf1_ros.driver.links import DriverSettings, make_link
+from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
 from abdf1_ros.driver.served import Served
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
 from abdf1_ros.pccc.dialect import Request
@@ -79,10 +79,7 @@ class Errands:
         self.stations = ActiveStationList(absent, routes=routes)
         for number in absent:
             self.stations.lost(number, 0.0)
-        self.machine = Machine(
-            lambda machine: self._run(), checksum=network.checksum, duplex=network.duplex,
-            timing=network.timing, counters=self.counters,
-            forget_on_send=network.mode == 'Master')
+        self.machine = make_machine(network, self._run, self.counters)
         self._tasks = JobTasks(network.station, first_tns)
         self._waiting: Inbox[_Errand] = Inbox()
         served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)

@@ -19,7 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from abdf1_ros.df1.machine import Machine
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.link import Link
+from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
@@ -30,8 +32,6 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.messages import Event
 from abdf1_ros.settings.network import Network
-
-Link = HalfDuplexMaster | StandardPollingMaster | FullDuplexPeer | SlaveLink
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,13 @@ class DriverSettings:
     poll_timeout: float = 60.0
     processor_period: float = 0.0
     first_tns: int = 0
+
+
+def make_machine(network: Network, run: Callable[[], Procedure], counters: Counters) -> Machine:
+    """Return the machine for the line of a net CSV, with ``run`` as its procedure."""
+    return Machine(
+        lambda machine: run(), checksum=network.checksum, duplex=network.duplex,
+        timing=network.timing, counters=counters, forget_on_send=network.mode == 'Master')
 
 
 def make_link(network: Network, settings: DriverSettings, machine: Machine,

@@ -21,8 +21,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from abdf1_ros.df1.polling import StandardPollingMaster
-from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
@@ -170,9 +168,9 @@ class Diagnostics:
             return WARN, RELEASED
         if state is None or not state.is_open:
             return ERROR, state.text if state else 'not started yet'
-        link = self._driver.link
-        if isinstance(link, SlaveLink) and now - link.last_poll > _LONGEST_UNPOLLED:
-            return WARN, f'port open, but not polled for {now - link.last_poll:.0f} s'
+        polled = self._driver.link.status().last_poll
+        if polled is not None and now - polled > _LONGEST_UNPOLLED:
+            return WARN, f'port open, but not polled for {now - polled:.0f} s'
         active = sum(station.active for station in self._driver.stations)
         total = sum(1 for _ in self._driver.stations)
         if total and not active:
@@ -447,13 +445,10 @@ def speed_seen(driver: Driver) -> str:
 
 def _poll_scans(driver: Driver) -> dict[str, str]:
     """Return last and longest scan times of the poll lists, where there are any."""
-    if not isinstance(driver.link, StandardPollingMaster):
-        return {}
-    scans = {'normal': driver.link.normal_scan, 'priority': driver.link.priority_scan}
     return {
         f'{name} poll scan': f'last {_milliseconds(times.last)}, '
                              f'longest {_milliseconds(times.longest)}'
-        for name, times in scans.items() if times.last is not None}
+        for name, times in driver.link.status().scans.items() if times.last is not None}
 
 
 def _milliseconds(seconds: float | None) -> str:

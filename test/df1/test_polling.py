@@ -25,7 +25,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import message_frame
 from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MOST_QUEUED
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
 import hypothesis
@@ -491,12 +491,11 @@ def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
 
 def test_scan_times() -> None:
     rig = bench(PollingSettings((1, 2, 3), priority=(9,), group_size=1))
-    link = rig.master.link
-    assert isinstance(link, StandardPollingMaster)
+    scans = rig.master.link.status().scans
+    priority, normal = scans['priority'], scans['normal']
     rig.start()
-    assert (link.normal_scan.last, link.priority_scan.last) == (None, None)
+    assert (normal.last, priority.last) == (None, None)
     rig.run(1.0)
-    priority, normal = link.priority_scan, link.normal_scan
     assert priority.last == priority.longest == pytest.approx(12 * 10 / 19200)
     assert normal.last == normal.longest == pytest.approx(3 * 12 * 10 / 19200)
     rig.ask(2)
@@ -509,8 +508,7 @@ def test_scan_times() -> None:
 
 def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig = bench(PollingSettings((1,)))
-    link = rig.master.link
-    assert isinstance(link, StandardPollingMaster)
+    normal = rig.master.link.status().scans['normal']
     rig.start()
     rig.run(1.0)
     rig.master.machine.stop(PortLost('unplugged'))
@@ -518,8 +516,8 @@ def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig.master.machine.start(rig.clock())
     rig.line.wake(rig.master.machine)
     rig.run(1.0)
-    assert link.normal_scan.longest is not None
-    assert link.normal_scan.longest < 1.0
+    assert normal.longest is not None
+    assert normal.longest < 1.0
 
 
 def test_line_without_a_speed_is_polled_no_faster_than_the_set_one() -> None:

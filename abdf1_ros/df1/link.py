@@ -1,0 +1,63 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every kind of link is, for those who run one and tell how it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from abdf1_ros.df1.machine import Procedure
+from abdf1_ros.df1.tasks import TaskSource
+
+
+@dataclass(slots=True)
+class ScanTimes:
+    """Seconds that the last and the longest scan of a poll list took, None before the first."""
+
+    last: float | None = None
+    longest: float | None = None
+
+    def add(self, seconds: float) -> None:
+        """Take the time of a scan."""
+        self.last = seconds
+        self.longest = max(self.longest or 0.0, seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStatus:
+    """
+    What only some links have to tell.
+
+    ``last_poll`` is the clock value (s) of the last poll of a slave, or of its start; ``scans``
+    are the times of a master's poll lists, by their names.
+    """
+
+    last_poll: float | None = None
+    scans: Mapping[str, ScanTimes] = field(default_factory=dict)
+
+
+NO_STATUS = LinkStatus()
+
+
+class Link(Protocol):
+    """A node on a line: a master of either kind, a slave or a peer."""
+
+    def run(self, source: TaskSource) -> Procedure:
+        """Carry out the tasks of ``source``, and serve who asks us, for ever."""
+
+    def status(self) -> LinkStatus:
+        """Return what this link has to tell; may be called from any thread."""
