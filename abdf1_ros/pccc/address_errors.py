@@ -20,7 +20,7 @@ from abdf1_ros.errors import FormatError
 
 
 class AddressSyntaxError(FormatError):
-    """The text is no address of this family."""
+    """The text is not an address of this family."""
 
 
 class AddressRangeError(FormatError):

@@ -100,5 +100,5 @@ class DataTable:
             raise NoSuchFile(f'there is no {address}')
         start = 2 * address.offset
         if start + 2 * words > len(store):
-            raise OutOfRange(f'{words} words at {address} end behind the file')
+            raise OutOfRange(f'{words} words at {address} end after the file')
         return store, start

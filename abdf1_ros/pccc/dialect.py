@@ -24,7 +24,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
 
 Request = tuple[int, bytes]
-"""CMD, and what stands behind TNS."""
+"""CMD, and what follows TNS."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class Dialect(Protocol):
         """
 
     def reply_size(self, address: Address, words: int) -> int:
-        """Return the bytes behind the header of the reply to that read."""
+        """Return the bytes after the header of the reply to that read."""
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Return the words in the reply to that read; FormatError when they are not there."""

@@ -44,7 +44,7 @@ _FIXED_FILES = {FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2}
 _FIRST_FREE_FILE = 3
 # Files of words whose bits may be numbered through.
 _FLAT_BITS = (FileType.BINARY, FileType.INTEGER, FileType.ASCII, FileType.BCD)
-# S0 writes a word of such an element with "/", as others write a bit: a number is none of both.
+# S0 writes a word of such an element with "/", as others write a bit.
 _NAMED_BITS = (FileType.TIMER, FileType.COUNTER, FileType.CONTROL)
 # Files that exist and that we do not know well enough to read them.
 _OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch'}
@@ -192,7 +192,7 @@ class FileAddressing(Addressing):
 def _with_member(address: Address, name: str) -> Address:
     members = address.layout.members
     member = members.get(name)
-    # A bit may be named behind the number of its word, a value behind nothing.
+    # The name of a bit may follow the number of its word, that of a value may not.
     if member is None or address.bit is not None or (
             address.word and (member.bit is None or member.word != address.word)):
         if address.file_type is FileType.STRING and name == 'LEN':
@@ -200,7 +200,7 @@ def _with_member(address: Address, name: str) -> Address:
                 f'the length is part of the string; read {address}, which is as long as that')
         known = ', '.join(members) or 'none'
         raise AddressSyntaxError(
-            f'{name} is no member here; members of {address.file_type.value} files: {known}')
+            f'{name} is not a member; members of {address.file_type.value} files: {known}')
     return replace(address, word=member.word, bit=member.bit)
 
 

@@ -16,7 +16,7 @@
 The diagnostic counters of a port, as read with 06/01 (M 9-6, 9-7, 9-31).
 
 They are words, low byte first, in an order that depends on the processor and on what its port
-is set to; the reply does not say which. Counters of 16 bits begin again at 0 behind 65535.
+is set to; the reply does not say which. A counter of 16 bits begins again at 0 after 65535.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _DCD, _LOST = 'carrier recovered', 'modem lost'
 _UNUSED = ''
 
 
-class Layout(Enum):
+class CounterLayout(Enum):
     """What each word counts; '' for a word that is not used."""
 
     SLC_FULL_DUPLEX = (
@@ -69,18 +69,18 @@ class Layout(Enum):
         return 2 * len(self.value)
 
 
-def layout_of(identity: Identity | None) -> Layout | None:
+def layout_of(identity: Identity | None) -> CounterLayout | None:
     """Return the layout of a processor that has identified itself, None for an unknown one."""
     if identity is None:
         return None
     if identity.family == 'PLC-5':
-        return Layout.PLC5
+        return CounterLayout.PLC5
     if identity.family != 'SLC':
         return None
     if is_micrologix_1000(identity):
-        return Layout.MICROLOGIX_1000
+        return CounterLayout.MICROLOGIX_1000
     is_half_duplex = identity.interface == HALF_DUPLEX_PORT
-    return Layout.SLC_SLAVE if is_half_duplex else Layout.SLC_FULL_DUPLEX
+    return CounterLayout.SLC_SLAVE if is_half_duplex else CounterLayout.SLC_FULL_DUPLEX
 
 
 def counter_request(identity: Identity | None) -> ReadCounters:
@@ -92,7 +92,7 @@ def counter_request(identity: Identity | None) -> ReadCounters:
     return ReadCounters(known.counter_address, known.counter_size)
 
 
-def decode_counters(data: bytes, layout: Layout | None) -> dict[str, str]:
+def decode_counters(data: bytes, layout: CounterLayout | None) -> dict[str, str]:
     """
     Return each counter by its name; without a layout the bytes, in hexadecimal.
 
@@ -125,7 +125,7 @@ class ServedCounters:
     elsewhere, and only the thread of the link changes them.
     """
 
-    def __init__(self, counters: Counters, layout: Layout) -> None:
+    def __init__(self, counters: Counters, layout: CounterLayout) -> None:
         self._counters = counters
         self._layout = layout
         self._origin: dict[str, int] = {}
@@ -164,9 +164,10 @@ def served_counters(counters: Counters, plc_type: PlcType, *, is_full_duplex: bo
     emulated: None.
     """
     if plc_type is PlcType.PLC5:
-        return ServedCounters(counters, Layout.PLC5)
+        return ServedCounters(counters, CounterLayout.PLC5)
     if plc_type is not PlcType.SLC:
         return None
     if is_full_duplex:
-        return ServedCounters(counters, Layout.SLC_FULL_DUPLEX)
-    return ServedCounters(counters, Layout.SLC_MASTER if is_master else Layout.SLC_SLAVE)
+        return ServedCounters(counters, CounterLayout.SLC_FULL_DUPLEX)
+    layout = CounterLayout.SLC_MASTER if is_master else CounterLayout.SLC_SLAVE
+    return ServedCounters(counters, layout)

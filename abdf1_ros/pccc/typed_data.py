@@ -65,7 +65,7 @@ class TypedData:
         """
         Read an array or a bare element, in every legal form.
 
-        Padding behind the declared size of an array is passed over. Raises FormatError for
+        Padding after the declared size of an array is ignored. Raises FormatError for
         anything else that does not add up.
         """
         reader = Reader(parameter)

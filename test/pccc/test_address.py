@@ -242,9 +242,9 @@ def test_members_of_large_structures(family: PlcType, text: str, word: int, bit:
     ('PD10:0.3', 'word 3 is the second half of a float32; write the first, 2'),
     ('PD10:0.SP/3', 'PD10:0.SP is a float32, which has no bits to address'),
     ('PD10:0.2/3', 'PD10:0.SP is a float32, which has no bits to address'),
-    ('PD10:0.2/EN', 'EN is no member here'), ('PD10:0.1/EN', 'EN is no member here'),
-    ('PD10:0.SP/INI', 'INI is no member here'), ('PD10:0.SPS', 'SPS is no member here'),
-    ('BT9:0.ACC', 'ACC is no member here'), ('PD:0', 'give the file number, as in PD9:0'),
+    ('PD10:0.2/EN', 'EN is not a member'), ('PD10:0.1/EN', 'EN is not a member'),
+    ('PD10:0.SP/INI', 'INI is not a member'), ('PD10:0.SPS', 'SPS is not a member'),
+    ('BT9:0.ACC', 'ACC is not a member'), ('PD:0', 'give the file number, as in PD9:0'),
     ('SC:0', 'give the file number')])
 def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
     with pytest.raises(AddressSyntaxError, match=f'^{reason}'):

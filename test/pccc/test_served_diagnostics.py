@@ -24,7 +24,7 @@ from abdf1_ros.pccc.diagnostics import max_echo, ReadCounters, RESET_REQUEST, ST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
-from abdf1_ros.pccc.link_counters import Layout, ServedCounters
+from abdf1_ros.pccc.link_counters import CounterLayout, ServedCounters
 from abdf1_ros.pccc.server import Server
 from hypothesis import given
 from hypothesis import strategies as st
@@ -81,7 +81,7 @@ def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> Non
 
 
 def test_slc_counters_are_at_address_0(counters: Counters) -> None:
-    served = ServedCounters(counters, Layout.SLC_SLAVE)
+    served = ServedCounters(counters, CounterLayout.SLC_SLAVE)
     block = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
     assert block == reply(served.encode())
     assert block.data[2:6] == b'\x2C\x01\x02\x00'
@@ -90,14 +90,14 @@ def test_slc_counters_are_at_address_0(counters: Counters) -> None:
 
 
 def test_plc5_ignores_the_address_of_counters(counters: Counters) -> None:
-    served = ServedCounters(counters, Layout.PLC5)
+    served = ServedCounters(counters, CounterLayout.PLC5)
     assert answer(PlcType.PLC5, ReadCounters(0x1234, 244).encode(), served) == reply(
         served.encode())
     assert answer(PlcType.PLC5, ReadCounters(0, 245).encode(), served) == reply(sts=REFUSED)
 
 
 def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None:
-    served = ServedCounters(counters, Layout.SLC_SLAVE)
+    served = ServedCounters(counters, CounterLayout.SLC_SLAVE)
     before = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
     assert answer(PlcType.SLC, RESET_REQUEST + b'\1', served) == reply(sts=REFUSED)
     assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == before != reply(bytes(26))

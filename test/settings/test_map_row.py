@@ -376,7 +376,7 @@ def test_access_that_does_not_fit(cells: dict[str, str], text: str) -> None:
     ('PLC2', '018', 2503, 'are octal, as in 020 or 110/17'),
     ('PLC2', 'N7:0', 2503, 'write the octal number of a word'),
     ('PLC2', '100000', 2504, 'words run from 0 to 77777 (octal)'),
-    ('PLC3', 'F8:0', 2503, 'F is no file type of a PLC-3'),
+    ('PLC3', 'F8:0', 2503, 'F is not a file type of a PLC-3'),
     ('PLC3', 'E2.1.8.10.0.0', 2504, 'only the data table, E3.1, can be read')])
 def test_addresses_of_plc2_and_plc3_that_are_none(plc: str, address: str, number: int,
                                                   right: str) -> None:

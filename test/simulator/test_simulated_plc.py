@@ -158,7 +158,7 @@ def test_message_of_a_plc2_and_a_plc3(plc: str, text: str, cmd: int, clock: Cloc
 
 @pytest.mark.parametrize('row, text', [
     ('1,PLC2,N7:0,,,,', '2:3 (Address): write the octal number of a word, as in 020 or 110/17'),
-    ('1,PLC3,F8:0,,,,', '2:3 (Address): F is no file type of a PLC-3; file types: O, I, T, C, '
+    ('1,PLC3,F8:0,,,,', '2:3 (Address): F is not a file type of a PLC-3; file types: O, I, T, C, '
                         'N, D, B, A, S'),
     ('300,PLC5,N7:0,,,,', '2:1 (Station): Station = "300" should be a whole number from 0 to '
                           '254'),

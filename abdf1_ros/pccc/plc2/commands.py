@@ -52,7 +52,7 @@ class BasicRead:
     size: int
 
     def encode(self) -> bytes:
-        """Return what stands behind TNS."""
+        """Return what follows TNS."""
         return word(self.address) + bytes((self.size,))
 
     @classmethod
@@ -71,7 +71,7 @@ class BasicWrite:
     data: bytes
 
     def encode(self) -> bytes:
-        """Return what stands behind TNS."""
+        """Return what follows TNS."""
         return word(self.address) + self.data
 
     @classmethod
@@ -110,7 +110,7 @@ class BasicBitWrite:
     changes: tuple[ByteChange, ...]
 
     def encode(self) -> bytes:
-        """Return what stands behind TNS."""
+        """Return what follows TNS."""
         return b''.join(change.encode() for change in self.changes)
 
     @classmethod

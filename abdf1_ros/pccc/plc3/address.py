@@ -128,7 +128,7 @@ def _kind(letters: str) -> FileType:
     kind = next((entry for entry in SECTIONS if entry.value == letters), None)
     if kind is None:
         known = ', '.join(entry.value for entry in SECTIONS)
-        raise AddressSyntaxError(f'{letters} is no file type of a PLC-3; file types: {known}')
+        raise AddressSyntaxError(f'{letters} is not a file type of a PLC-3; file types: {known}')
     return kind
 
 
@@ -173,7 +173,7 @@ def _member(kind: FileType, member: str | None, bit: str | None) -> tuple[int, i
     if member and member.isdigit():
         place = next((entry for entry in members.values() if entry.word == int(member)), None)
     if place is None:
-        raise AddressSyntaxError(f'{member} is no member here; members of {kind.value}: '
+        raise AddressSyntaxError(f'{member} is not a member; members of {kind.value}: '
                                  f'{", ".join(members)}')
     named = members.get(bit or '')
     if named is not None and named.word == place.word and place.bit is None:

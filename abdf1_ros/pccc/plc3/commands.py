@@ -16,7 +16,7 @@
 The extended address of a PLC-3 (M 13-5..13-8).
 
 A flag byte says which of six levels follow: area, context, section, file, structure, word. The
-area of the data table is 3; a level that is left out is 3, 1, or 0 for all behind these two.
+area of the data table is 3; a level that is left out is 3, 1, or 0 for all after these two.
 """
 
 from __future__ import annotations

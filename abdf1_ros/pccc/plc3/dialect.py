@@ -24,7 +24,7 @@ from abdf1_ros.pccc.word_range.commands import WordBitWrite
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 
 
-class _Range:
+class _Plc3Range:
     """The extended address and the bit write."""
 
     files = FILES
@@ -43,4 +43,4 @@ class _Range:
         return WordBitWrite(self.address(address), set_bits, reset_bits).encode()
 
 
-PLC3 = WordRangeDialect(_Range())
+PLC3 = WordRangeDialect(_Plc3Range())

@@ -73,7 +73,7 @@ class Plc5Dialect:
                               f'{typed.element_size} bytes, asked were {asked} of {size}')
         if typed.element_size == size:
             return typed.data
-        # Timers carry two internal words behind the three that have names.
+        # Timers carry two internal words after the three that have names.
         step = typed.element_size
         return b''.join(typed.data[at:at + size] for at in range(0, len(typed.data), step))
 
@@ -111,7 +111,7 @@ def _most_words(file_type: FileType, room: int) -> int:
     return min(count, plc5.MAX_INTEGERS) * layout.words
 
 
-class _Range:
+class _Plc5Range:
     """Read-modify-write for bits, as with typed commands."""
 
     files = FILES
@@ -129,4 +129,4 @@ class _Range:
 
 
 PLC5_TYPED = Plc5Dialect()
-PLC5_WORD_RANGE = WordRangeDialect(_Range())
+PLC5_WORD_RANGE = WordRangeDialect(_Plc5Range())

@@ -99,7 +99,7 @@ class TypedService:
         return b''
 
     def place(self, address: plc5.SystemAddress, offset: int = 0) -> Address:
-        """Return the place ``offset`` elements (values, with a sub-element) behind ``address``."""
+        """Return the place ``offset`` elements (values, with a sub-element) after ``address``."""
         kind = self._table.file_type(address.file)
         if self._is_other(kind):
             raise extended(status.EXT_BAD_ADDRESS)

@@ -67,12 +67,12 @@ def test_last_word_of_each_file_is_the_last_of_its_area() -> None:
 
 @pytest.mark.parametrize(('text', 'right'), [
     ('N7', 'as in N7:0'), ('020', 'as in N7:0'), ('N:0', 'give the file number, as in N7:0'),
-    ('F8:0', 'F is no file type of a PLC-3'), ('ST9:0', 'ST is no file type of a PLC-3'),
+    ('F8:0', 'F is not a file type of a PLC-3'), ('ST9:0', 'ST is not a file type of a PLC-3'),
     ('I:018', 'octal, as in I:017'), ('E3.1.2.0.0.18', 'octal, as in I:017'),
     ('N7:0/8', 'PLC-3 bits are octal'),
     ('N7:0.ACC', 'words of N files have no members'), ('T:4', 'say which word, as in T:0.ACC'),
-    ('T:4.POS', 'POS is no member here; members of T: CTL, PRE, ACC, EN, TT, DN'),
-    ('T:4.3', '3 is no member here'), ('T:4.ACC/DN', 'PLC-3 bits are octal'),
+    ('T:4.POS', 'POS is not a member; members of T: CTL, PRE, ACC, EN, TT, DN'),
+    ('T:4.3', '3 is not a member'), ('T:4.ACC/DN', 'PLC-3 bits are octal'),
     ('E3.1.8.10.0', 'or E3.1.8.10.0.5'), ('N7:0/DN', 'PLC-3 bits are octal')])
 def test_what_is_no_address(text: str, right: str) -> None:
     with pytest.raises(AddressSyntaxError) as fault:
