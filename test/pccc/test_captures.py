@@ -16,14 +16,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from abdf1_ros.counters import Counters
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.emulated import EmulatedProcessor
+from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.link_counters import served_counters
+from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.word_range import commands as word_range
 import pytest
 from support.captures import Capture, CAPTURES
 
+OURS = [capture for capture in CAPTURES if capture.client == 'ours: node, Mode Peer']
+_READ: dict[tuple[int, int], Callable[[Reader], Any]] = {
+    (plc5.CMD, plc5.TYPED_READ): plc5.TypedRead.read,
+    (plc5.CMD, plc5.TYPED_WRITE): plc5.TypedWrite.read,
+    (plc5.CMD, plc5.READ_MODIFY_WRITE): plc5.ReadModifyWrite.read,
+    (word_range.CMD, word_range.READ):
+        lambda reader: word_range.WordRangeRead.read(reader, plc5.SystemAddress.read),
+    (word_range.CMD, word_range.WRITE):
+        lambda reader: word_range.WordRangeWrite.read(reader, plc5.SystemAddress.read),
+    (slc.CMD, slc.LOGICAL_READ): slc.LogicalRead.read,
+    (slc.CMD, slc.LOGICAL_WRITE): slc.LogicalWrite.read,
+    (slc.CMD, slc.MASKED_WRITE): slc.MaskedWrite.read}
 _DIAGNOSTICS = 0x06  # what a processor says of itself depends on its state
 
 
@@ -50,6 +69,19 @@ def test_our_server_answers_as_it_was_answered(capture: Capture) -> None:
             told, ours = (describe(one, exchange.command) for one in (exchange.reply, reply))
             assert len(told.split()) == len(ours.split()), f'{exchange.text}: {told}'
         compared += 1
+    assert compared
+
+
+@pytest.mark.parametrize('capture', OURS, ids=lambda capture: capture.name)
+def test_what_they_have_accepted_of_ours_is_what_we_would_send(capture: Capture) -> None:
+    compared = 0
+    for exchange in capture.exchanges():
+        function, *parameters = exchange.command.data
+        read = _READ.get((exchange.command.cmd, function))
+        if read is not None and not exchange.reply.sts:
+            encoded = read(Reader(bytes(parameters))).encode()
+            assert encoded == exchange.command.data, exchange.text
+            compared += 1
     assert compared
 
 
