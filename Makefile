@@ -75,6 +75,25 @@ demo-peer: $(INSTALLED) ## The same on a full-duplex line
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
 	$(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
+# launch_ros asks for composition_interfaces, which has no wheel, for component containers alone.
+.PHONY: ros-tools
+ros-tools: $(INSTALLED) ## Get ros2 launch, topic, security and the linters of ament into .venv
+	$(PY) -m pip install --quiet -r requirements/ros_tools_needs.txt
+	$(PY) -m pip install --quiet --no-deps --no-build-isolation -r requirements/ros_tools.txt
+	@$(PY) -c 'import composition_interfaces' 2>/dev/null || { \
+	    folder=$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
+	    mkdir -p "$$folder/composition_interfaces"; \
+	    touch "$$folder/composition_interfaces/__init__.py"; \
+	    printf 'class LoadNode:\n    Request = Response = None\n' \
+	        > "$$folder/composition_interfaces/srv.py"; }
+
+.PHONY: test-ros
+test-ros: $(INSTALLED) ## Run the tests that need these tools; what is missing fails
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" ABDF1_ROS_TOOLS=1 \
+	    AMENT_PREFIX_PATH="$(CURDIR)/$(VENV):$${AMENT_PREFIX_PATH:-}" $(PY) -m pytest \
+	    test/test_ros_tools.py test/test_launch_files.py test/test_ros2_topic.py \
+	    test/test_security_policy.py test/test_ament.py $(PYTEST_ARGS)
+
 .PHONY: lint
 lint: $(INSTALLED) ## Check style and types
 	$(PY) -m ruff check .

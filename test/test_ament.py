@@ -1,0 +1,45 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The linters that every ROS package runs, as they come with Jazzy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from support.ros_tools import needs
+
+ROOT = Path(__file__).resolve().parent.parent
+# What is ours; a build or an environment may lie beside it.
+SOURCES = [str(ROOT / name) for name in (
+    'abdf1_ros', 'examples', 'launch', 'test', 'tools', 'setup.py')]
+
+
+def test_copyright() -> None:
+    assert needs('ament_copyright.main').main(argv=SOURCES) == 0
+
+
+def test_flake8() -> None:
+    status, errors = needs('ament_flake8.main').main_with_errors(argv=SOURCES)
+    assert (status, errors) == (0, [])
+
+
+def test_pep257() -> None:
+    assert needs('ament_pep257.main').main(argv=SOURCES) == 0
+
+
+def test_xmllint() -> None:
+    # package.xml names a schema on a server; that is for those who have the Internet.
+    folders = [str(ROOT / name) for name in ('config', 'launch')]
+    assert needs('ament_xmllint.main').main(argv=folders) == 0
