@@ -24,7 +24,7 @@ faults on and off.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 import math
 from operator import itemgetter
@@ -223,15 +223,16 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
     """Return the thread that plays ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
     machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
-    open_line = line.open
+    open_line: Callable[[], Port] = line.open
     if options.full_duplex is not None:
         # Only a port has a speed of its own, for which the timers have to wait.
         timing = Network(baud=options.baud).timing if options.port else LineTiming()
         machine = _full_duplex(plcs[0], checksum, timing)
 
-        def open_line() -> Port:
+        def open_faulty() -> Port:
             return _FaultyPort(line.open(), plcs[0], checksum)
 
+        open_line = open_faulty
     return LinkThread(machine, open_line, on_state=_Announcer().announce,
                       on_fault=_print_fault)
 
@@ -257,7 +258,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     line.add_argument('--pty', metavar='NAME', type=_name,
                       help='a pseudo-terminal of this name (default: one with the name that is '
                            'printed)')
-    line.add_argument('--port', type=_name, help='a serial port, socket://host:port or rfc2217://host:port')
+    line.add_argument('--port', type=_name,
+                      help='a serial port, socket://host:port or rfc2217://host:port')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
     parser.add_argument('--ladder', metavar='STATION', action='append', default=[],
                         help='its program watches a heartbeat in N10:0 and says when ROS is in '

@@ -103,13 +103,12 @@ class ReportBundle:
 
     def write(self, path: str, summary: Summary, kind: LineKind) -> None:
         """Write the bundle."""
+        processors = [f'station {station}: {text}'
+                      for station, text in sorted(self._processors.items())]
         texts = {
             'summary.txt': '\n'.join(summary_lines(summary, kind)),
             'summary.json': summary_json(summary, kind),
-            'processors.txt': '\n'.join(
-                f'station {station}: {text}'
-                for station, text in sorted(self._processors.items()))
-                or 'no diagnostic status was seen',
+            'processors.txt': '\n'.join(processors) or 'no diagnostic status was seen',
             'versions.json': json.dumps(_versions(), indent=1)}
         if self.is_anonymous:
             texts['entries.json'] = '\n'.join(map(json_line, map(_without_data, self._entries)))

@@ -107,7 +107,7 @@ def _stuffed(data: bytes) -> bytes:
 
 
 def message(data: bytes, check: Check) -> bytes:
-    """Return the frame of a slave's or of a full-duplex message (M 5-2)."""
+    """Return the frame for ``data`` from a slave or in full duplex (M 5-2)."""
     return b'\x10\x02' + _stuffed(data) + b'\x10\x03' + check_bytes(data, check)
 
 

@@ -239,10 +239,9 @@ class Interlocks:
     def _good_until(self, row: HeartbeatRow) -> float:
         """Return until when a heartbeat may leave (clock value in s): later it may be wrong."""
         youngest = self._writes.youngest()
-        return min([
-            row.executor_until(self._executor), row.topics_until(self._messages), *(
-            fallback.deadline(youngest.get(id(fallback.mapping), -math.inf))
-            for fallback in self._fallbacks_of(row.mapping.station))])
+        ends = [fallback.deadline(youngest.get(id(fallback.mapping), -math.inf))
+                for fallback in self._fallbacks_of(row.mapping.station)]
+        return min([row.executor_until(self._executor), row.topics_until(self._messages), *ends])
 
     def ended(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
         """Take note how one of our writes ended."""

@@ -129,7 +129,7 @@ def release(byte: int) -> tuple[str, str]:
 
 
 def letters(byte: int) -> tuple[str, str]:
-    """Return series and revision where both are letters (M 10-22)."""
+    """Return series and revision where each is a letter (M 10-22)."""
     return _letter(byte >> 5), _letter(byte & 0x1F)
 
 

@@ -27,7 +27,7 @@ from abdf1_ros.settings.values import Values, ValueType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from std_msgs.msg import (
+from std_msgs.msg import (  # noqa: I101
     Float32MultiArray,
     Int16MultiArray,
     Int32MultiArray,

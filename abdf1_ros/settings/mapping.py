@@ -92,7 +92,7 @@ class Mapping:
     station: int
     plc_type: PlcType
     length: int
-    type: ValueType
+    type: ValueType  # noqa: A003
     topic: str
     period: int | None = None
     publish: Publish = Publish.ALWAYS

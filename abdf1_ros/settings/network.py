@@ -142,7 +142,8 @@ class Network:
         'Cmd_Timeout', 1000, 'ms until a reply is no longer polled for', low=500, high=5000,
         message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
     com_port: str = _net(
-        'Com_Port', '1', 'n for /dev/ttyS(n-1), a device path, socket://host:port, or rfc2217://host:port')
+        'Com_Port', '1',
+        'n for /dev/ttyS(n-1), a device path, socket://host:port, or rfc2217://host:port')
     baud: int = _net('Baud', 9600, 'bits per second', choices=BAUD_RATES)
     data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)

@@ -56,7 +56,7 @@ class ValueType(Enum):
         return _ARRAY_CODES[self]
 
     @property
-    def range(self) -> tuple[float, float]:
+    def range(self) -> tuple[float, float]:  # noqa: A003
         """Return the least and the greatest value."""
         return _RANGES[self]
 
@@ -117,7 +117,7 @@ class Codec:
     ``length`` words, without the length word of an ST element.
     """
 
-    type: ValueType
+    type: ValueType  # noqa: A003
     length: int
     bit: int = 0
     word_order: WordOrder = WordOrder.LOW

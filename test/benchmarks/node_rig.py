@@ -69,7 +69,7 @@ class Running:
         return (int(fields[11]) + int(fields[12])) / _TICK
 
     def memory(self) -> float:
-        """Return how much memory (MiB) it has resident."""
+        """Return how many MiB it has resident."""
         line, = (line for line in self._read('status').splitlines() if line.startswith('VmRSS'))
         return int(line.split()[1]) / 1024
 

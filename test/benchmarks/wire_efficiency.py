@@ -51,7 +51,14 @@ from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import Values, ValueType  # noqa: E402
-from paced_line import answering_line, answering_pty, BareLine, BITS, far_end, Listener  # noqa: E402
+from paced_line import (  # noqa: E402
+    answering_line,
+    answering_pty,
+    BareLine,
+    BITS,
+    far_end,
+    Listener,
+)
 
 SIZES = (1, 10, 50, 110)
 SPEEDS = (9600, 19200, 38400, 115200)

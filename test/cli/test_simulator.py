@@ -74,7 +74,7 @@ class Simulator:
         line, self._rest = self._rest.split(b'\n', 1)
         return line.decode()
 
-    def type(self, text: str) -> None:
+    def type(self, text: str) -> None:  # noqa: A003
         """Give it lines on standard input."""
         assert self._process.stdin is not None
         self._process.stdin.write(text.encode())

@@ -94,8 +94,8 @@ def test_repeated_command_for_us_is_acknowledged_and_served_once(standard: bool)
 
 @BOTH
 @pytest.mark.parametrize('dst', [MASTER, 8, BROADCAST])
-def test_what_is_not_accepted_is_acknowledged_dropped_and_counted(standard: bool,
-                                                                 dst: int) -> None:
+def test_what_is_not_accepted_is_acknowledged_dropped_and_counted(
+        standard: bool, dst: int) -> None:
     rig = bench(standard, 7, 8, settings=replace(SETTINGS, accept_slave_messages=False))
     command = rig.message(7, dst)
     rig.start()

@@ -338,8 +338,8 @@ def test_area_is_a_file_or_a_slot() -> None:
     ('C5:3/1', 'bit 1 of a C element has no name; word 1 is C5:3.PRE; '
                'bits: CU, CD, DN, OV, UN, UA'),
     ('R6:0/7', 'bit 7 of a R element has no name; bits: EN, EU, DN, EM, ER, UL, IN, FD')])
-def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(family: PlcType, text: str,
-                                                            right: str) -> None:
+def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
+        family: PlcType, text: str, right: str) -> None:
     """The specification's own form of a sub-element, T4;0/2, means word 2."""
     with pytest.raises(AddressSyntaxError) as caught:
         parse_address(text, family)

@@ -127,8 +127,8 @@ def test_slc_models(code: int, model: str) -> None:
 
 @pytest.mark.parametrize(('code', 'name', 'model', 'remarks'), [
     (0xB9, b'1766-LEC   ', 'MicroLogix 1400', ()), (0x77, b'1747-L542B ', '1747-L542B', ()),
-    (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', ()), (0x1A, b'500-20     ',
-                                                          'SLC 500 fixed', ()),
+    (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', ()),
+    (0x1A, b'500-20     ', 'SLC 500 fixed', ()),
     (0x78, b'5/04       ', 'SLC 5/04', ('its processor code 0x78 is that of a SLC 5/05',)),
     (0x9C, b'1762-L24   ', 'MicroLogix 1200',
      ('its processor code 0x9C is that of a MicroLogix 1100',)),

@@ -61,7 +61,7 @@ class Script:
             raise
         yield Step(None, None)
 
-    def next(self) -> Symbol | None:
+    def next(self) -> Symbol | None:  # noqa: A003
         """Return what came of the next step."""
         return self.heard.get(timeout=PATIENCE)
 
@@ -519,7 +519,7 @@ class Stuck:
         self.go_on = threading.Event()
         self.closed = threading.Event()
 
-    def open(self) -> Port:
+    def open(self) -> Port:  # noqa: A003
         """Open a port, after a while."""
         self.is_asked.set()
         assert self.go_on.wait(PATIENCE)

@@ -122,7 +122,7 @@ class Fed(SerialDevice):
         super().__init__(self._ours, lambda: None, is_marked=True)
         self.chunks = list(chunks)
 
-    def all(self) -> list[bytes]:
+    def all(self) -> list[bytes]:  # noqa: A003
         """Return what comes of all chunks."""
         found = []
         for chunk in self.chunks:

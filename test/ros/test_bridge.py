@@ -31,7 +31,7 @@ from rcl_interfaces.msg import Parameter
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.duration import Infinite
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
-from std_msgs.msg import MultiArrayLayout, String, UInt8MultiArray, UInt16MultiArray
+from std_msgs.msg import MultiArrayLayout, String, UInt8MultiArray, UInt16MultiArray  # noqa: I101
 from std_srvs.srv import Trigger
 from support.ros import (
     details,

@@ -44,7 +44,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import (
+from std_msgs.msg import (  # noqa: I101
     Float32MultiArray,
     Int16MultiArray,
     Int32MultiArray,

@@ -32,7 +32,7 @@ from abdf1_ros.ros.node import BridgeNode, main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.node import Node
-from std_msgs.msg import (
+from std_msgs.msg import (  # noqa: I101
     Float32MultiArray,
     Int16MultiArray,
     MultiArrayDimension,
@@ -80,9 +80,10 @@ class Bench:
         self.diagnostics = observer.diagnostics(plcs.port)
         net = write_csv(folder / 'net.csv', *NET)
         map_file = write_csv(folder / 'map.csv', MAP_HEADER, rows)
+        arguments = ros_args(
+            f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}', *assignments)
         self.node = BridgeNode(context=observer.context, use_global_arguments=False,
-                               cli_args=ros_args(
-            f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}', *assignments))
+                               cli_args=arguments)
         observer.executor.add_node(self.node)
         self.node.start()
         observer.until(lambda: self.node.driver.is_online, 'the port')

@@ -30,7 +30,12 @@ from abdf1_ros.settings.network import load_network
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rclpy.duration import Infinite
-from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt8MultiArray, UInt16MultiArray
+from std_msgs.msg import (  # noqa: I101
+    Float32MultiArray,
+    Int16MultiArray,
+    UInt8MultiArray,
+    UInt16MultiArray,
+)
 from support.ros import (
     details,
     ERROR,

@@ -59,9 +59,10 @@ class Bench:
         self.write_map(SPEED, RECIPE)
         self.diagnostics = observer.diagnostics(plcs.port)
         self.port = plcs.port
+        arguments = ros_args(
+            f'net_file:={self.net}', f'map_file:={self.map}', f'port:={plcs.port}')
         self.node = BridgeNode(context=observer.context, use_global_arguments=False,
-                               cli_args=ros_args(
-            f'net_file:={self.net}', f'map_file:={self.map}', f'port:={plcs.port}'))
+                               cli_args=arguments)
         observer.executor.add_node(self.node)
         self.node.start()
         observer.until(lambda: self.node.driver.is_online, 'the port')

@@ -294,11 +294,14 @@ def test_conversation_of_a_master_and_two_slaves(noise: Noise) -> None:
                    for entry in entries)
 
 
-@given(strategies.lists(strategies.tuples(
+PIECES = strategies.tuples(
     strategies.floats(0, 1e6), strategies.sampled_from(Direction), strategies.one_of(
         strategies.binary(max_size=20),
-        strategies.sampled_from([data for _, data in TRANSACTION]))), max_size=30),
-    strategies.sampled_from([None, *Checksum]), strategies.sampled_from([None, *Duplex]))
+        strategies.sampled_from([data for _, data in TRANSACTION])))
+
+
+@given(strategies.lists(PIECES, max_size=30),
+       strategies.sampled_from([None, *Checksum]), strategies.sampled_from([None, *Duplex]))
 def test_any_bytes_in_any_chunks(
         said: list[tuple[float, Direction, bytes]], checksum: Checksum | None,
         duplex: Duplex | None) -> None:

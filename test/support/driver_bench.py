@@ -176,7 +176,7 @@ class DriverBench:
         """Put any station on the line."""
         self._stations.append(station)
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         """Open the port."""
         self.driver.machine.start(self.line.now)
         self.line.wake(self.driver.machine)

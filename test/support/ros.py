@@ -203,7 +203,7 @@ class Inbox(list[Any]):
         """Wait for the first message."""
         return self.until(lambda message: True, 'a message')
 
-    def next(self) -> Any:
+    def next(self) -> Any:  # noqa: A003
         """Wait for a message that is not here yet."""
         self.clear()
         return self.first()

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from std_msgs.msg import (
+from std_msgs.msg import (  # noqa: I101
     Float32MultiArray,
     Int16MultiArray,
     Int32MultiArray,
@@ -141,7 +141,7 @@ class Files:
 
     folder: Path
     net: Path
-    map: Path
+    map: Path  # noqa: A003
     simulator: Path
     port: Path
 

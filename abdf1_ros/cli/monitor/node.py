@@ -33,7 +33,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_full_topic_name import validate_full_topic_name
-from std_msgs.msg import String, UInt8MultiArray, UInt16MultiArray
+from std_msgs.msg import String, UInt8MultiArray, UInt16MultiArray  # noqa: I101
 
 # How often (s) the topics of the node are looked for; they do not change while it lives.
 _DISCOVERY_PERIOD = 0.5

@@ -61,7 +61,7 @@ class DataFile:
     and cannot be counted up.
     """
 
-    type: FileType
+    type: FileType  # noqa: A003
     number: int
     elements: int
 

@@ -85,7 +85,7 @@ class ByteChange:
     """Bits of one byte to set and to reset; ``address`` is odd for the high byte of a word."""
 
     address: int
-    set: int
+    set: int  # noqa: A003
     reset: int
 
     def __post_init__(self) -> None:

@@ -66,7 +66,7 @@ class WordRangeRead(Generic[_Place]):
     @classmethod
     def read(cls, reader: Reader,
              read_address: Callable[[Reader], _Place]) -> WordRangeRead[_Place]:
-        """Take the parameters off ``reader``, those of a file read (0F/04) too."""
+        """Take the parameters off ``reader``, those of a file read with 0F/04 too."""
         offset, total = reader.word(), reader.word()
         address = read_address(reader)
         size = reader.byte()
@@ -101,7 +101,7 @@ class WordBitWrite(Generic[_Place]):
     """Bit write, 0F/02: bits of one word to set and to reset (M 7-4)."""
 
     address: _Place
-    set: int
+    set: int  # noqa: A003
     reset: int
 
     def __post_init__(self) -> None:
