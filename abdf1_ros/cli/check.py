@@ -46,6 +46,7 @@ from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, Network
 from abdf1_ros.text import printable
@@ -53,7 +54,6 @@ from abdf1_ros.text import printable
 EXIT_FAULTY = 2
 EXIT_INTERRUPTED = 130
 
-_LONGEST = 86_400_000
 _SHOWN_TAGS = 8  # in the table; JSON has them all
 _EPILOG = """\
 exit status: 0 when both files are good, also with warnings; 2 for errors;
@@ -133,8 +133,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
 
 def _duration(text: str) -> float:
     value = decimal_number(text)
-    if value is None or not 0 <= value <= _LONGEST:
-        raise argparse.ArgumentTypeError(f'"{text}" should be ms from 0 to {_LONGEST}')
+    if value is None or not 0 <= value <= MAX_PERIOD:
+        raise argparse.ArgumentTypeError(f'"{text}" should be ms from 0 to {MAX_PERIOD}')
     return value
 
 

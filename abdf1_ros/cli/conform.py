@@ -51,6 +51,7 @@ from abdf1_ros.conform.report import as_issue, as_json, as_junit, line_of, summa
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file, package_version
 from abdf1_ros.ports.descriptor import Port
@@ -281,8 +282,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     unknown = set(options.only) - {case.name for case in CASES}
     if unknown:
         parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')
-    if not 0 <= options.station <= 254:
-        parser.error(f'--station {options.station} should be from 0 to 254')
+    if not 0 <= options.station <= MAX_STATION:
+        parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
     if not 1 <= options.count <= 100:
         parser.error(f'--count {options.count} should be from 1 to 100')
     if options.tcp is not None and not re.fullmatch(r'[^:]*:\d{1,5}', options.tcp):

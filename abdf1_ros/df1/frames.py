@@ -31,7 +31,7 @@ from typing import Final
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
 
-# Bytes of unstuffed link data that we take: the largest reply is 244 bytes behind a header
+# Bytes of unstuffed link data that we take: the largest reply is 244 bytes after a header
 # (M 7-30..7-40), and no known device sends more than this.
 MAX_LINK_DATA = 261
 
@@ -110,7 +110,7 @@ _CONTROLS = {pair: Control(Code(pair[1])) for pair in (ACK, NAK, EOT, ENQ)}
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A pair DLE x that is no symbol, or none that means anything here; ``byte`` is x."""
+    """A pair DLE x that is not a symbol, or means nothing here; ``byte`` is x."""
 
     byte: int
 

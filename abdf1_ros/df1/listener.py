@@ -38,7 +38,7 @@ from abdf1_ros.df1.frames import (
 _BCC_FRAMES = 2
 # So many frames in a row that are right with the other check only: the guess was wrong.
 _CONTRARY_FRAMES = 3
-# Bytes that are kept of what is no message, or one that does not end.
+# Bytes that are kept of what is not a message, or one that does not end.
 _MOST_KEPT = 2048
 
 

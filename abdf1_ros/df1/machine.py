@@ -237,7 +237,7 @@ class Machine:
         data = self.decoder.link_data
         is_faster = self.now - self._line_free < len(data) * self._timing.char_time
         if is_faster or not begins_good_reply(data):
-            return 0.0  # it is no line of that speed, such as a simulator's; or no such reply
+            return 0.0  # it does not have that speed (a simulator's), or the reply is another
         missing = HEADER_SIZE + self._reply_size - len(data) - _LAST_CHARACTERS
         return max(missing, 0) * self._timing.char_time
 

@@ -57,7 +57,7 @@ MAX_FORWARDS = 16
 MAX_KEPT = 2 * MAX_FORWARDS
 
 # Messages that a slave may have queued before the reply we want. They are taken even when the
-# time of the command is up, or on a slow line each reply would for ever be found behind the one
+# time of the command is up, or on a slow line each reply would for ever be found after the one
 # before it.
 MOST_QUEUED = 8
 
@@ -193,7 +193,7 @@ class MasterLine:
                 self.take_unwanted(number, packet)
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
-        """Poll an inactive station; of what is heard nothing is lost, but silence is no news."""
+        """Poll an inactive station; report whatever was heard that is not a good answer."""
         answer = yield from self.poll(number)
         if not is_good(answer) and (not isinstance(answer, Silence) or self._last_code):
             self._note_cause(answer, number, Message.NTC_EOT_STX_EXPECTED)

@@ -30,8 +30,8 @@ complete in the order of the poll list.
 
 A station that does not answer is polled again up to ENQ_Retries, then becomes inactive; any
 answer makes it active. A dead station costs a whole Timeout, so inactive ones are polled once a
-scan at most, and never for more than an eighth of the line's time: the living do not wait for
-the dead.
+scan at most, and never for more than an eighth of the line's time, so that active stations do
+not wait for them.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class StandardPollingMaster:
         self._given: dict[int, float] = {}
         # Stations that have answered a probe, and no command since. What they cost is as good as
         # the time of another probe: one that takes no commands would else come back at once.
-        self._doubtful: set[int] = set()
+        self._unproven: set[int] = set()
         self._last_probed: _PollList | None = None
 
     def status(self) -> LinkStatus:
@@ -157,7 +157,7 @@ class StandardPollingMaster:
         self._line.forget_forwards()
         self._outstanding.clear()
         self._given.clear()
-        self._doubtful.clear()
+        self._unproven.clear()
         self._priority.started = self._normal.started = None  # no scan lasts across a stop
         while True:
             begun = self._machine.now
@@ -167,7 +167,7 @@ class StandardPollingMaster:
                 yield Step(None, _PAUSE)
 
     def _is_active(self, number: int) -> bool:
-        """Tell whether a place in a list has its turn; our own is no station of the line."""
+        """Tell whether a place in a list has its turn; our own is not a station of the line."""
         return number == self._settings.station or self._stations[number].active
 
     def _scan(self, source: TaskSource) -> Talk:
@@ -198,7 +198,7 @@ class StandardPollingMaster:
             yield from self._visit_inactive(normal, source)
 
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
-        """Poll one inactive station of a list, if the living can spare the time."""
+        """Poll one inactive station of a list, if the active ones can spare the time."""
         number = polled.inactive(self._is_active)
         polled.is_kept_waiting = number is not None and not self._line.may_probe
         other = self._normal if polled is self._priority else self._priority
@@ -212,7 +212,7 @@ class StandardPollingMaster:
         answer = yield from self._line.poll_inactive(number)
         if is_good(answer):
             yield from self._answered(number, answer)
-            self._doubtful.add(number)
+            self._unproven.add(number)
         if any(station.active for station in self._stations):
             self._line.probed(begun)
 
@@ -344,13 +344,13 @@ class StandardPollingMaster:
             task.sent = error.sent
             self._end(station, error)
         else:
-            self._doubtful.discard(number)
+            self._unproven.discard(number)
             entry.deadline = begun + self._settings.cmd_timeout
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Take note that a station does not answer any more, and has had the line since then."""
         for station in self._stations.behind(number):
             self._end(station, error)
-        if number in self._doubtful:
-            self._doubtful.remove(number)
+        if number in self._unproven:
+            self._unproven.remove(number)
             self._line.probed(begun)

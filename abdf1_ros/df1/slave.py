@@ -261,7 +261,7 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
     Send what ``handle`` answers to ``symbol``, after TX_Delay; meanwhile ``look`` now and then.
 
     An answer belongs to what was said last: a master that says something else waits for it no
-    more, and would take it for the answer to that. So a poll or a message behind which there is
+    more, and would take it for the answer to that. So a poll or a message after which there is
     something else already is passed over, as if it had not been heard.
     """
     heard: Symbol | None = symbol

@@ -23,7 +23,7 @@ from abdf1_ros.df1.packet import Packet
 
 MAX_STATION = 254
 
-# So many commands in a row without a reply in time are no accident.
+# So many commands in a row without a reply in time are not an accident.
 _MOST_OVERDUE = 2
 
 

@@ -31,7 +31,7 @@ class Task(Protocol):
 
     The link sets ``sent`` when the command has been on the line: without a reply its outcome
     is then unknown. It ends the command by calling ``reply`` or ``fail``, once. ``reply_size``
-    is the bytes behind the header of a good reply, 0 where that is not known. After ``expires``
+    is the bytes after the header of a good reply, 0 where that is not known. After ``expires``
     (clock value in s) the command is not sent, nor sent once more.
     """
 

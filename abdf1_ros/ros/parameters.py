@@ -32,6 +32,7 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.ros.files import FileWatch
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network
 from abdf1_ros.settings.station_lists import parse_stations
@@ -63,7 +64,7 @@ class Parameters:
     read_only: bool = _parameter(False, 'refuse every write')
     default_period: int = _parameter(
         100, 'ms between reads of a mapping without Period; 0: as often as the line allows',
-        0, 86_400_000)
+        0, MAX_PERIOD)
     diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
     stale_after: float = _parameter(
         3.0, 'periods after which a value counts as lost', 1.0, 1000.0)

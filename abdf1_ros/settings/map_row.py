@@ -22,6 +22,7 @@ import math
 from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
@@ -48,8 +49,7 @@ from abdf1_ros.settings.structures import type_fault, write_fault
 from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 _NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)
-_MAX_STATION = 254
-_MAX_PERIOD = 86_400_000
+MAX_PERIOD = 86_400_000  # ms
 _PLC_TYPE_NAMES = tuple(entry.value for entry in PlcType)
 
 _Choice = TypeVar('_Choice', bound=Enum)
@@ -103,13 +103,13 @@ class RowReader:
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
         command = self._choice('Command', Command, None)
         # 255 is everybody, who may be written to but cannot answer.
-        last_station = BROADCAST if command is Command.WRITE else _MAX_STATION
+        last_station = BROADCAST if command is Command.WRITE else MAX_STATION
         station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
-                               _MAX_STATION + 1)
+                               MAX_STATION + 1)
         via = self._via(command, station)
         plc_type = self._plc_type()
         length = self._number('Length', 1, 65535, 1)
-        period = self._number('Period', 0, _MAX_PERIOD, None)
+        period = self._number('Period', 0, MAX_PERIOD, None)
         publish = self._choice('Publish', Publish, Publish.ALWAYS)
         minimum = self._decimal('Min', -math.inf)
         maximum = self._decimal('Max', math.inf)
@@ -225,7 +225,7 @@ class RowReader:
 
     def _via(self, command: Command | None, station: int | None) -> int | None:
         """Return the gateway, None for a station that needs none."""
-        via = self._number('Via', 0, _MAX_STATION, None)
+        via = self._number('Via', 0, MAX_STATION, None)
         if via is None or via == station:
             return None
         if command is Command.SERVE:

@@ -26,6 +26,7 @@ from urllib.parse import urlsplit
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
@@ -121,7 +122,7 @@ class Network:
     """A checked net CSV; times in milliseconds, as in the file."""
 
     station: int = _net(
-        'Station', 5, 'DF1 address of this node', low=0, high=254,
+        'Station', 5, 'DF1 address of this node', low=0, high=MAX_STATION,
         message=Message.CRT_BAD_STATION_ID, message_args=(255,))
     mode: str = _net(
         'Mode', 'Master', 'driver mode', choices=MODES,

@@ -32,6 +32,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
@@ -302,8 +303,8 @@ def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list
 
 def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
               clock: Callable[[], float]) -> None:
-    station = _number(row, 'Station', 0, 254)
-    via = _number(row, 'Via', 1, 254) if row.get('Via') else None
+    station = _number(row, 'Station', 0, MAX_STATION)
+    via = _number(row, 'Via', 1, MAX_STATION) if row.get('Via') else None
     length = _number(row, 'Length', 1, 1000) if row.get('Length') else 1
     motion = _choice(row, 'Motion', {entry.value: entry for entry in Motion})
     plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in PlcType})
