@@ -29,6 +29,7 @@ from std_msgs.msg import Float32MultiArray, Int16MultiArray
 from support.fault_box import FaultBox
 from support.ros import (
     EVERYTHING,
+    here,
     Inbox,
     Observer,
     OK,
@@ -104,7 +105,7 @@ class Rig:
                             lambda status: all(word in status.message for word in words))
 
     def recovers(self, limit: float) -> None:
-        """Wait for new values of both stations, for ``limit`` s at most, and good diagnostics."""
+        """Wait for new values of both stations, ``limit`` s at most here, and good diagnostics."""
         began = time.monotonic()
         self.diagnostics.clear()
         before = len(self.speeds), len(self.setpoint)
@@ -114,7 +115,7 @@ class Rig:
         duration = time.monotonic() - began
         self.until_well()
         print(f'values are back after {duration:.2f} s')
-        assert duration < limit
+        assert duration < here(limit)
 
     def write(self, value: float) -> str:
         """Write the set point of station 2; return the text of the result."""

@@ -76,11 +76,16 @@ os.environ |= {
 
 EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 
-PATIENCE = 20.0  # s; what takes longer does not happen
+PATIENCE = 40.0  # s; what takes longer does not happen
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 _Result = TypeVar('_Result')
+
+
+def here(seconds: float) -> float:
+    """Return a time limit (s), longer where more programs run than there are processors."""
+    return seconds * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 class Process:

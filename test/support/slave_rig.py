@@ -31,6 +31,7 @@ from support.fault_box import FaultBox
 from support.ptys import Pty
 from support.ros import (
     EVERYTHING,
+    here,
     Inbox,
     Observer,
     OK,
@@ -168,7 +169,7 @@ class Line:
         self.slave.until_well()
 
     def recovers(self, limit: float) -> None:
-        """Wait for new values at both ends, for ``limit`` s at most, and good diagnostics."""
+        """Wait for new values at both ends, for ``limit`` s at most here, and good diagnostics."""
         began = time.monotonic()
         before = {end.name: len(end.theirs) for end in (self.master, self.slave)}
         back: dict[str, float] = {}
@@ -183,7 +184,7 @@ class Line:
 
         self.observer.until(are_both_back, 'new values')
         print('values are back:', ', '.join(f'{end} {time:.2f} s' for end, time in back.items()))
-        assert max(back.values()) < limit
+        assert max(back.values()) < here(limit)
         self.until_well()
 
     def works(self) -> None:
