@@ -181,3 +181,32 @@ def test_damaged_frames_change_no_guess() -> None:
         damaged[6] ^= 1 + tns % 2
         symbols(decoder, bytes(damaged))
     assert kind.checksum is Checksum.CRC
+
+
+PIECES = strategies.sampled_from([
+    frames.ACK, frames.NAK, frames.EOT, frames.ENQ, frames.STX, frames.SOH, frames.ETX,
+    b'\x10\x10', b'\x10', b'\x01', b'\x02\x03', frame(Checksum.CRC), frame(Checksum.BCC, 0x1010),
+    frames.master_frame(16, COMMAND, Checksum.CRC), frames.poll_frame(16)])
+
+
+@given(strategies.lists(PIECES, max_size=12), strategies.integers(1, 40))
+def test_what_stood_on_the_line_is_kept_for_each_symbol(pieces: list[bytes], size: int) -> None:
+    data = b''.join(pieces)
+    decoder = ListeningDecoder(LineKind())
+    kept = []
+    for start in range(0, len(data), size):
+        decoder.feed(data[start:start + size])
+        while decoder.next_symbol() is not None:
+            kept.append(decoder.wire)
+    assert all(wire[:1] == frames.DLE and len(wire) > 1 for wire in kept)
+    assert sum(map(len, kept)) <= len(data)
+
+
+def test_a_response_inside_a_message_is_kept_apart_from_it() -> None:
+    decoder = ListeningDecoder(LineKind(Checksum.CRC, Duplex.FULL))
+    message = frames.message_frame(COMMAND, Checksum.CRC)
+    decoder.feed(b'\x55' + message[:7] + frames.ACK + message[7:])
+    kept = []
+    while decoder.next_symbol() is not None:
+        kept.append(decoder.wire)
+    assert kept == [frames.ACK, message]
