@@ -25,6 +25,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 import json
+from pathlib import Path
 import sys
 from typing import Any
 
@@ -63,6 +64,7 @@ examples:
   check config/net.csv config/map.csv
   check --response-time 25 net.csv map.csv    the PLC needs 25 ms for each answer
   check --json net.csv map.csv | jq .load
+  check nets/                                 a line of text for each pair in the folder
 """
 
 
@@ -98,13 +100,10 @@ def main(args: Sequence[str] | None = None) -> int:
     """Print the findings; return 2 when there are errors, otherwise 0."""
     prepare_output()
     options = _parse(args)
+    is_good = False
     try:
-        found = examine(options.net, options.map)
-        report = None
-        if found.network is not None:
-            report = make_report(found.network, found.mappings, options.default_period / 1000,
-                                 options.response_time / 1000)
-        print(_json(found, report) if options.json else _text(found, report), flush=True)
+        text, is_good = _folder(options) if options.map is None else _pair(options)
+        print(text, flush=True)
     except BrokenPipeError:
         drop_output()
     except OSError as error:  # such as a full disk
@@ -113,13 +112,74 @@ def main(args: Sequence[str] | None = None) -> int:
         return EXIT_FAULTY
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
-    return EXIT_FAULTY if found.problems else 0
+    return 0 if is_good else EXIT_FAULTY
+
+
+def _pair(options: argparse.Namespace) -> tuple[str, bool]:
+    """Return all there is to say of two files, and whether they have no error."""
+    found = examine(options.net, options.map)
+    report = _report(found, options)
+    return _json(found, report) if options.json else _text(found, report), not found.problems
+
+
+def _report(found: Findings, options: argparse.Namespace) -> Report | None:
+    if found.network is None:
+        return None
+    return make_report(found.network, found.mappings, options.default_period / 1000,
+                       options.response_time / 1000)
+
+
+def pairs(folder: Path) -> list[tuple[str, Path, Path]]:
+    """
+    Return name, net and map file of each line below a folder, by name.
+
+    The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder
+    NAME. One of them may be missing.
+    """
+    ends = 'net.csv', 'map.csv'
+    starts = {str(path.relative_to(folder))[:-len(ends[0])]
+              for path in folder.rglob('*.csv') if path.name.endswith(ends)}
+    return [(start.rstrip('/_') or folder.name, folder / f'{start}net.csv',
+             folder / f'{start}map.csv') for start in sorted(starts)]
+
+
+def _folder(options: argparse.Namespace) -> tuple[str, bool]:
+    """Return a line or an object for each line of a plant, and whether none has an error."""
+    contents: dict[str, Any] = {}
+    texts = []
+    is_good = True
+    for name, net, map_file in pairs(Path(options.net)):
+        found = examine(str(net), str(map_file))
+        report = _report(found, options)
+        is_good = is_good and not found.problems
+        contents[name] = _content(found, report)
+        texts.append(_summary(name, found, report))
+    if not contents:
+        is_good = False
+        texts.append(f'{printable(options.net)}: no files NAME_net.csv and NAME_map.csv, nor '
+                     'folders with net.csv and map.csv')
+    return json.dumps({'lines': contents}, indent=2) if options.json else '\n'.join(texts), is_good
+
+
+def _summary(name: str, found: Findings, report: Report | None) -> str:
+    """Return one line of text, and one more for each error."""
+    errors = [f'{printable(name)}: {colour(f"error: {problem}", RED, sys.stdout)}'
+              for problem in found.problems]
+    if report is None:
+        return '\n'.join(errors)
+    text = (f'{printable(name)}: {len(found.mappings)} rows, port '
+            f'{printable(report.network.port)}, scan {report.scan_time * 1000:.0f} ms, '
+            f'load {report.load:.0%}')
+    if warnings := len(report.remarks()):
+        text += colour(f', {warnings} warning{"s" if warnings > 1 else ""}', YELLOW, sys.stdout)
+    return '\n'.join([*errors, text])
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('check', __doc__, _EPILOG)
-    parser.add_argument('net', metavar='NET', help='the net CSV')
-    parser.add_argument('map', metavar='MAP', help='the map CSV')
+    parser.add_argument('net', metavar='NET', help='the net CSV, or a folder with the files of '
+                        'many lines: NAME_net.csv and NAME_map.csv')
+    parser.add_argument('map', metavar='MAP', nargs='?', help='the map CSV')
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object, with every tag of every block')
     parser.add_argument('--default-period', type=_duration, metavar='MS',
@@ -128,7 +188,10 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--response-time', type=_duration, metavar='MS',
                         default=USUAL_RESPONSE_TIME * 1000,
                         help='ms that a PLC takes for each answer (default: %(default)g)')
-    return parser.parse_args(args)
+    options = parser.parse_args(args)
+    if options.map is None and not Path(options.net).is_dir():
+        parser.error(f'{printable(options.net)} is not a folder, so a map CSV has to follow')
+    return options
 
 
 def _duration(text: str) -> float:
@@ -202,7 +265,12 @@ def _times_text(report: Report) -> str:
 
 
 def _json(found: Findings, report: Report | None) -> str:
-    """Return the same for programs; every key is always there, times are in ms."""
+    """Return the same for programs."""
+    return json.dumps(_content(found, report), indent=2)
+
+
+def _content(found: Findings, report: Report | None) -> dict[str, Any]:
+    """Return what there is to say; every key is always there, times are in ms."""
     content: dict[str, Any] = {
         'errors': [_problem(problem) for problem in found.problems],
         'warnings': [], 'network': None, 'mappings': len(found.mappings), 'blocks': [],
@@ -215,7 +283,7 @@ def _json(found: Findings, report: Report | None) -> str:
             'scan_time_ms': _ms(report.scan_time), 'load': round(report.load, 4),
             'needed_baud': report.needed_baud(),
             'response_time_ms': _ms(report.response_time)}
-    return json.dumps(content, indent=2)
+    return content
 
 
 def _problem(problem: Problem) -> dict[str, Any]:

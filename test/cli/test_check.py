@@ -217,3 +217,59 @@ def test_process_needs_no_ros_and_tells_its_statuses(files: tuple[Path, Path]) -
                            capture_output=True, timeout=30, check=True)
     assert 'exit status: 0' in usage.stdout
     assert 'examples:' in usage.stdout
+
+
+# A folder
+
+
+def plant(folder: Path, **lines: tuple[str, str]) -> None:
+    """Write the files of many lines."""
+    for name, (net, row) in lines.items():
+        write_csv(folder / f'{name}_net.csv', NET_HEADER, [net])
+        write_csv(folder / f'{name}_map.csv', MAP_HEADER, [row])
+
+
+def test_folder_has_a_line_of_text_for_each_pair(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, GOOD_ROW))
+    (tmp_path / 'hall' / 'paint').mkdir(parents=True)
+    write_csv(tmp_path / 'hall' / 'paint' / 'net.csv', NET_HEADER, [GOOD_NET])
+    write_csv(tmp_path / 'hall' / 'paint' / 'map.csv', MAP_HEADER, [GOOD_ROW])
+    write_csv(tmp_path / 'notes.csv', 'a', ['b'])
+    assert main([str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press']
+    assert lines[0].startswith('glue: 1 rows, port /dev/ttyS0, scan ')
+
+
+def test_error_of_one_pair_is_named_and_the_others_are_told(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=('255,Master,9600,500,300', GOOD_ROW))
+    (tmp_path / 'lone_net.csv').write_text((tmp_path / 'press_net.csv').read_text())
+    assert main([str(tmp_path)]) == 2
+    out = capsys.readouterr().out
+    assert f'glue: error: {tmp_path}/glue_net.csv:2:1 (Station): 2552 ' in out
+    assert f'lone: error: {tmp_path}/lone_map.csv: ' in out
+    assert '\npress: 1 rows, ' in out
+
+
+def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, BAD_ROWS[0]))
+    assert main(['--json', str(tmp_path)]) == 2
+    lines = parsed(capsys)['lines']
+    assert list(lines) == ['glue', 'press']
+    assert (len(lines['glue']['errors']), lines['press']['errors']) == (1, [])
+    assert lines['press']['blocks'][0]['tags'] == ['speed']
+
+
+def test_folder_without_lines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path)]) == 2
+    assert 'no files NAME_net.csv and NAME_map.csv' in capsys.readouterr().out
+
+
+def test_one_file_is_not_enough(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(files[0], NET_HEADER, [GOOD_NET])
+    with pytest.raises(SystemExit):
+        main([str(files[0])])
+    assert f'{files[0]} is not a folder, so a map CSV has to follow' in capsys.readouterr().err
