@@ -123,7 +123,7 @@ def test_vectors_cover_every_mode() -> None:
     assert {(entry.kind, entry.duplex, entry.station is None) for entry in VECTORS} == {
         ('symbol', HALF, True), ('poll', HALF, False), ('message', HALF, False),
         ('message', HALF, True), ('message', FULL, True)}
-    assert len(VECTORS) == 182
+    assert len(VECTORS) == 192
 
 
 @pytest.mark.parametrize('entry', CAPTURED, ids=lambda entry: f'{entry.direction}-{entry.time}')

@@ -27,7 +27,7 @@ from abdf1_ros.pccc.slc.identity import is_micrologix_1000
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.vectors import pair
+from support.vectors import pair, vector
 
 SLC = bytes.fromhex('00 EE 34 49 22') + b'5/03'.ljust(11) + bytes.fromhex('0000 06 00 3412 20 FC')
 PLC5 = pair('diag_status_plc5_40')[1].data
@@ -295,3 +295,13 @@ def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
     for text in (str(identity), identity.name, identity.mode_text, *identity.faults,
                  *identity.remarks):
         assert text.isprintable()
+
+
+@pytest.mark.parametrize(('name', 'model'), [
+    ('plc5_12', 'PLC-5/12'), ('plc5_25', 'PLC-5/25'), ('plc5_15', 'PLC-5/15'),
+    ('6008_ltv', 'PLC-5 VME (6008-LTV)'), ('1785_ka', '1785-KA'), ('1785_ka5', '1785-KA5'),
+    ('1785_ka3', 'PLC-2/16 at 1785-KA3'), ('1785_ke', '1785-KE'),
+    ('1784_kt', '1784-KT or 1784-KT2'), ('1770_kf3', '1770-KF3')])
+def test_models_of_the_vectors(name: str, model: str) -> None:
+    reply = vector(f'diag_status_{name}_rep_fd_crc').packet
+    assert decode_identity(reply.data).model == model
