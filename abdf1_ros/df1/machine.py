@@ -39,8 +39,19 @@ from typing import cast, NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameDecoder, MAX_LINK_DATA, Symbol
+from abdf1_ros.df1.frames import (
+    ACK,
+    Code,
+    Control,
+    Duplex,
+    Frame,
+    FrameDecoder,
+    MAX_LINK_DATA,
+    NAK,
+    Symbol,
+)
 from abdf1_ros.df1.line_rate import LineRate
+from abdf1_ros.df1.outgoing import Outgoing
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 from abdf1_ros.errors import CommandExpired
 
@@ -157,10 +168,11 @@ class Machine:
     ``send_at_once`` where that is set, so that it is on the line while the reply is made use of.
     All others come from ``data_to_send``.
 
-    ``unsent`` asks the port how many bytes have still to leave,
-    as far as it can tell; ``position`` counts the bytes given out so far. ``rate`` is what the
-    line has shown of its speed. ``late`` is the sum of the seconds by which it was called after a
-    deadline of its procedure: so long this process, or its host, has not run.
+    ``unsent`` asks the port how many bytes have still to leave, as far as it can tell;
+    ``position`` counts the bytes given out so far. With ``embeds`` a long message is given out in
+    portions, and a response goes between two of them (M 4-3). ``rate`` is what the line has shown
+    of its speed. ``late`` is the sum of the seconds by which it was called after a deadline of its
+    procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -175,8 +187,10 @@ class Machine:
         self.background: Background | None = None
         self.late = 0.0
         self.position = 0
+        self.embeds = False
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
+        self._outgoing = Outgoing(checksum, self._timing.char_time)
         self.rate = LineRate(self._timing.char_time)
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
@@ -198,9 +212,8 @@ class Machine:
     def next_call(self) -> float | None:
         """Return when to call ``handle_timeout`` (clock value in s), None for never."""
         expiry = self.background.next_expiry() if self.background else None
-        if expiry is None or self.deadline is None:
-            return self.deadline if expiry is None else expiry
-        return min(expiry, self.deadline)
+        moments = (expiry, self.deadline, self._outgoing.due)
+        return min((moment for moment in moments if moment is not None), default=None)
 
     @property
     def char_time(self) -> float:
@@ -223,7 +236,7 @@ class Machine:
 
     @property
     def _still_here(self) -> int:
-        return len(self._out) + self.unsent()
+        return self._outgoing.size + len(self._out) + self.unsent()
 
     @property
     def spare_time(self) -> float:
@@ -259,6 +272,7 @@ class Machine:
         """
         procedure, self._procedure = self._procedure, None
         self._out.clear()
+        self._outgoing.clear()
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
         self._echoes, self._echo_due = False, 0
@@ -307,6 +321,8 @@ class Machine:
         if self.background is not None and (expiry := self.background.next_expiry()) is not None \
                 and expiry <= now:
             self.background.expire(now)
+        if self._outgoing.due is not None and now >= self._outgoing.due:
+            self._out += self._outgoing.next(now)
         if self.deadline is None or now < self.deadline:
             return
         self.late += now - self.deadline
@@ -403,7 +419,7 @@ class Machine:
         free = max(self.now, self._line_free)
         if step.frame:
             size = len(step.frame)
-            self._out += step.frame
+            self._out += self._given_out(step.frame, free)
             self.counters.chars_sent += size
             self.position += size
             self._line_free = free = free + size * self._timing.char_time
@@ -418,6 +434,14 @@ class Machine:
         if self.send_at_once is not None and self._out:
             self.send_at_once(self.data_to_send())
         return True
+
+    def _given_out(self, frame: bytes, free: float) -> bytes:
+        """Return what goes out at once of a frame; the line is busy until ``free``."""
+        if self._outgoing.can_embed and frame in (ACK, NAK):
+            return frame  # behind what is on the line of our message, before the rest of it
+        if self.embeds or self._outgoing.size:
+            return self._outgoing.put(frame, free)
+        return frame
 
     def _transmit(self, step: Step) -> None:
         self._pending, self.deadline = None, self._kept_deadline

@@ -174,6 +174,8 @@ class FullDuplexPeer:
         self._accepted: _Accepted | None = None
         self._noise = 0
         self._is_aborted = False
+        self._embedded_in = 0  # the last message that had a response inside, by its number
+        self._machine.embeds = False
 
     def _next_task(self, source: TaskSource) -> Task | None:
         if len(self._outstanding) >= self._settings.max_outstanding:
@@ -351,6 +353,9 @@ class FullDuplexPeer:
             # symbol; only the last of these needs a NAK now (M 4-8).
             self._last_response, self._is_aborted = frames.NAK, True
             return b''
+        # Who sends responses inside of messages understands them too; as the products do with
+        # Embedded Responses = Auto-detect, we begin with it then (M 4-3).
+        self._machine.embeds |= self._embedded_in == self._machine.decoder.begun
         packet = Packet.decode(frame.data)
         self._counters.messages_received += 1
         if not packet.is_sound:
@@ -416,5 +421,7 @@ class FullDuplexPeer:
         return response
 
     def _count_response(self, code: Code) -> None:
+        if self._machine.decoder.in_message:
+            self._embedded_in = self._machine.decoder.begun
         self._counters.acks_received += code is Code.ACK
         self._counters.naks_received += code is Code.NAK

@@ -413,6 +413,69 @@ def test_embedded_nak_brings_the_message_again() -> None:
     assert peer.served == [THEIRS]
 
 
+LONG = Packet(dst=1, src=5, cmd=0x0F, sts=0, tns=0x2010, data=bytes(range(200)))
+
+
+def embedding(peer: PeerBench) -> None:
+    """Let the other end show that it embeds responses."""
+    peer.begin(COMMAND)
+    peer.said()
+    frame = peer.frame(THEIRS)
+    assert peer.hear(frame[:5] + ACK) == b''
+    assert peer.hear(frame[5:]) == ACK + peer.frame(OUR_REPLY)
+    assert peer.hear(ACK) == b''
+    assert peer.hear_packet(REPLY) == ACK
+    peer.wait(1.0)
+
+
+def test_response_goes_into_our_message_where_the_other_end_does_so_too() -> None:
+    """M 4-3; Embedded Responses = Auto-detect."""
+    peer = bench(timing=LineTiming(char_time=0.001))
+    embedding(peer)
+    peer.begin(LONG)
+    said = peer.said()
+    plain = peer.frame(LONG)
+    assert 16 <= len(said) < 40 and plain.startswith(said)
+    begun = peer.now
+    while (peer.machine.next_call or 0.0) < begun + 0.1:
+        (after, more), = peer.wait((peer.machine.next_call or 0.0) - peer.now)
+        said += more
+    assert plain.startswith(said)
+    assert peer.hear_packet(later(THEIRS, 1)) == ACK  # at once, before the rest
+    rest = b''.join(data for _, data in peer.wait(0.3))
+    assert said + rest == plain
+    assert peer.hear(ACK) == peer.frame(later(OUR_REPLY, 1))
+    assert peer.counts()['acks_sent'] == 3
+
+
+def test_response_waits_for_our_message_where_nobody_embeds() -> None:
+    peer = bench(timing=LineTiming(char_time=0.001))
+    peer.begin(LONG)
+    assert peer.said() == peer.frame(LONG)
+    assert peer.hear_packet(THEIRS) == ACK
+    assert not peer.machine.embeds
+
+
+def test_ack_while_the_rest_of_our_message_is_kept_is_none_to_it() -> None:
+    peer = bench(timing=LineTiming(char_time=0.001))
+    embedding(peer)
+    errand = peer.begin(LONG)
+    said = peer.said()
+    assert peer.hear(ACK) == b''
+    rest = b''.join(data for _, data in peer.wait(0.3))
+    assert said + rest == peer.frame(LONG)
+    assert peer.wait(1.0)[0][1] == ENQ
+    assert errand.result is None
+
+
+def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
+    peer = bench(timing=LineTiming(char_time=0.001))
+    embedding(peer)
+    assert peer.machine.embeds
+    peer.start()
+    assert not peer.machine.embeds
+
+
 @pytest.mark.parametrize('name', ['embedded_ack', 'embedded_nak'])
 def test_embedded_response_of_the_vectors(name: str) -> None:
     entry = vector(name)

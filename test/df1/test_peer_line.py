@@ -278,3 +278,22 @@ def test_lost_frame_on_a_line_that_is_faster_than_set_costs_no_more_than_its_ret
     rig.line.noise = Noise(lost=1.0)
     rig.run(1)
     assert rig.line.now - begun < rig.transfer_bound()
+
+
+@pytest.mark.parametrize('checksum', Checksum)
+@pytest.mark.parametrize('rate', [0.0, 1e-3, 1e-2])
+def test_both_ends_embed_responses_once_one_does(rate: float, checksum: Checksum) -> None:
+    rig = Rig(replace(SETTINGS, checksum=checksum, max_outstanding=3),
+              noise=noise_of(rate) if rate else QUIET, seed=5)
+    rig.line.run_for(0.2)
+    for end in rig.ends:
+        end.machine.embeds = True
+    rig.run(200)
+    assert_bounded(rig)
+    if rate == 0.0 or checksum is Checksum.CRC:
+        assert_exact(rig)
+    if rate == 0.0:
+        assert all(end.counts().get('enq_retries') is None for end in rig.ends)
+        assert sum(isinstance(errand.result, Packet)
+                   for end in rig.ends for errand in end.all) == 400
+    assert_recovers(rig)

@@ -177,7 +177,7 @@ class PeerBench(PeerNode):
     def _wait(self, seconds: float) -> Iterator[tuple[float, bytes]]:
         start, end = self.now, self.now + seconds
         for _ in range(_MOST_STEPS):
-            deadline = self.machine.deadline
+            deadline = self.machine.next_call
             if deadline is None or deadline > end:
                 self.now = end
                 return
