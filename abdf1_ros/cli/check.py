@@ -40,10 +40,11 @@ from abdf1_ros.cli.terminal import (
     YELLOW,
 )
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.served import line_problems
+from abdf1_ros.driver.served import row_problems
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
+from abdf1_ros.plan.interlocks import Bound
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.settings.map_file import load_mappings
@@ -77,8 +78,9 @@ class Findings:
     problems: list[Problem] = field(default_factory=list)
 
 
-def examine(net_file: str, map_file: str) -> Findings:
-    """Read both files, collecting every fault."""
+def examine(net_file: str, map_file: str,
+            default_period: float = DriverSettings().default_period) -> Findings:
+    """Read both files, collecting every fault; ``default_period`` in seconds."""
     found = Findings()
     try:
         found.network = load_network(net_file)
@@ -90,8 +92,10 @@ def examine(net_file: str, map_file: str) -> Findings:
     except ConfigurationError as error:
         found.problems += error.problems
     if found.network is not None:
-        for mapping, problem in line_problems(found.mappings, found.network, map_file):
-            found.mappings.remove(mapping)
+        for mapping, problem in row_problems(
+                found.mappings, found.network, default_period, map_file):
+            if mapping in found.mappings:
+                found.mappings.remove(mapping)
             found.problems.append(problem)
     return found
 
@@ -117,7 +121,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _pair(options: argparse.Namespace) -> tuple[str, bool]:
     """Return all there is to say of two files, and whether they have no error."""
-    found = examine(options.net, options.map)
+    found = examine(options.net, options.map, options.default_period / 1000)
     report = _report(found, options)
     return _json(found, report) if options.json else _text(found, report), not found.problems
 
@@ -149,7 +153,7 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     texts = []
     is_good = True
     for name, net, map_file in pairs(Path(options.net)):
-        found = examine(str(net), str(map_file))
+        found = examine(str(net), str(map_file), options.default_period / 1000)
         report = _report(found, options)
         is_good = is_good and not found.problems
         contents[name] = _content(found, report)
@@ -261,7 +265,8 @@ def _times_text(report: Report) -> str:
     response = report.response_time * 1000
     return (f'expected scan time: {report.scan_time * 1000:.1f} ms for everything once, with '
             f'{response:g} ms for each answer of a PLC\n'
-            f'load of the line: {report.load:.0%} of the time is needed to keep the periods')
+            f'load of the line: {report.load:.0%} of the time is needed to keep the periods'
+            + ''.join(f'\n{printable(str(bound))}' for bound in report.bounds))
 
 
 def _json(found: Findings, report: Report | None) -> str:
@@ -274,7 +279,8 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
     content: dict[str, Any] = {
         'errors': [_problem(problem) for problem in found.problems],
         'warnings': [], 'network': None, 'mappings': len(found.mappings), 'blocks': [],
-        'scan_time_ms': None, 'load': None, 'needed_baud': None, 'response_time_ms': None}
+        'scan_time_ms': None, 'load': None, 'needed_baud': None, 'bounds': [],
+        'response_time_ms': None}
     if report is not None:
         content |= {
             'network': {name: getattr(report.network, name) for name in FIELDS},
@@ -282,6 +288,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'blocks': [_entry(report, block) for block in report.blocks],
             'scan_time_ms': _ms(report.scan_time), 'load': round(report.load, 4),
             'needed_baud': report.needed_baud(),
+            'bounds': [_bound(bound) for bound in report.bounds],
             'response_time_ms': _ms(report.response_time)}
     return content
 
@@ -290,6 +297,11 @@ def _problem(problem: Problem) -> dict[str, Any]:
     return {
         **asdict(problem.place), 'number': problem.message.number if problem.message else None,
         'mnemonic': problem.message.name if problem.message else None, 'text': str(problem)}
+
+
+def _bound(bound: Bound) -> dict[str, Any]:
+    return {'tag': bound.mapping.tag, 'command': bound.mapping.command.value,
+            'ms': None if bound.seconds is None else _ms(bound.seconds)}
 
 
 def _remark(remark: Remark) -> dict[str, Any]:

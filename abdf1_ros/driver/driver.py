@@ -59,6 +59,7 @@ from abdf1_ros.plan.forecast import (
     longest_wait,
     scan_time,
 )
+from abdf1_ros.plan.interlocks import MODE_PERIOD, own_load
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
@@ -68,10 +69,6 @@ from abdf1_ros.settings.values import Values
 # A read of several packets lets others go between them. On a busy line so many times its own time
 # passes until it has had all its turns.
 _TURNS_OF_A_READ = 10
-
-# A station that we write heartbeats or fallbacks to is asked for its mode so often (s): a change
-# to RUN is a first contact.
-MODE_PERIOD = 2.0
 
 _NOT_OPEN = 'the port is not open'
 
@@ -232,7 +229,8 @@ class Driver:
 
     def _make_points(self, blocks: Sequence[Block]) -> dict[Mapping, ReadPoint]:
         """Return the points of all mappings that read, in their order."""
-        expected = intervals(blocks)
+        expected = intervals(blocks, own_load=own_load(
+            self.network, self.mappings, self._settings.default_period))
         found = {mapping: expected[block.period] for block in blocks for mapping in block.mappings}
         wait = longest_wait(blocks)
         return {mapping: self._served_point(mapping) if mapping.serves

@@ -26,10 +26,8 @@ import math
 
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.plan.interlocks import ANSWERS_IN_TIME
 from abdf1_ros.settings.mapping import Mapping
-
-# So many answers about the mode have to fit into the stale time of a row.
-_ANSWERS_IN_TIME = 3
 
 
 class RunGuard:
@@ -117,7 +115,7 @@ class Guards:
 
     def status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""
-        return {station: min(guard.limit for guard in guards) / _ANSWERS_IN_TIME
+        return {station: min(guard.limit for guard in guards) / ANSWERS_IN_TIME
                 for station, guards in self._runs.items()}
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:

@@ -27,6 +27,10 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.plan.forecast import line_model
+from abdf1_ros.plan.interlocks import guard_faults
+from abdf1_ros.plan.planner import Planner
+from abdf1_ros.settings.map_file import broken_links
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import ValueType
@@ -170,6 +174,32 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
             where = Place(path, mapping.line)
             found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
     return found
+
+
+def row_problems(mappings: Sequence[Mapping], network: Network, default_period: float,
+                 path: str) -> list[tuple[Mapping, Problem]]:
+    """
+    Return the rows that cannot be used on this line, and those that depend on such a row.
+
+    ``default_period`` (s) is for rows without Period. A row whose counter is not read often enough
+    for its Heartbeat_Timeout is among them (docs/heartbeats.md, rules 14 and 15).
+    """
+    found = line_problems(mappings, network, path)
+    left = [mapping for mapping in mappings if mapping not in dict(found)]
+    blocks = Planner(line_model(network), default_period).plan(left)
+    faults = [(mapping, 'Heartbeat_Timeout', text)
+              for mapping, text in guard_faults(left, blocks)] or _broken(left)
+    while faults:
+        for mapping, column, text in faults:
+            where = Place(path, mapping.line, column=column)
+            found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
+            left = [other for other in left if other is not mapping]
+        faults = _broken(left)
+    return found
+
+
+def _broken(mappings: Sequence[Mapping]) -> list[tuple[Mapping, str, str]]:
+    return [(mapping, fault.column, fault.text) for mapping, fault in broken_links(mappings)]
 
 
 def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:

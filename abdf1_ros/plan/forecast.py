@@ -32,7 +32,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import BAUD_RATES, Network
 
 USUAL_RESPONSE_TIME = 0.01
-_ANSWERS = 2
+ANSWERS = 2
 _POLL_CHARACTERS = 4
 
 # A read without a period takes what the others leave, but has its turn at least in so many
@@ -47,7 +47,7 @@ def line_model(network: Network) -> LineModel:
 
 def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> float:
     """Return the seconds that a block takes when each answer takes ``response_time`` s."""
-    return block.line_time + _ANSWERS * response_time * len(block.requests)
+    return block.line_time + ANSWERS * response_time * len(block.requests)
 
 
 def scan_time(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
@@ -65,16 +65,17 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
                for block in blocks if block.period)
 
 
-def intervals(blocks: Iterable[Block],
-              response_time: float = USUAL_RESPONSE_TIME) -> dict[float, float]:
+def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME,
+              own_load: float = 0.0) -> dict[float, float]:
     """
     Return the seconds from one read to the next to be expected of blocks, by their period (s).
 
     That is the period, as far as the line allows. Where it does not, all become longer by the
     factor of its load, but none by more than a scan time: that is what ``ReadQueue`` gives.
+    ``own_load`` is the part of the line's time that heartbeats need.
     """
     blocks = list(blocks)
-    once, needed = scan_time(blocks, response_time), load(blocks, response_time)
+    once, needed = scan_time(blocks, response_time), load(blocks, response_time) + own_load
     unlimited = scan_time((block for block in blocks if not block.period), response_time)
     wanted = {block.period: block.period or PATIENCE * once for block in blocks}
     if unlimited and needed < 1:

@@ -51,10 +51,18 @@ class LineModel:
     def read_time(self, dialect: Dialect, request: Request, station: int = 0) -> float:
         """Return the seconds that a read takes of a station that answers at once."""
         _, body = dialect.read(request.start, request.words)
-        command = bytes(HEADER_SIZE) + body
-        reply_size = HEADER_SIZE + dialect.reply_size(request.start, request.words)
+        stuffed = len(frames.stuff(body))
+        return self.transaction_time(
+            stuffed, dialect.reply_size(request.start, request.words), station)
+
+    def transaction_time(self, command: int, reply: int, station: int = 0) -> float:
+        """
+        Return the seconds of a transaction with a station that answers at once.
+
+        ``command`` and ``reply`` are the bytes of each after TNS.
+        """
         # Of a frame only the size counts, so the check need not be that of its data.
-        sent = len(frames.stuff(command)) + len(frames.ACK)
+        sent, reply_size = HEADER_SIZE + command + len(frames.ACK), HEADER_SIZE + reply
         if self.duplex is Duplex.HALF:
             sent += len(frames.master_frame(station, b'', self.checksum))
             sent += len(frames.poll_frame(station))

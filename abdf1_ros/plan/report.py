@@ -29,7 +29,7 @@ from enum import Enum
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.plan import forecast
+from abdf1_ros.plan import forecast, interlocks
 from abdf1_ros.plan.line_model import Request
 from abdf1_ros.plan.planner import Block, Place, Planner
 from abdf1_ros.settings.mapping import Mapping
@@ -50,6 +50,7 @@ class Kind(Enum):
     PERIOD = 'period'
     LOAD = 'load'
     GAP = 'gap'
+    INTERLOCK = 'interlock'
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,13 @@ class Report:
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        return forecast.load(self.blocks, self.response_time)
+        return forecast.load(self.blocks, self.response_time) + interlocks.own_load(
+            self.network, self.mappings, self.default_period, self.response_time)
+
+    @property
+    def bounds(self) -> list[interlocks.Bound]:
+        """Return what heartbeats and fallbacks can promise."""
+        return list(interlocks.bounds(self.network, self.mappings, self.response_time))
 
     def time(self, block: Block) -> float:
         """Return the seconds that a block takes, answers included."""
@@ -102,7 +109,7 @@ class Report:
             text = 'the map has no usable row: nothing is read or written'
             return [*found, Remark(Kind.MAP, text)]
         return [*found, *_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
-                *_gap_remarks(self)]
+                *_gap_remarks(self), *_interlock_remarks(self)]
 
 
 def make_report(network: Network, mappings: Iterable[Mapping], default_period: float,
@@ -192,6 +199,12 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
         yield Remark(Kind.LOAD, (
             f'the periods need {load:.0%} of the line; writes, repetitions and silent stations '
             'have to do with the rest'))
+
+
+def _interlock_remarks(report: Report) -> Iterator[Remark]:
+    """Find heartbeats and fallbacks whose times do not go with those of the line."""
+    for text in interlocks.remarks(report.network, report.mappings, report.response_time):
+        yield Remark(Kind.INTERLOCK, text)
 
 
 def _period_remarks(report: Report) -> Iterator[Remark]:

@@ -53,7 +53,7 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
             mappings.append(mapping)
             kept[mapping.item] = row
         problems += [fault.in_file(row) for fault in faults]
-    while broken := list(_broken_links(mappings)):
+    while broken := list(broken_links(mappings)):
         for mapping, fault in broken:
             if mapping in mappings:
                 mappings.remove(mapping)
@@ -61,7 +61,7 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
     return mappings, problems
 
 
-def _broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]:
+def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]:
     """
     Yield what depends on a row that is not there.
 

@@ -24,12 +24,12 @@ from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.driver import MODE_PERIOD
 from abdf1_ros.driver.heartbeats import LARGEST
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.plan.interlocks import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES

@@ -21,12 +21,13 @@ from dataclasses import replace
 import tracemalloc
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.served import line_problems, Served
+from abdf1_ros.driver.served import line_problems, row_problems, Served
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.heartbeats import Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from hypothesis import given
@@ -506,6 +507,27 @@ def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> 
     assert texts(*ours, network=network) == [
         'map.csv:2: Item: 1, Station 1 is our own in the net file, and nobody asks himself; '
         'the station to read or write belongs here'] * 2 * is_wrong
+
+
+def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
+    counter = make_mapping('N11:3', tag='alive', item=1)
+    guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 250))
+    (mapping, problem), = row_problems([counter, guarded], Network(baud=19200), 0.1, 'map.csv')
+    assert mapping is guarded
+    assert str(problem) == (
+        'map.csv:3 (Heartbeat_Timeout): Item: 2, Heartbeat_Timeout 250 ms is shorter than 3 reads '
+        'of alive on this line; 300 ms would do')
+
+
+def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it() -> None:
+    own = Network(station=1)
+    counter = make_mapping('N11:3', tag='alive', period=100, item=1)
+    guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 900))
+    word = make_mapping('N7:5', 'Write', tag='speed', topic='speed', item=3)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500, station=2, item=4,
+                        heartbeat=Heartbeat(('speed',), 500))
+    found = row_problems([counter, guarded, word, beat], own, 0.1, 'map.csv')
+    assert [mapping.tag for mapping, _ in found] == ['alive', 'level', 'speed', 'beat']
 
 
 def test_problems_go_with_their_rows() -> None:

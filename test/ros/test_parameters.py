@@ -253,7 +253,8 @@ def test_mappings_are_shown_with_their_defaults(
         'tag': 'line/door', 'command': 'Read', 'address': 'I:017/12', 'station': '1',
         'plc_type': 'PLC5', 'length': '1', 'type': 'bool', 'topic': 'line/door', 'period': '',
         'publish': 'Always', 'min': '', 'max': '', 'word_order': 'Low', 'scale': '', 'offset': '',
-        'access': 'Typed', 'processor': ''}
+        'access': 'Typed', 'processor': '', 'fallback': '', 'fallback_after': '', 'requires': '',
+        'requires_timeout': '', 'publish_while': '', 'heartbeat_timeout': '', 'via': ''}
 
 
 def test_mappings_can_be_kept_out_of_the_parameters(
