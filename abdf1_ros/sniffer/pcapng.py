@@ -50,15 +50,15 @@ _VERDICTS = {None: 0, True: 1, False: 2}
 
 class PcapngWriter:
     """
-    Write entries to ``path``; a file that is there is replaced if it is pcapng.
+    Write entries to ``path``, a file or a named pipe; a file that is there has to be pcapng.
 
-    Raises OSError where it cannot be written, or is something else, which is left alone. Nobody
-    else may read it: it holds what PLCs are told.
+    A file is replaced; a pipe waits for its reader. Raises OSError where it cannot be written, or
+    is something else, which is left alone. Nobody else may read it: it holds what PLCs are told.
     """
 
     def __init__(self, path: str) -> None:
         place = Path(path)
-        if place.exists() and not _is_pcapng(place):
+        if place.exists() and not place.is_fifo() and not _is_pcapng(place):
             raise OSError(f'{path} is there and is not pcapng; give another name')
         self.begun = 0.0
         place.touch(0o640)

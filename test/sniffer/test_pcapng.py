@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum
@@ -79,3 +80,15 @@ def test_only_pcapng_is_replaced_and_nobody_else_may_read_it(tmp_path: Path) -> 
     with pytest.raises(OSError, match='is there and is not pcapng'):
         PcapngWriter(str(path))
     assert path.read_text() == 'mine'
+
+
+def test_a_named_pipe_is_written_as_it_goes(tmp_path: Path) -> None:
+    path = tmp_path / 'pipe'
+    os.mkfifo(path)
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    writer = PcapngWriter(str(path))
+    assert os.read(reader, 1000) == HEAD
+    writer.write(Entry(0.0, Direction.OUT, Kind.ACK, wire=b'\x10\x06'))
+    assert b'\x10\x06' in os.read(reader, 1000)
+    writer.close()
+    os.close(reader)
