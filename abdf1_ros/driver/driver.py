@@ -212,6 +212,11 @@ class Driver:
         self._is_ending = True
         self.interlocks.wind_down()
 
+    def resume(self) -> None:
+        """Go on after ``wind_down``, once the port is to be opened again; in any thread."""
+        self.interlocks.resume()
+        self._is_ending = False
+
     def request_counters(self, station: int) -> None:
         """
         Ask for the link counters of a station; may be called from any thread, then wake the link.

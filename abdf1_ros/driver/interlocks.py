@@ -72,7 +72,7 @@ class Interlocks:
 
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
     row into our own table; ``report`` gets the result of each fallback that was written. Only
-    ``executor_ran`` and ``wind_down`` may be called from another thread.
+    ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
@@ -106,6 +106,10 @@ class Interlocks:
     def wind_down(self) -> None:
         """Write 0, then every fallback, then nothing any more (rule 5)."""
         self._is_ending = True
+
+    def resume(self) -> None:
+        """Take note that it was not the end: the next opening of the port is a first contact."""
+        self._is_ending = self._has_demanded_all = False
 
     @property
     def is_over(self) -> bool:

@@ -54,7 +54,7 @@ _FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
 
 _FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
-    Freshness.STALE: ERROR, Freshness.FAILED: ERROR}
+    Freshness.STALE: ERROR, Freshness.FAILED: ERROR, Freshness.WITHHELD: ERROR}
 
 Verdict = tuple[bytes, str]
 
@@ -81,7 +81,8 @@ class Diagnostics:
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
     faults of the rows that the map was read without, ``map_name`` is what the file is called.
     ``writes`` is what has become of writes so far. ``changed_files`` are the names of files that
-    are not any more as they were read.
+    are not any more as they were read. ``crowded`` are topics with a Fallback that more than one
+    publisher feeds.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
@@ -99,6 +100,7 @@ class Diagnostics:
         self._last_events: dict[int | None, _Moment] = {}
         self.writes = writes or WriteLog()
         self.changed_files: list[str] = []
+        self.crowded: tuple[str, ...] = ()
         self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
         self._rate = _Rate()
         self._sections = [
@@ -106,9 +108,34 @@ class Diagnostics:
             Section('counters', port, self._judge_counters, lambda now: self._counters()),
             *(self._station_section(station, port) for station in driver.stations),
             Section('mappings', port, self._judge_mappings, self._mapping_values),
-            Section('writes', port, self.writes.judge, self.writes.values),
+            Section('writes', port, self._judge_writes, self._write_values),
         ]
         self._node_name = node_name
+
+    def _judge_writes(self, now: float) -> Verdict:
+        """Return the level of writes; a heartbeat that does not count is a WARN."""
+        level, text = self.writes.judge(now)
+        interlocks = self._driver.interlocks
+        at_rest = [row.mapping.tag for row in interlocks.heartbeats if row.reason]
+        due = [row.mapping.tag for row in interlocks.fallbacks if row.cause is not None]
+        notes = [f'{", ".join(tags)}: {what}' for tags, what in (
+            (at_rest, 'heartbeat does not count'), (due, 'fallback value is due'),
+            (self.crowded, 'more than one publisher')) if tags]
+        return (max(level, WARN), '; '.join([text, *notes])) if notes else (level, text)
+
+    def _write_values(self, now: float) -> dict[str, str]:
+        """Return counts, and the state of each heartbeat and fallback."""
+        values = self.writes.values(now)
+        for beat in self._driver.interlocks.heartbeats:
+            age = '' if beat.confirmed is None else f', {now - beat.confirmed:.1f} s ago'
+            state = f'does not count: {beat.reason}' if beat.reason else 'counts'
+            values[beat.mapping.tag] = f'heartbeat {beat.value}{age}; {state}'
+        for row in self._driver.interlocks.fallbacks:
+            state = 'a message stands' if not row.stands else 'the fallback value stands'
+            if row.cause is not None:
+                state = f'the fallback value is due ({row.cause.value})'
+            values[row.mapping.tag] = state
+        return values
 
     def attach(self, link: LinkThread, port_errors: Callable[[], dict[str, int]]) -> None:
         """Name the thread whose port is reported on, and what tells the errors of its UART."""
@@ -460,4 +487,13 @@ def _describe(point: ReadPoint, now: float) -> str:
     text = f'{point.freshness(now).value}: {point.mapping.address} at station ' \
            f'{point.mapping.station}'
     text += ', never read' if age is None else f', last read {age:.1f} s ago'
+    if point.withheld:
+        text += f'; {point.withheld}, since {now - point.withheld_since:.1f} s, ' \
+                f'for the {_ordinal(point.withholdings)} time'
     return f'{text}; {point.error}' if point.error else text
+
+
+def _ordinal(number: int) -> str:
+    endings = {1: 'st', 2: 'nd', 3: 'rd'}
+    is_teen = number // 10 % 10 == 1
+    return f'{number}{"th" if is_teen else endings.get(number % 10, "th")}'

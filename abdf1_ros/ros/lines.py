@@ -36,6 +36,7 @@ from typing import Any
 
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import package_version
+from abdf1_ros.ros.interlocks import END_LIMIT
 from abdf1_ros.ros.node import (
     BridgeNode,
     EXIT_CONFIGURATION,
@@ -271,9 +272,14 @@ class Lines:
 
     def end(self) -> bool:
         """End all links, then all nodes; return whether there was time for the latter."""
+        nodes = [line.node for line in self.lines if line.node is not None]
+        for node in nodes:
+            node.begin_end()
+        give_up = time.monotonic() + END_LIMIT  # for all of them together
+        for node in nodes:
+            node.finish_end(give_up)
         for line in self.lines:
             line.ask_to_stop()
-        nodes = [line.node for line in self.lines if line.node is not None]
         for node in nodes:
             node.link.stop()
         # Writes that have come already are refused now; whoever waits for a result gets it.

@@ -47,6 +47,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import changed_text, Diagnostics, DuplicateNameWatch, speed_seen
+from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import (
     ACTIVE_LAYOUT,
@@ -120,7 +121,7 @@ _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
 
 _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
-    Outcome.SUPERSEDED: DiagnosticStatus.WARN}
+    Outcome.SUPERSEDED: DiagnosticStatus.WARN, Outcome.FALLBACK: DiagnosticStatus.WARN}
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +182,8 @@ class BridgeNode(Node):
         self._diagnostics = self._make_diagnostics(None)
         self._writes = WriteTopics(self, parameters.write_timeout, self._lost, self.link.wake)
         self._writes.use(self.driver)
+        self._interlocks = InterlockWatch(self)
+        self._interlocks.use(self.driver)
         self._link_counters = LinkCounterService(self.driver, self.link, self._wake_executor)
         self._create_services()
         if has_timer:
@@ -235,6 +238,11 @@ class BridgeNode(Node):
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
         self._tell_remarks(configuration)
+        silent = [mapping.tag for mapping in configuration.mappings
+                  if mapping.heartbeat or mapping.fallback]
+        if silent and configuration.parameters.read_only:
+            self.get_logger().warning(
+                f'read_only: no heartbeat and no fallback value is written: {_few(silent)}')
         if not configuration.mappings:
             self.get_logger().warning('the map has no usable row: nothing is read or written')
         if configuration.ignored:
@@ -259,12 +267,30 @@ class BridgeNode(Node):
         """Open the port and begin to read."""
         self.link.start()
 
+    def begin_end(self) -> None:
+        """Have heartbeats set to 0 and fallbacks written; ``finish_end`` waits for it."""
+        begin_end(self.driver, self.link)
+
+    def finish_end(self, give_up: float, what: str = 'ends') -> None:
+        """
+        Wait until the PLCs know, up to a monotonic clock value; name what is not confirmed.
+
+        ``what`` says in the log what goes on then (docs/heartbeats.md, rule 5).
+        """
+        tags = wait_for_end(self.driver, self.link, give_up)
+        if tags:
+            self.get_logger().error(f'{what} before the PLC has confirmed: {_few(tags)}')
+
     def stop(self, patience: Duration = _LAST_WORDS) -> None:
         """
         End the link thread, then tell the last state; the node may be destroyed after it.
 
-        ``patience`` is for a subscriber that is stuck.
+        Where the link still runs, PLCs are told of the end first. ``patience`` is for a subscriber
+        that is stuck.
         """
+        if self.link.is_alive():
+            self.begin_end()
+            self.finish_end(time.monotonic() + END_LIMIT)
         self.link.stop()
         self._opener.close()
         self._publish_diagnostics(line_time())
@@ -287,7 +313,7 @@ class BridgeNode(Node):
         self._diagnostics.written(result, line_time())
         mapping = result.mapping
         level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
-        if level == DiagnosticStatus.ERROR:
+        if level == DiagnosticStatus.ERROR or result.outcome is Outcome.FALLBACK:
             self._lines.warning(f'writes to {mapping.tag}',
                                 f'write to {mapping.tag} {result.value}: {result}')
         values = {'address': str(mapping.address), 'station': str(mapping.station),
@@ -341,6 +367,8 @@ class BridgeNode(Node):
         if self._duplicate_names.look(now):
             self._duplicate_name_came_or_went(self._duplicate_names.has_found)
         self._tell_speed(self.driver.machine.rate.seen)
+        if self._interlocks.look(now):
+            self._tell_crowd()
         wrong_types = self._diagnostics.wrong_types()
         for text in wrong_types:
             if text not in self._wrong_types:
@@ -360,6 +388,14 @@ class BridgeNode(Node):
         if names and not self._diagnostics.changed_files:
             self._lines.warning('the files', changed_text(names))
         self._diagnostics.changed_files = names
+
+    def _tell_crowd(self) -> None:
+        """Warn of topics with a Fallback that more than one publisher feeds (rule 17)."""
+        self._diagnostics.crowded = self._interlocks.crowded
+        for topic in self._interlocks.crowded:
+            self._lines.warning(f'publishers of {topic}', (
+                f'~/write/{topic} has more than one publisher: its fallback value is not written '
+                'while any of them goes on (a forgotten "ros2 topic pub -r"?)'))
 
     def _tell_speed(self, seen: float | None) -> None:
         """Log once that the line is faster, or slower, than it is set."""
@@ -413,9 +449,13 @@ class BridgeNode(Node):
         """Put new files to work; return False where the link does not take them."""
         self._configuration = configuration
         before, old_reads = self.driver, self._reads
+        # For heartbeats and fallbacks new files are a new start.
+        self.begin_end()
+        self.finish_end(time.monotonic() + END_LIMIT, 'goes on with new files')
         driver, reads = self._make_driver(old_reads)
         reopen = self._opener.use(self._port_settings())
         if not self.link.exchange(driver.machine, reads.publish_later_values, reopen):
+            before.resume()
             self.get_logger().error('the link has not taken the new files')
             return False
         self.driver, self._reads = driver, reads
@@ -423,6 +463,7 @@ class BridgeNode(Node):
         self._link_counters.use(driver)
         self._writes.use(driver)
         old_reads.end(reads)
+        self._interlocks.use(driver)
         self._log.forget_all()
         if before.stations.words() != driver.stations.words():
             self._publish_active()
@@ -432,9 +473,12 @@ class BridgeNode(Node):
                      response: SetBool.Response) -> SetBool.Response:
         """Leave the port to others, or take it again."""
         if request.data:
+            self.driver.resume()
             self.link.take()
             response.success, response.message = True, f'{self._port} is being opened'
         else:
+            self.begin_end()
+            self.finish_end(time.monotonic() + END_LIMIT, 'the port is left')
             response.success = self.link.release()
             response.message = f'{self._port}: {self.link.state.text}'
         return response
@@ -552,6 +596,8 @@ def _spin(node: BridgeNode, ended: threading.Event) -> None:
     node.start()
     while not ended.is_set() and not node.link.has_failed:
         executor.spin_once(timeout_sec=0.1)
+    node.begin_end()
+    node.finish_end(time.monotonic() + END_LIMIT)
     node.link.stop()
     # Writes that have come already are refused now; whoever waits for a result gets it.
     give_up = time.monotonic() + LAST_WRITES

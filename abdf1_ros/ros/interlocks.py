@@ -1,0 +1,102 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the node adds to heartbeats and fallback values: the executor, other publishers, the end.
+
+The numbers of rules are those of docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+import time
+
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ports.link_thread import LinkThread
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+END_LIMIT = 2.0
+"""How long (s) an orderly end may take until all is confirmed (rule 5)."""
+
+# How often (s) the executor says that it runs: well within the shortest period of a heartbeat.
+_LIFE_SIGN = 0.1
+
+# How often (s) publishers to topics with a Fallback are counted.
+_LOOK = 2.0
+
+_GLANCE = 0.005
+
+
+class InterlockWatch:
+    """
+    Watches over the heartbeats and fallbacks of ``node``; ``use`` names the driver.
+
+    The timer that tells the link of the executor exists only while there are heartbeats.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._driver: Driver | None = None
+        self._timer: object | None = None
+        self._next_look = 0.0
+        self.crowded: tuple[str, ...] = ()
+
+    def use(self, driver: Driver) -> None:
+        """Watch over another driver; called in the thread of the executor, or before it runs."""
+        self._driver = driver
+        self._tell()
+        if driver.interlocks.heartbeats and self._timer is None:
+            # Not the node's clock: that may be a simulation's, which need not run.
+            self._timer = self._node.create_timer(
+                _LIFE_SIGN, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _tell(self) -> None:
+        """Say that the executor runs (rule 3 c)."""
+        if self._driver is not None:
+            self._driver.interlocks.executor_ran(line_time())
+
+    def look(self, now: float) -> bool:
+        """
+        Count publishers every now and then; tell whether ``crowded`` is another than before.
+
+        ``crowded`` are the topics of Fallback rows that two or more feed (rule 17).
+        """
+        if self._driver is None or now < self._next_look:
+            return False
+        self._next_look = now + _LOOK
+        topics = dict.fromkeys(row.mapping.topic for row in self._driver.interlocks.fallbacks)
+        before, self.crowded = self.crowded, tuple(
+            topic for topic in topics if self._node.count_publishers(f'~/write/{topic}') > 1)
+        return self.crowded != before
+
+
+def begin_end(driver: Driver, link: LinkThread) -> None:
+    """Have heartbeats set to 0 and fallbacks written; ``wait_for_end`` waits for it (rule 5)."""
+    driver.wind_down()
+    link.wake()
+
+
+def wait_for_end(driver: Driver, link: LinkThread, give_up: float) -> list[str]:
+    """
+    Wait until all is confirmed, or until the monotonic clock value ``give_up``.
+
+    Returns the tags of what was not confirmed.
+    """
+    interlocks = driver.interlocks
+    while link.state.is_open and link.is_alive() and not interlocks.is_over \
+            and time.monotonic() < give_up:
+        time.sleep(_GLANCE)
+    return interlocks.unconfirmed() if interlocks else []

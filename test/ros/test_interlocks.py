@@ -1,0 +1,196 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Heartbeats, fallback values and guarded reads of a real node; named by the rules they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.ros.node import BridgeNode
+import pytest
+from std_msgs.msg import Int16MultiArray
+from std_srvs.srv import SetBool, Trigger
+from support.ros import details, Inbox, Observer, Plcs, ros_args, until_status, WARN, write_csv
+
+NET = ('NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout', ['1,1,500,115200,100'])
+MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Requires,'
+       'Requires_Timeout,Publish_While,Heartbeat_Timeout', [
+           'beat,Heartbeat,N10:0,1,SLC,100,,,,,,',
+           'speed,Write,N10:1,1,SLC,,7,400,,,,',
+           'doors,Read,N7:0,1,SLC,50,,,,,RUN,'])
+SIMULATOR = ('Station,PLC_Type,Address,Length,Values,Motion,Period', [
+    '1,SLC,S:0,8,,,', '1,SLC,N7:0,4,5,,', '1,SLC,N10:0,4,,,'])
+
+
+class Cell:
+    """A bridge with a heartbeat, a PLC, and who looks at both."""
+
+    def __init__(self, folder: Path, *assignments: str) -> None:
+        self.observer = Observer()
+        self.plcs = Plcs(write_csv(folder / 'simulator.csv', *SIMULATOR))
+        self._folder = folder
+        self._assignments = assignments
+
+    def __enter__(self) -> Cell:
+        self.observer.__enter__()
+        self.plcs.__enter__()
+        self.results = self.observer.results()
+        self.diagnostics = self.observer.diagnostics(self.plcs.port)
+        net = write_csv(self._folder / 'net.csv', *NET)
+        self.map = write_csv(self._folder / 'map.csv', *MAP)
+        self.node = BridgeNode(
+            context=self.observer.context, use_global_arguments=False, cli_args=ros_args(
+                f'net_file:={net}', f'map_file:={self.map}', f'port:={self.plcs.port}',
+                *self._assignments))
+        self.observer.executor.add_node(self.node)
+        self.node.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self.node in self.observer.executor.get_nodes():
+            self.stop()
+        self.plcs.__exit__(*exception)
+        self.observer.__exit__(*exception)
+
+    def stop(self) -> None:
+        """End the bridge in order."""
+        self.observer.executor.remove_node(self.node)
+        self.node.stop()
+        self.node.destroy_node()
+
+    def word(self, address: str) -> int:
+        """Return a word of the PLC."""
+        table = self.plcs[1].table
+        return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait for something; the executor runs meanwhile."""
+        self.observer.until(lambda: condition() or None, what)
+
+    def until_counting(self) -> None:
+        """Wait until the heartbeat counts."""
+        self.until(lambda: self.word('N10:0') > 2, 'a heartbeat that counts')
+
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        """Call a service of the bridge."""
+        return self.observer.call(kind, f'/abdf1/{name}', request)
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Cell]:
+    with Cell(tmp_path) as made:
+        yield made
+
+
+def fallbacks(results: Inbox) -> list[str]:
+    """Return the causes of the fallback values that have been told."""
+    return [result.message.partition(': ')[2] for result in results
+            if result.message.startswith('fallback value written')]
+
+
+def test_rule_2_fallback_at_the_start_goes_before_the_count(cell: Cell) -> None:
+    cell.until_counting()
+    assert cell.word('N10:1') == 7
+    assert fallbacks(cell.results) == ['start']
+
+
+def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
+    cell.until_counting()
+    cell.observer.executor.remove_node(cell.node)
+    stood = [cell.word('N10:0')]
+
+    def stands() -> bool:
+        stood.append(cell.word('N10:0'))
+        return len(stood) > 150 and len(set(stood[-150:])) == 1
+
+    # Within max(Period, 1 s) and one beat it has to stand; the observer spins 100 times a second.
+    cell.until(stands, 'a heartbeat that stands still')
+    cell.observer.executor.add_node(cell.node)
+    last = cell.word('N10:0')
+    cell.until(lambda: cell.word('N10:0') > last, 'a heartbeat that counts again')
+
+
+def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
+    cell.until_counting()
+    publisher = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    publisher.publish(Int16MultiArray(data=[42]))
+    cell.until(lambda: cell.word('N10:1') == 42, 'the command')
+    cell.stop()
+    assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
+
+
+def test_rule_5_port_that_is_left_to_others_is_left_with_zero(cell: Cell) -> None:
+    cell.until_counting()
+    assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
+    assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
+    assert cell.call(SetBool, 'polling', SetBool.Request(data=True)).success
+    cell.until_counting()
+
+
+def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
+    cell.until_counting()
+    header, rows = MAP
+    write_csv(cell.map, header, [row for row in rows if not row.startswith('beat')])
+    assert cell.call(Trigger, 'reload', Trigger.Request()).success
+    assert cell.word('N10:0') == 0
+    write_csv(cell.map, header, rows)
+    assert cell.call(Trigger, 'reload', Trigger.Request()).success
+    cell.until_counting()
+
+
+def test_rule_8_fallback_comes_when_the_publisher_is_gone(cell: Cell) -> None:
+    cell.until_counting()
+    publisher = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    publisher.publish(Int16MultiArray(data=[42]))
+    cell.until(lambda: cell.word('N10:1') == 42, 'the command')
+    cell.until(lambda: cell.word('N10:1') == 7, 'the fallback value')
+    cell.until(lambda: fallbacks(cell.results) == ['start', 'timeout'], 'both results')
+
+
+def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
+    doors = cell.observer.listen(Int16MultiArray, '/abdf1/read/doors')
+    assert doors.first().data[0] == 5
+    cell.plcs.say('program 1')
+    status = cell.observer.until(lambda: next((
+        status for array in cell.diagnostics for status in array.status
+        if status.name.endswith(': mappings') and 'withheld' in status.message), None),
+        'a withheld row')
+    assert 'withheld' in details(status)['doors']
+    assert 'not in RUN: it is in REM PROG' in details(status)['doors']
+    cell.plcs.say('run 1')
+    count = len(doors)
+    cell.until(lambda: len(doors) > count, 'a value after RUN')
+
+
+def test_rule_17_two_publishers_of_a_fallback_row_are_a_warning(cell: Cell) -> None:
+    cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    status = until_status(cell.diagnostics, 'writes', WARN)
+    cell.until(lambda: 'speed: more than one publisher' in until_status(
+        cell.diagnostics, 'writes', WARN).message, 'the warning')
+    assert 'heartbeat' in details(status)['beat']
+
+
+def test_rule_18_read_only_writes_nothing_and_says_so(
+        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with Cell(tmp_path, 'read_only:=true') as cell:
+        doors = cell.observer.listen(Int16MultiArray, '/abdf1/read/doors')
+        doors.first()
+        assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 0)
+    said = capfd.readouterr().err
+    assert said.count('read_only: no heartbeat and no fallback value is written: beat, speed') == 1
