@@ -40,13 +40,16 @@ class LineRate:
     """
     The rate of a line on which a character should take ``char_time`` seconds.
 
+    Where it ``is_half_duplex``, what is heard cannot pass while something is sent.
+
     ``seen`` is the rate in multiples of the set one, None while nothing speaks against that.
     Above 1 it is a lower limit; below 1 it is what the bytes of messages come at.
     """
 
-    def __init__(self, char_time: float) -> None:
+    def __init__(self, char_time: float, is_half_duplex: bool = True) -> None:
         self.seen: float | None = None
         self._char_time = char_time
+        self._is_half_duplex = is_half_duplex
         self._asked: float | None = None
         self._sent = 0
         self._heard = 0
@@ -55,7 +58,7 @@ class LineRate:
         self._messages: list[float] = []
 
     def sent(self, characters: int, heard: int, now: float) -> None:
-        """Take note of characters that are to be answered; ``heard`` counts those from there."""
+        """Take note of characters that are to be answered; ``heard`` counts what has come."""
         if self._asked is None:
             self._asked, self._sent, self._heard = now, 0, heard
         self._sent += characters
@@ -66,7 +69,8 @@ class LineRate:
             return
         seconds, self._asked = now - self._asked, None
         self._exchanges += 1
-        needed = (self._sent + heard - self._heard) * self._char_time
+        passed = self._sent + (heard - self._heard if self._is_half_duplex else 0)
+        needed = passed * self._char_time
         if needed > _FASTER * seconds:
             self._fast.append(needed / max(seconds, 1e-6))
         if self._exchanges < EXCHANGES:

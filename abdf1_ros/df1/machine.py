@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 import math
-from typing import cast, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
@@ -191,7 +191,7 @@ class Machine:
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self._outgoing = Outgoing(checksum, self._timing.char_time)
-        self.rate = LineRate(self._timing.char_time)
+        self.rate = LineRate(self._timing.char_time, duplex is Duplex.HALF)
         self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
@@ -371,16 +371,11 @@ class Machine:
                                   self.now - self._message.begun)
             self._resume(symbol)
 
-    @property
-    def _heard_with_sent(self) -> int:
-        """Return the characters heard that could not pass while others were sent."""
-        return self.counters.chars_received if self._is_half_duplex else 0
-
     def _take_as_answer(self) -> None:
         """Conclude from an answer that what we have sent has left, but what is still here."""
         here = 0 if self._is_half_duplex else self._still_here
         if not here:
-            self.rate.answered(self._heard_with_sent, self.now)
+            self.rate.answered(self.counters.chars_received, self.now)
         left = self.now + here * self._timing.char_time
         self._line_free = min(self._line_free, left)
 
@@ -390,7 +385,8 @@ class Machine:
         while procedure is not None:
             try:
                 # None is what a generator is started with, and no procedure sees it.
-                step = procedure.throw(error) if error else procedure.send(cast(Heard, heard))
+                step = procedure.throw(error) if error else procedure.send(
+                    heard)  # type: ignore[arg-type]
             except StopIteration:
                 self._procedure, self.deadline = None, None
                 return
@@ -429,7 +425,7 @@ class Machine:
         self._set_deadline(step, free)
         if step.timeout != 0:
             if step.frame:
-                self.rate.sent(len(step.frame), self._heard_with_sent, self.now)
+                self.rate.sent(len(step.frame), self.counters.chars_received, self.now)
             return False
         if self.send_at_once is not None and self._out:
             self.send_at_once(self.data_to_send())

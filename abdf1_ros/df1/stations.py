@@ -121,7 +121,10 @@ class ActiveStationList:
 
     def heard(self, number: int, now: float) -> None:
         """Note an answer of any kind: the station is active, and all that share its gateway."""
-        self[number].last_heard = now
+        station = self[number]
+        station.last_heard = now
+        if station.active:
+            return  # and so are all that share its gateway
         for station in map(self.__getitem__, self.behind(self.via(number))):
             if not station.active:
                 station.active, station.silent_since = True, None

@@ -108,3 +108,10 @@ def test_forgotten_rate_is_measured_anew() -> None:
     for number in range(EXCHANGES - 1):
         exchange(rate, number, 0.01)
     assert rate.seen is None
+
+
+def test_what_is_heard_in_full_duplex_may_pass_while_something_is_sent() -> None:
+    rate = LineRate(0.001, is_half_duplex=False)
+    for number in range(EXCHANGES):
+        exchange(rate, number, 0.01)  # 10 characters each way at once, at the set speed
+    assert rate.seen is None
