@@ -333,8 +333,9 @@ end
 
 local function octal(value, digits) return string.format('%0' .. digits .. 'o', value) end
 
--- M 13-10..13-15: 00 and text, or a mask and the levels it names. typed: what a write tells.
-local function range_address(r, typed)
+-- M 13-10..13-15: 00 and text, or a mask and the levels it names. only_plc5: a command that a PLC-3
+-- does not have. typed: what a write tells.
+local function range_address(r, only_plc5, typed)
   local mask = r.byte()
   if mask == nil then return end
   if mask == 0 then
@@ -353,7 +354,7 @@ local function range_address(r, typed)
       if level[n] == nil then return end
     end
   end
-  if bit.band(mask, 0xF2) ~= 0x02 then  -- of a PLC-3
+  if not only_plc5 and bit.band(mask, 0xF2) ~= 0x02 then  -- of a PLC-3
     local section, file = level[2] or 1, level[3] or 0
     local element, word = level[4] or 0, level[5] or 0
     local known = PLC3_SECTIONS[section]
@@ -418,11 +419,11 @@ end
 local function address_of(cmd, fnc, data)
   if cmd == 0x0F then
     if fnc == 0x00 or fnc == 0x01 or fnc == 0x04 or fnc == 0x68 then
-      return range_address(reader(data, 12))
+      return range_address(reader(data, 12), fnc == 0x68)
     elseif fnc == 0x67 then
-      return range_address(reader(data, 12), written_type)
+      return range_address(reader(data, 12), true, written_type)
     elseif fnc == 0x02 or fnc == 0x26 then
-      return range_address(reader(data, 8))
+      return range_address(reader(data, 8), fnc == 0x26)
     elseif fnc == 0xA1 or fnc == 0xA9 then
       return logical_address(reader(data, 9), true)
     elseif fnc == 0xA2 or fnc == 0xAA or fnc == 0xAB then

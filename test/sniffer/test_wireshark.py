@@ -135,7 +135,7 @@ def test_every_frame_of_the_vectors(tmp_path: Path) -> None:
 def test_every_command_of_the_vectors(tmp_path: Path) -> None:
     entries: list[Entry] = []
     session = Session(Checksum.BCC)
-    for exchange in load_json('pccc_vectors.json'):
+    for exchange in load_json('exchanges.json')['exchanges']:
         for direction, name in ((Direction.OUT, 'command'), (Direction.IN, 'reply')):
             frame = message_frame(bytes.fromhex(exchange[name]), Checksum.BCC)
             entries += session.feed(Chunk(2.5, direction, frame))
