@@ -616,6 +616,21 @@ def test_message_that_has_begun_when_the_time_is_up_is_heard_out() -> None:
     assert errand.result == REPLY
 
 
+@pytest.mark.parametrize('begin', [STX, STX + bytes(261)])
+def test_other_end_that_dribbles_does_not_keep_us_waiting(begin: bytes) -> None:
+    """A message that has begun, and then a byte every 60 ms without end."""
+    peer = bench(enq_retries=1, timing=LineTiming(char_time=0.001))
+    errand = peer.begin(COMMAND)
+    peer.said()
+    said = [peer.hear(begin)]
+    while errand.result is None and peer.now < 200.0:
+        said += [data for _, data in peer.wait(0.06)]
+        said += [peer.hear(b'U')]
+    assert isinstance(errand.result, StationInactive)
+    assert errand.seconds < 2 * TIMEOUT + 1.0
+    assert b''.join(said) == ENQ
+
+
 # Receiver
 
 def test_last_response_begins_as_nak() -> None:
