@@ -23,21 +23,22 @@ Theory of operation. The transmitter sends one message at a time and waits for i
     silence   DLE ENQ asks for the response again, up to ENQ_Retries
 
 The receiver answers every message at once with ACK or NAK and remembers what it answered, for
-an ENQ (M 4-7..4-9). That memory begins as NAK, and falls back to NAK with everything heard
-that was no message: an old ACK must not stand for a new message that got lost.
+an ENQ (M 4-7..4-9). That memory begins as NAK, and goes back to NAK after anything that is not a
+message: an old ACK must not count for a new message that got lost.
 
-Responses name no message. What comes while bytes of a message have still to leave is none to it
-(M 4-5: WAIT follows SEND). A transfer that went wrong at first, and the start, are followed by a
-pause in which responses that come late are passed over; they would stand for the next message.
+A response does not say which message it is for. One that comes before all bytes of our message
+have left is not for that message (M 4-5: WAIT follows SEND). After the start, and after a
+transfer that needed a second try, there is a short pause: responses that come in it are late, and
+would be taken for the response to the next message.
 
 An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
 at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
 A reply that overtakes its ACK counts as one (M 4-13).
 
-A message is sent again when its sender has not understood our response (M 4-5), so a repetition
-comes within the time of its retries, and of one of them where the sender has acknowledged our
-reply and not asked again. Whatever comes later with the same number is another message: some
-processors count from 0 after each power-up, some programs always send 0.
+A message is sent again when its sender has not understood our response (M 4-5). So a repetition
+comes within the time that the sender's retries take; if the sender has acknowledged our reply and
+has not asked again, within the time of one retry. Any later message with the same number is a
+new one: some processors count from 0 after each power-up, some programs always send 0.
 """
 
 from __future__ import annotations
@@ -108,14 +109,14 @@ class _Accepted:
     """
     The last message accepted: its key (M 4-4), and when (clock value in s) it came.
 
-    ``is_answered`` tells that our reply to it has been acknowledged, ``is_doubted`` that its
+    ``is_answered`` tells that our reply to it has been acknowledged, ``may_come_again`` that its
     sender has asked for a response again, or has had a NAK.
     """
 
     key: tuple[int, int, int]
     when: float
     is_answered: bool = False
-    is_doubted: bool = False
+    may_come_again: bool = False
 
 
 class FullDuplexPeer:
@@ -382,14 +383,14 @@ class FullDuplexPeer:
         last, settings = self._accepted, self._settings
         if last is None or last.key != packet.duplicate_key or not settings.duplicate_detection:
             return False
-        is_settled = last.is_answered and not last.is_doubted
+        is_settled = last.is_answered and not last.may_come_again
         enq_retries = 0 if is_settled else max(_ENQ_LIMIT, settings.enq_retries)
         return self._machine.now - last.when < settings.retry_time(enq_retries)
 
     def _expect_repetition(self) -> None:
         """Take note that the other end may send its last message again."""
         if self._accepted is not None:
-            self._accepted.is_doubted = True
+            self._accepted.may_come_again = True
 
     def _take_reply(self, packet: Packet) -> None:
         """Hand a reply to the command it belongs to, if it is still waited for."""

@@ -335,7 +335,7 @@ def test_nothing_is_sent_at_the_start_that_a_response_to_a_process_before_us_wou
 
 
 @pytest.mark.parametrize('response', [ACK, NAK])
-def test_response_while_our_message_is_leaving_is_none_to_it(response: bytes) -> None:
+def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -> None:
     """M 4-5: WAIT follows SEND; what has still to leave is for the port to say."""
     peer = bench(timing=LineTiming(char_time=0.01))
     unsent = 1
@@ -378,7 +378,7 @@ def test_early_ack_counts_on_a_link_faster_than_baud() -> None:
     assert first.result == REPLY
 
 
-def test_ack_before_a_byte_of_our_message_is_handed_over_is_none_to_it() -> None:
+def test_ack_before_a_byte_of_our_message_is_handed_over_does_not_count() -> None:
     peer = bench()
     peer.begin(COMMAND)
     peer.machine.receive_data(ACK, peer.now)  # read before the message is taken for the port
@@ -456,7 +456,7 @@ def test_response_waits_for_our_message_where_nobody_embeds() -> None:
     assert not peer.machine.embeds
 
 
-def test_ack_while_the_rest_of_our_message_is_kept_is_none_to_it() -> None:
+def test_ack_while_the_rest_of_our_message_is_kept_does_not_count() -> None:
     peer = bench(timing=LineTiming(char_time=0.001))
     embedding(peer)
     errand = peer.begin(LONG)
