@@ -71,6 +71,10 @@ demo: $(INSTALLED) ## Run bridge and simulated PLC for DEMO_SECONDS (20; 0: unti
 demo-peer: $(INSTALLED) ## The same on a full-duplex line
 	@$(PY) -m abdf1_ros demo --peer --seconds $(DEMO_SECONDS)
 
+.PHONY: demo-heartbeats
+demo-heartbeats: $(INSTALLED) ## Show what happens when publisher, PLC program or bridge dies (40 s)
+	@$(PY) -m abdf1_ros demo --heartbeats
+
 .PHONY: test
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
 	$(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)

@@ -24,6 +24,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+import math
 import os
 from pathlib import Path
 import shutil
@@ -74,6 +75,11 @@ FULL_DUPLEX = Scene(
     'A PLC-5 (station 1), simulated on a full-duplex DF1 line',
     'peer_net.csv', 'peer_map.csv', ('--full-duplex', '1'), 1, 'line_speed', None,
     'msg 1 N7:50 11 22 33 44')
+
+
+HEARTBEATS = Scene(
+    'An SLC 5/03 (station 2) whose program watches over ROS, and is watched',
+    'net.csv', 'heartbeat_map.csv', ('--ladder', '2'), 2, 'doors', None)
 
 
 class Interrupted(Exception):
@@ -293,6 +299,85 @@ class Demo:
         print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
 
 
+class HeartbeatDemo(Demo):
+    """
+    The three deaths: of the publisher, of the bridge, of the program of the PLC.
+
+    What the lamps of the PLC say is printed by the simulator.
+    """
+
+    _speed = 0
+    _next_message = math.inf
+
+    def run(self, seconds: float) -> None:
+        """Tell the story; ``seconds`` do not shorten it."""
+        self._simulator = self._start('simulator', *self._simulator_args)
+        self._bridge = self._start('node', *self._bridge_args)
+        self._title(self._scene.title)
+        self._publisher = self._watcher.create_publisher(
+            MESSAGES[self._mappings['speed'].message_type], '/abdf1/write/speed', 10)
+        self._wait('values', lambda: 'doors' in self._watcher.values)
+        self._take_control('1. Somebody publishes a speed, and a person resets the PLC')
+        self._title('2. The publisher dies')
+        self._next_message = math.inf
+        self._wait('the fallback value', lambda: self._used() == 0)
+        self._say('the program of the PLC uses 0; the result on ~/write_results: '
+                  f'"{self._fallback_result()}"')
+        self._take_control('   ... and comes back; control needs another reset')
+        self._title('3. The program of the PLC stands still, while its port answers')
+        deadline = self._watcher.expect(self._mappings['doors'])
+        self._pause(1.0)
+        self._watcher.missed = 0
+        self._command('program 2')
+        self._wait('the silence to be noticed', lambda: self._watcher.missed > 0)
+        self._say('/abdf1/read/doors is withheld; a subscriber with a deadline of '
+                  f'{deadline:.1f} s is told')
+        self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
+        self._print_statuses('mappings')
+        self._command('run 2')
+        self._take_control('   ... and runs again')
+        self._title('4. The bridge dies (kill -9)')
+        self._bridge.kill()
+        self._bridge.wait()
+        self._pause_without_bridge(4.5)
+        self._say('the watchdog of the PLC has taken the speed away, 3 s after the last heartbeat')
+
+    def _take_control(self, title: str) -> None:
+        self._title(title)
+        self._speed, self._next_message = 0, 0.0
+        self._pause(4.5)
+        self._command('reset 2')
+        self._pause(0.5)
+        self._speed = 800
+        self._wait('the speed in the PLC', lambda: self._used() == 800)
+        self._say('speed 800 is published, and used by the program (N11:2)')
+
+    def _used(self) -> int:
+        return int(self._watcher.values['used_speed'][0])
+
+    def _fallback_result(self) -> str:
+        text = 'fallback value written'
+        found = [result.message for result in self._watcher.results
+                 if result.message.startswith(text)]
+        return found[-1] if found else ''
+
+    def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
+        return super()._spin_until(lambda: self._feed() or condition(), limit)
+
+    def _feed(self) -> bool:
+        """Publish the speed five times a second."""
+        if time.monotonic() >= self._next_message:
+            self._next_message = time.monotonic() + 0.2
+            self._publisher.publish(
+                MESSAGES[self._mappings['speed'].message_type](data=[self._speed]))
+        return False
+
+    def _pause_without_bridge(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            rclpy.spin_once(self._watcher, timeout_sec=0.05)
+
+
 def _shown(values: Any) -> str:
     if isinstance(values, str):
         return values
@@ -313,12 +398,16 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
     parser.add_argument('--peer', action='store_true',
                         help='show a full-duplex line, on which the PLC writes by itself')
+    parser.add_argument('--heartbeats', action='store_true',
+                        help='show heartbeats, fallback values and guarded reads (40 s)')
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
         try:
-            demo = Demo(FULL_DUPLEX if options.peer else HALF_DUPLEX, Path(folder) / 'line')
+            line = Path(folder) / 'line'
+            demo = HeartbeatDemo(HEARTBEATS, line) if options.heartbeats else Demo(
+                FULL_DUPLEX if options.peer else HALF_DUPLEX, line)
             return _tell(demo, options.seconds)
         except KeyboardInterrupt:
             print()

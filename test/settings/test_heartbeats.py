@@ -16,7 +16,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command
 import pytest
 from support.mappings import fault, faults, load_rows, one, row
@@ -181,3 +184,13 @@ def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
     rows = (row(**bad), row(**BEAT, Requires='speed', Requires_Timeout='500'))
     assert tags_of(*rows) == []
     assert len(faults(*rows)) == 2
+
+
+def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
+    root = Path(__file__).resolve().parents[2]
+    mappings, problems = load_mappings(str(root / 'config' / 'heartbeat_map.csv'))
+    assert problems == []
+    assert [mapping.tag for mapping in mappings] == [
+        'ros_alive', 'speed', 'used_speed', 'plc_alive', 'doors']
+    rows = (root / 'config' / 'heartbeat_map.csv').read_text(encoding='utf-8').split('\n', 2)[2]
+    assert rows in (root / 'docs/tutorials/heartbeats.md').read_text(encoding='utf-8')
