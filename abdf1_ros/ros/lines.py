@@ -81,11 +81,7 @@ _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
 
 # The end takes no longer than this (s): what is not destroyed by then ends with the process.
 _LAST_WORDS = 0.5
-_DESTRUCTION = 2.0
-
-# How long (s) a thread may keep the interpreter while others wait. The usual 5 ms are too long
-# for the ACK of a hundred lines.
-_SWITCH_INTERVAL = 0.0005
+_DESTRUCTION = 1.0
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -365,7 +361,6 @@ def _run(given: Sequence[str], ended: threading.Event) -> int:
     names = dict.fromkeys(name for path in parameter_files(given) for name in sections(path))
     node = LinesNode()
     lines = Lines(chosen([*names], node.wanted), node)
-    sys.setswitchinterval(_SWITCH_INTERVAL)
     lines.start(ended.is_set)
     running = sum(line.node is not None for line in lines.lines)
     node.get_logger().info(f'{running} of {len(lines.lines)} lines run')
