@@ -383,8 +383,10 @@ def _files(options: argparse.Namespace) -> int:
         except Abdf1Error as error:
             return _failed(session, options.station, error)
     if options.map:
-        print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period')
-        for row in files.map_rows(found, options.station, family, kind.get('Processor', '')):
+        print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period'
+              + ('' if options.via is None else ',Via'))
+        for row in files.map_rows(found, options.station, family, kind.get('Processor', ''),
+                                  options.via):
             print(row)
     return 0 if found else EXIT_FAILED
 

@@ -150,7 +150,7 @@ def _count(session: Session, station: int, plc_type: PlcType, kind: FileType,
 
 
 def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
-             processor: str) -> Iterator[str]:
+             processor: str, via: int | None = None) -> Iterator[str]:
     """Yield a row of a map CSV for each file, as long as one packet; others are comments."""
     for entry in found:
         kind = entry.type
@@ -167,4 +167,5 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
             length = max(1, length // per_element)
         number = '' if kind is FileType.STATUS else entry.number
         yield (f'{kind.value.lower()}{entry.number},Read,{kind.value}{number}:0,{station},'
-               f'{plc_type.value},{processor},{length},{_DRAFT_PERIOD}')
+               f'{plc_type.value},{processor},{length},{_DRAFT_PERIOD}'
+               f'{"" if via is None else f",{via}"}')

@@ -26,7 +26,7 @@ from abdf1_ros.ports.listing import SerialPortInfo
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network
 import pytest
-from support.driver_bench import simulated_plc
+from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
 
 Output = pytest.CaptureFixture[str]
@@ -103,6 +103,25 @@ def test_files_become_rows_of_a_map(
     mappings, problems = load_mappings(str(path))
     assert problems == []
     assert {mapping.tag for mapping in mappings} >= {'s2', 'b3', 'n7'}
+
+
+def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
+    plc = simulated_plc(2, 'SLC', time.monotonic, *SLC)
+    plc.via = 10
+    store(plc, 'N7:1', [42])
+    with plc_line(tmp_path / 'plc', plc) as name:
+        line = ('--port', name, '--via', '10')
+        assert main(['read', 'N7:1', '--station', '2', *line]) == 0
+        assert '42' in capsys.readouterr().out
+        assert main(['write', 'N7:1', '43', '--station', '2', '--yes', *line]) == 0
+        assert stored(plc, 'N7:1') == b'\x2B\0'
+        capsys.readouterr()
+        assert main(['files', '2', '--files', '2-10', '--map', *line]) == 0
+    path = tmp_path / 'map.csv'
+    path.write_text(capsys.readouterr().out, encoding='utf-8')
+    mappings, problems = load_mappings(str(path))
+    assert problems == []
+    assert {(mapping.station, mapping.via) for mapping in mappings} == {(2, 10)}
 
 
 def test_station_without_files_is_an_error(port: str, capsys: Output) -> None:
