@@ -83,6 +83,7 @@ class World:
         self.silent = self.refuses = False
         self.troubled = 0.0  # when something was wrong last
         self._values = itertools.count(1)
+        self._outputs = parse_address('N7:0', self.plc.table.plc_type)
 
     def _slave(self) -> Machine:
         self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
@@ -101,11 +102,13 @@ class World:
         return self.line.now if hasattr(self, 'line') else 0.0
 
     def _serve(self, command: Packet) -> Packet:
-        if self.refuses and command.cmd == 0x0F and command.data[:1] == b'\x67':
-            return command.reply(sts=0x10)
         before = self.words()
+        saved = self.plc.table.read(self._outputs, 2)
         reply = self.plc.serve(command)
         after = self.words()
+        if self.refuses and after[:2] != before[:2]:  # of the outputs only, not the heartbeat
+            self.plc.table.write(self._outputs, saved)
+            return command.reply(sts=0x10)
         if after[2] != before[2]:
             self._beaten(after[2])
         for number in range(2):
