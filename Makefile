@@ -6,6 +6,7 @@ FUZZ_SECONDS ?= 60
 MUTANTS ?= 200
 SOAK_HOURS ?= 24
 LONG_RUN_MINUTES ?= 60
+KILLS ?= 20
 PYTEST_ARGS ?=
 TEST_WORKERS ?= 4
 
@@ -38,7 +39,7 @@ help: ## List the targets
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
 	@echo 'TEST_WORKERS (4: processes of test, more than processors, as many tests wait),'
-	@echo 'MUTANTS (of mutate), FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run).'
+	@echo 'MUTANTS (of mutate), FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run), KILLS.'
 
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
@@ -136,6 +137,10 @@ long-run: $(INSTALLED) ## Run node and simulator with faults for LONG_RUN_MINUTE
 .PHONY: mutate
 mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes, tell which no test finds (hours)
 	$(PY) test/mutation/run.py --count $(MUTANTS)
+
+.PHONY: kills
+kills: $(INSTALLED) ## Kill bridge, publisher and PLC program KILLS times each (20), and time the fallback
+	$(PY) test/soak/kills.py --rounds $(KILLS)
 
 .PHONY: audit
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
