@@ -20,9 +20,15 @@ bridge that ends by itself is started again, unless its files or parameters are 
 one_process:=true all of them run in one process, the command "lines".
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    GroupAction,
+    IncludeLaunchDescription,
+    TimerAction,
+)
 from launch.conditions import IfCondition, UnlessCondition
+from launch.events.process import ProcessExited
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
 from launch_ros.actions import Node
@@ -31,6 +37,9 @@ from launch_ros.substitutions import FindPackageShare
 
 # The namespaces: values are on /press/abdf1/read/... and so on.
 LINES = ('press', 'paint', 'packing')
+
+# Exit status for faulty files or parameters, which do not become better by trying again.
+FAULTY = 2
 
 
 def line(namespace: str) -> GroupAction:
@@ -43,11 +52,18 @@ def line(namespace: str) -> GroupAction:
         condition=UnlessCondition(LaunchConfiguration('one_process')))
 
 
+def started_again(event: ProcessExited, context: LaunchContext) -> list[TimerAction]:
+    """Return what starts all of them again, after anything but a refusal of their settings."""
+    if context.is_shutdown or event.returncode == FAULTY:
+        return []
+    return [TimerAction(period=2.0, actions=[all_lines()])]
+
+
 def all_lines() -> Node:
     """Return all bridges in one process."""
     sections = ParameterFile(LaunchConfiguration('lines_file'), allow_substs=True)
     return Node(package='abdf1_ros', executable='lines', output='screen', parameters=[sections],
-                respawn=True, respawn_delay=2.0,
+                on_exit=started_again,
                 condition=IfCondition(LaunchConfiguration('one_process')))
 
 

@@ -193,3 +193,13 @@ def test_three_lines_run_side_by_side(launch: Starter, one_process: str) -> None
             9600, True]
         assert get_parameters(observer, 'net.mode', node='/packing/abdf1') == ['Peer']
     ended(process)
+
+
+def test_faulty_lines_in_one_process_are_not_started_again(
+        launch: Starter, tmp_path: Path) -> None:
+    faulty = tmp_path / 'lines.yaml'
+    faulty.write_text('/press/abdf1: {ros__parameters: {net_file: /no, map_file: /no}}\n')
+    process = launch('three_lines.launch.py', f'lines_file:={faulty}', 'one_process:=true')
+    process.wait_for('exit code 2')
+    process.result()  # nothing is left to be done
+    assert process.text.count('process started with pid') == 1

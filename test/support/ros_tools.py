@@ -30,14 +30,13 @@ import shutil
 import sys
 from typing import Any
 
+from abdf1_ros.cli.main import COMMANDS
 import pytest
 from support.ros import Process
 
 SOURCE = Path(__file__).resolve().parents[2]
 TOOLS = ('launch', 'launch_ros', 'ros2launch', 'ros2topic', 'sros2', 'ament_copyright',
          'ament_flake8', 'ament_pep257', 'ament_xmllint')
-
-_COMMANDS = ('check', 'demo', 'monitor', 'node', 'plc', 'simulator', 'sniff')
 
 
 def found() -> list[str]:
@@ -69,7 +68,7 @@ def install(folder: Path) -> None:
     marker.touch()
     commands.mkdir(parents=True)
     (share / 'abdf1_ros').symlink_to(SOURCE)
-    for name in _COMMANDS:
+    for name in COMMANDS:
         command = commands / name
         command.write_text(
             f'#!/bin/sh\nexec "{sys.executable}" -m abdf1_ros {name} "$@"\n', encoding='utf-8')
