@@ -52,7 +52,8 @@ MODES = {0: Mode.PROGRAM, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM, 5: Mode.REMOTE_TE
 
 _UNNAMED_FAULT = 'major processor fault (word S:11 says which)'
 _FAULT_WORDS = Address(ADDRESSING, FileType.STATUS, 2, 11)
-# Bits of S:11 as the PLC-5 manuals list them with their status file (1785-UM012).
+# Bits of S:11. The texts are general knowledge of these processors: no manual that lists them was
+# at hand (1785-UM012 has the status file).
 _FAULTS = (
     'corrupted program file', 'bad address in the ladder program', 'programming error',
     'SFC fault', 'error when the program was assembled', 'start-up protection',

@@ -15,7 +15,8 @@
 """
 What the major error code of an SLC 500 or MicroLogix means (word S:6; M 10-3, 10-4).
 
-Codes and causes are those that publication 1747-RM001 lists for S:6. A code above 50 in its low
+The texts are general knowledge of these processors: no manual that lists them was at hand, so the
+code is always shown beside them. Publication 1747-RM001 has the list. A code above 50 in its low
 byte is about the I/O slot in its high byte. Codes that only one of the MicroLogix has, or has
 with another meaning, are left out: their text is in the manual of that controller.
 """
