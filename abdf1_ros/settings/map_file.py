@@ -81,7 +81,7 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]
         if counter is None:
             yield mapping, Fault('Publish_While', 'should be RUN or the tag of a good Read row; '
                                                   f'"{shown(condition.tag)}" is neither')
-        elif text := _no_counter(mapping, counter):
+        elif text := _no_counter(mapping, counter, mappings):
             yield mapping, Fault('Publish_While', f'"{shown(condition.tag)}" {text}')
         elif counter.period and condition.timeout \
                 and condition.timeout < _LEAST_PERIODS * counter.period:
@@ -90,7 +90,7 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]
                 f'{_LEAST_PERIODS} x {counter.period} ms, the Period of {shown(counter.tag)}')
 
 
-def _no_counter(mapping: Mapping, counter: Mapping) -> str:
+def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping]) -> str:
     """Return why values cannot depend on ``counter``, empty if they can (rule 13)."""
     if counter.command is not Command.READ:
         return 'is not a Read row'
@@ -98,6 +98,8 @@ def _no_counter(mapping: Mapping, counter: Mapping) -> str:
         return f'is of station {counter.station}; a counter of the same PLC is needed'
     if not counts(counter.type, counter.length):
         return 'is not one int16 or uint16 word'
+    if any(beat.heartbeat and beat.shares_words(counter) for beat in mappings):
+        return 'reads our own heartbeat, so both sides would wait for each other'
     return 'depends on something itself' if counter.publish_while else ''
 
 

@@ -23,7 +23,7 @@ from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import Problem
+from abdf1_ros.errors import FormatError, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access
@@ -41,6 +41,7 @@ from abdf1_ros.settings.heartbeats import (
     read_heartbeat,
     read_publish_while,
 )
+from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import row_remarks
@@ -154,6 +155,11 @@ class RowReader:
         if fallback and mapping.station == BROADCAST:
             fault('Fallback', 'nobody confirms what is written to station 255',
                   is_superfluous=True)
+        if fallback:
+            try:
+                raw_values(mapping, fallback.values)
+            except FormatError as error:
+                fault('Fallback', f'Fallback cannot be written: {error}')
         publish_while = read_publish_while(
             row, command.value, mapping.publish is Publish.ALWAYS, fault)
         if publish_while and publish_while.tag == mapping.tag:

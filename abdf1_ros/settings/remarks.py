@@ -26,6 +26,7 @@ from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.station_lists import octal_remarks
+from abdf1_ros.settings.values import ValueType
 
 _ACK_SIZE = 2
 
@@ -68,6 +69,10 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[str]:
     if not mapping.serves and mapping.address.file_type is FileType.STATUS:
         yield _at(row, 'Command', f'{mapping.address} is in the status file: a write may change '
                                   'how the processor runs')
+    if mapping.fallback is not None and mapping.type is ValueType.BOOL \
+            and mapping.processor is not None and mapping.processor.may_lack_masked_write:
+        yield _at(row, 'Fallback', f'{mapping.processor.value} may change bits by rewriting the '
+                                   'whole word: what its program changes meanwhile is lost')
     low, high = mapping.limits
     if mapping.minimum < low and mapping.minimum != -math.inf:
         yield _at(row, 'Min', f'Min {mapping.minimum:.10g} is below {low:.10g}, the least that '

@@ -194,3 +194,20 @@ def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
         'ros_alive', 'speed', 'used_speed', 'plc_alive', 'doors']
     rows = (root / 'config' / 'heartbeat_map.csv').read_text(encoding='utf-8').split('\n', 2)[2]
     assert rows in (root / 'docs/tutorials/heartbeats.md').read_text(encoding='utf-8')
+
+
+def test_rule_12_fallback_is_a_value_that_can_be_written() -> None:
+    assert 'Fallback cannot be written: value 1.5 at index 0 is no int16' in fault(
+        **WRITE, Fallback='1.5', Fallback_After='500')
+
+
+def test_rule_12_fallback_of_bits_of_an_old_slc_is_warned_of() -> None:
+    mapping = one(**WRITE | {'Address': 'B3:0/0'}, PLC_Type='SLC', Processor='5/02', Fallback='0',
+                  Fallback_After='500')
+    assert 'rewriting the whole word' in mapping.remarks[0]
+
+
+def test_rule_13_counter_is_not_an_echo_of_our_heartbeat() -> None:
+    found = faults(row(**BEAT), row(**COUNTER | {'Address': 'N10:0'}), row(**DOORS))
+    assert len(found) == 1
+    assert '"counter" reads our own heartbeat, so both sides would wait for each other' in found[0]
