@@ -16,10 +16,9 @@
 Write one value to a PLC and wait for the result.
 
 The bridge answers every message to ~/write/<topic> with exactly one result for each mapping of
-that topic on ~/write_results. A result has the tag of the mapping, not the name of the writer:
-with several writers to one topic, this program takes the first result that has its tag and its
-numbers (texts are not compared), which may be that of another who has written the same. So give
-each topic one writer.
+that topic on ~/write_results. It repeats the label of the message as "request", so that several
+writers to one topic can tell their results apart. A text has no label: this program takes the
+first result that has its tag. So give a topic of texts one writer.
 
 A command whose result does not come is neither done nor not done. Look at the read topic before
 you send it again; for a pulse, a second one may be the wrong one.
@@ -36,6 +35,7 @@ import signal
 import sys
 import time
 from typing import Any
+import uuid
 
 from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
@@ -64,7 +64,7 @@ class CommandWriter(Node):
         super().__init__('command_writer')
         self._topic = f'{bridge}/write/{topic}'
         self._tags = tags
-        self._numbers: list[str] = []
+        self._request = ''
         self._publisher: Any = None
         self.results: dict[str, DiagnosticStatus] = {}
         self._listener = self.create_subscription(
@@ -90,11 +90,13 @@ class CommandWriter(Node):
             message.data = ' '.join(words)
         elif isinstance(message, std_msgs.msg.Float32MultiArray):
             message.data = [number(float, word, 'a number') for word in words]
-            self._numbers = [f'{value:.7g}' for value in message.data]
         else:
             message.data = [number(lambda text: int(text, 0), word, 'a whole number')
                             for word in words]
-            self._numbers = list(map(str, message.data))
+        if not isinstance(message, std_msgs.msg.String):
+            # The result repeats it, so that ours is not taken for that of another writer.
+            self._request = f'{self.get_fully_qualified_name()} {uuid.uuid4()}'
+            message.layout.dim = [std_msgs.msg.MultiArrayDimension(label=self._request)]
         self._publisher.publish(message)
         return self._spin_until(lambda: len(self.results) == len(self._tags), timeout)
 
@@ -104,14 +106,9 @@ class CommandWriter(Node):
         return getattr(std_msgs.msg, found[0].topic_type.split('/')[-1]) if found else None
 
     def _take(self, result: DiagnosticStatus) -> None:
-        value = next((pair.value for pair in result.values if pair.key == 'value'), '')
-        if result.name in self._tags and self._is_ours(value):
+        request = next((pair.value for pair in result.values if pair.key == 'request'), '')
+        if result.name in self._tags and (not self._request or request == self._request):
             self.results.setdefault(result.name, result)
-
-    def _is_ours(self, value: str) -> bool:
-        # The bridge cuts a long value short; what it shows has to agree.
-        shown = [word for word in value.strip('[]').split(', ') if not word.startswith('and ')]
-        return not self._numbers or shown == self._numbers[:len(shown)]
 
     def _spin_until(self, condition: Callable[[], Any], timeout: float) -> bool:
         end = time.monotonic() + timeout

@@ -30,6 +30,7 @@ from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files
 
 EXAMPLE = SOURCE / 'examples' / 'command_writer.py'
+OURS = 'the request that has been sent'
 
 
 @pytest.fixture(scope='module')
@@ -122,8 +123,9 @@ def answered(write: Write) -> Iterator[Answered]:
         answers: list[Answer] = []
 
         def take(message: Int16MultiArray) -> None:
-            for tag, text, value in answers[-1](list(message.data)):
-                pairs = [KeyValue(key='value', value=value),
+            label = message.layout.dim[0].label
+            for tag, text, request in answers[-1](list(message.data)):
+                pairs = [KeyValue(key='request', value=label if request == OURS else request),
                          KeyValue(key='latency_ms', value='1.0')]
                 results.publish(DiagnosticStatus(name=tag, message=text, values=pairs))
 
@@ -141,8 +143,9 @@ def answered(write: Write) -> Iterator[Answered]:
 
 def test_results_of_other_mappings_and_other_writers_are_not_taken(answered: Answered) -> None:
     status, lines = answered(lambda data: [
-        ('recipe', 'not written: refused', '[7]'), ('lamps', 'not written: refused', '[8]'),
-        ('lamps', 'written', '[7]'), ('lamps', 'unknown whether written', '[7]')])
+        ('recipe', 'not written: refused', OURS),
+        ('lamps', 'not written: refused', '/command_writer 1'),
+        ('lamps', 'written', OURS), ('lamps', 'unknown whether written', OURS)])
     assert (status, lines) == (0, ['lamps: written (1.0 ms)'])
 
 
@@ -153,9 +156,9 @@ def test_no_result_in_time_is_unknown(answered: Answered) -> None:
 
 def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> None:
     tags = ('--tags', 'north', 'south')
-    assert answered(lambda data: [('north', 'written', '[7]'), ('south', 'written', '[7]')],
+    assert answered(lambda data: [('north', 'written', OURS), ('south', 'written', OURS)],
                     *tags)[0] == 0
-    status, lines = answered(lambda data: [('north', 'written', '[7]')], *tags,
+    status, lines = answered(lambda data: [('north', 'written', OURS)], *tags,
                              '--timeout', '1.5')
     assert (status, lines) == (
         3, ['north: written (1.0 ms)', 'unknown whether written: no result within 1.5 s'])
