@@ -29,7 +29,8 @@ MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 KEYS = dict(line.split() for line in
             (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
             if line and not line.startswith('#'))
-PINNED = ('ros.txt', 'test.txt', 'tools.txt', 'fuzz.txt', 'audit.txt')
+PINNED = ('ros.txt', 'ros_tools.txt', 'ros_tools_needs.txt', 'test.txt', 'tools.txt', 'fuzz.txt',
+          'audit.txt')
 
 # The key that brings a module which has another name.
 BRINGS = {'serial': 'python3-serial', 'yaml': 'python3-yaml'}
@@ -76,7 +77,8 @@ def test_tools_of_developers_are_pinned(name: str) -> None:
     lines = (ROOT / 'requirements' / name).read_text(encoding='utf-8').splitlines()
     needs = [line for line in lines if line and not line.startswith('#')]
     assert needs
-    pin = re.compile(r'[A-Za-z0-9_.-]+(\[[a-z]+\])?==[0-9][0-9.]*[0-9]( +# .*)?')
+    pin = re.compile(r'[A-Za-z0-9_.-]+(\[[a-z]+\])?==[0-9][0-9.]*[0-9]( +# .*)?'
+                     r'|[a-z0-9_]+ @ https://\S+/tags/[0-9.]+\.tar\.gz(#subdirectory=\w+)?')
     assert [line for line in needs if not pin.fullmatch(line)] == []
 
 

@@ -336,6 +336,7 @@ def test_what_is_written_is_confirmed_and_comes_back(
     assert (result.level, result.message) == (OK, 'written')
     said = details(result)
     assert 0 < float(said.pop('latency_ms')) < 5000
+    assert int(said.pop('request')) > 0
     assert said == {'address': address, 'station': station, 'value': shown}
     inbox.values(values)
     inbox.clear()  # of what it was at first

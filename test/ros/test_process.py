@@ -349,7 +349,7 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
         # Also with the clock of a simulation, which nobody publishes here.
         until_status(diagnostics, 'mappings', OK)
         assert [status.name for status in diagnostics[-1].status] == [
-            f'line_a: {name}' for name in STATUSES]
+            f'cell/line_a: {name}' for name in STATUSES]
         assert not observer.node.count_publishers('/cell/line_a/read/door')
         assert observer.node.count_subscribers('/cell/line_a/write/flags')
         assert get_parameters(
