@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 # Copyright 2026 abdf1_ros maintainers
 #
 # Licensed under the Apache License, Version 2.0 (the "License");

@@ -263,7 +263,7 @@ def _entry(report: Report, block: Block) -> dict[str, Any]:
 
 def _times_text(report: Report) -> str:
     response = report.response_time * 1000
-    return (f'expected scan time: {report.scan_time * 1000:.1f} ms for everything once, with '
+    return (f'expected poll cycle: {report.scan_time * 1000:.1f} ms for everything once, with '
             f'{response:g} ms for each answer of a PLC\n'
             f'load of the line: {report.load:.0%} of the time is needed to keep the periods'
             + ''.join(f'\n{printable(str(bound))}' for bound in report.bounds))

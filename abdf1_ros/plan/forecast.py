@@ -71,7 +71,7 @@ def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIM
     Return the seconds from one read to the next to be expected of blocks, by their period (s).
 
     That is the period, as far as the line allows. Where it does not, all become longer by the
-    factor of its load, but none by more than a scan time: that is what ``ReadQueue`` gives.
+    factor of its load, but none by more than a poll cycle: that is what ``ReadQueue`` gives.
     ``own_load`` is the part of the line's time that heartbeats need.
     """
     blocks = list(blocks)

@@ -37,7 +37,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
 
 _HIGH_LOAD = 0.8
-_WORTH_SAVING = 0.05  # of the scan time
+_WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 
 

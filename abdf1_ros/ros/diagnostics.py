@@ -216,9 +216,9 @@ class Diagnostics:
             'speed seen': speed_seen(self._driver),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
-            'scan time': _milliseconds(self._driver.scan_time),
-            'longest scan time': _milliseconds(self._driver.longest_scan_time),
-            'expected scan time': _milliseconds(self._driver.expected_scan_time),
+            'poll cycle': _milliseconds(self._driver.scan_time),
+            'longest poll cycle': _milliseconds(self._driver.longest_scan_time),
+            'expected poll cycle': _milliseconds(self._driver.expected_scan_time),
             **_periods(self._driver.points.values()),
             **_poll_scans(self._driver),
             **{name: str(count) for name, count in self._port_errors().items()},
@@ -471,7 +471,7 @@ def speed_seen(driver: Driver) -> str:
 
 
 def _poll_scans(driver: Driver) -> dict[str, str]:
-    """Return last and longest scan times of the poll lists, where there are any."""
+    """Return last and longest poll cycles of the poll lists, where there are any."""
     return {
         f'{name} poll scan': f'last {_milliseconds(times.last)}, '
                              f'longest {_milliseconds(times.longest)}'

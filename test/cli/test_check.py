@@ -60,7 +60,7 @@ def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     cells = next(line.split() for line in out.splitlines() if line.endswith('speed'))
     # 52 characters of 10 bits at 9600 baud, and two answers of 10 ms.
     assert cells == ['1', 'PLC5', 'N7:0', 'N7:1', '2', '4', '1', '54.2', '74.2', '1000.0', 'speed']
-    assert 'expected scan time: 74.2 ms' in out
+    assert 'expected poll cycle: 74.2 ms' in out
     assert 'load of the line: 7%' in out
     assert out.endswith('no errors, no warnings\n')
 

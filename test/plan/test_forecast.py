@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Forecasts of scan time and load, before anything is connected."""
+"""Forecasts of poll cycle and load, before anything is connected."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def test_read_topic_offers_its_stale_time(bridge: Bridge) -> None:
 def test_stale_time_is_three_periods_and_what_the_line_cannot_do_of_them(
         bridge: Bridge, tag: str, period: int) -> None:
     link = find_status(bridge.diagnostics.first(), 'link')
-    scan_time = int(details(link)['expected scan time'].removesuffix(' ms'))
+    scan_time = int(details(link)['expected poll cycle'].removesuffix(' ms'))
     assert scan_time > 100  # what most of these rows want, so the line is too slow
     stale_time = read_qos(bridge, tag).lifespan.nanoseconds / 1e6
     assert 3 * period < stale_time < 3 * (period + scan_time) + scan_time
@@ -470,14 +470,14 @@ def test_link_status_tells_of_port_and_load(bridge: Bridge) -> None:
     bridge.diagnostics.clear()
     bridge.diagnostics.first()
     status = until_status(bridge.diagnostics, 'link', OK,
-                          lambda status: details(status)['scan time'] != 'unknown')
+                          lambda status: details(status)['poll cycle'] != 'unknown')
     said = details(status)
     assert status.message == 'OK: port open, 2 of 2 stations have answered'
     assert said['port'] == 'open'
     assert said['settings'] == '115200 baud, CRC'
     assert float(said['transactions per second']) > 1
     assert re.fullmatch(r'[1-9]\d* %', said['line load'])
-    assert re.fullmatch(r'[1-9]\d* ms', said['scan time'])
+    assert re.fullmatch(r'[1-9]\d* ms', said['poll cycle'])
 
 
 def test_station_status_tells_of_its_answers(bridge: Bridge) -> None:

@@ -231,9 +231,9 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
 
 def test_scan_time_is_unknown_before_the_second_read(bench: Bench) -> None:
     values = details(bench.status('link'))
-    assert values['scan time'] == values['longest scan time'] == 'unknown'
+    assert values['poll cycle'] == values['longest poll cycle'] == 'unknown'
     expected = round(bench.driver.expected_scan_time * 1000)
-    assert values['expected scan time'] == f'{expected} ms'
+    assert values['expected poll cycle'] == f'{expected} ms'
 
 
 def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
@@ -402,7 +402,7 @@ def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) ->
 
     jobs.clear()
     jobs.add(Divided())
-    assert details(bench.status('link'))['scan time'] == '250 ms'
+    assert details(bench.status('link'))['poll cycle'] == '250 ms'
 
 
 # writes

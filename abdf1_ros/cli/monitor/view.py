@@ -40,8 +40,8 @@ _AGE_WIDTH = 7
 _GOOD_VALUE_WIDTH = 24
 _LEAST_VALUE_WIDTH = 12
 
-_LINK_KEYS = ('settings', 'transactions per second', 'line load', 'scan time',
-              'longest scan time', 'expected scan time')
+_LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle',
+              'longest poll cycle', 'expected poll cycle')
 _STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
                  'mode', 'faults')
 

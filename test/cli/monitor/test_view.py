@@ -112,10 +112,10 @@ def test_link_shows_load_and_scan_time() -> None:
     picture = snapshot(statuses=[Status(
         'link', Style.WARNING, 'WARN: port open', {
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
-            'scan time': '240 ms', 'last error': '2509 ERR'})])
+            'poll cycle': '240 ms', 'last error': '2509 ERR'})])
     assert line_with('WARN: port open', picture).style is Style.WARNING
     assert line_with('line load', picture).text.strip() == \
-        'settings 19200 baud, CRC, line load 61 %, scan time 240 ms'
+        'settings 19200 baud, CRC, line load 61 %, poll cycle 240 ms'
     assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
 
 
