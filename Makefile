@@ -169,7 +169,9 @@ check-install: build ## Build, then see that what is installed starts
 	@source install/setup.bash; cd /; set -e; commands="$(CURDIR)/$(dir $(NODE))"; \
 	"$$commands/check" "$(CURDIR)/$(SHARE)/config/net.csv" "$(CURDIR)/$(SHARE)/config/map.csv" \
 	    > /dev/null; \
-	for name in plc sniff simulator conform interlock_consumer.py; do "$$commands/$$name" --help > /dev/null; done; \
+	for name in plc sniff simulator conform interlock_consumer.py; do \
+	    PATH="$(CURDIR)/$(VENV)/bin:$$PATH" "$$commands/$$name" --help > /dev/null; \
+	done; \
 	echo 'check-install: check passed the installed files; plc, sniff, simulator, conform and an example start'
 
 .PHONY: clean

@@ -40,11 +40,10 @@ setup(
         (f'share/{PACKAGE}/config/sros2', ['config/sros2/policy.xml']),
         (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
         (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
+        (f'lib/{PACKAGE}', sorted(glob('examples/*.py'))),  # where "ros2 run" finds them
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
         (f'share/{PACKAGE}/wireshark', ['wireshark/abdf1.lua']),
     ],
-    # Beside the executables, so that "ros2 run" finds them; they get the interpreter that installs.
-    scripts=sorted(glob('examples/*.py')),
     zip_safe=False,
     install_requires=['setuptools', 'pyserial', 'PyYAML'],
     # Not tests_require: newer setuptools ignores it, and colcon test would then run no pytest.
