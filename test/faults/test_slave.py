@@ -149,8 +149,8 @@ def test_slave_is_stopped_and_goes_on(line: Line) -> None:
     assert line.slave.result().startswith(REFUSED + 'it came ')
     line.works()
     assert not line.master.was_told(own)
-    # The port has kept the command and its repetitions; it was executed once, or never sent.
-    assert line.slave.was_told(value) == was_sent
+    # The port has kept the command and its repetitions: executed once at most, if it was sent.
+    assert line.slave.was_told(value) <= was_sent
 
 
 @pytest.mark.parametrize('receiver', ['Slave', 'Master'])

@@ -39,6 +39,10 @@ from support.simulator_process import Files, make_files, READS, STATUSES
 NODE = '/cell/line_a'
 ARGUMENTS = ('-r', '__ns:=/cell', '-r', '__node:=line_a')
 
+# These would say how large a terminal is, whatever it is.
+_ENVIRONMENT = {name: value for name, value in os.environ.items()
+                if name not in ('LINES', 'COLUMNS')}
+
 
 @pytest.fixture(scope='module')
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
@@ -125,7 +129,7 @@ class Terminal:
         termios.tcsetwinsize(theirs, (60, 120))
         self.process = subprocess.Popen(
             [sys.executable, '-m', 'abdf1_ros', 'monitor', *args], stdin=theirs, stdout=theirs,
-            stderr=theirs, env=os.environ | {'TERM': term})
+            stderr=theirs, env=_ENVIRONMENT | {'TERM': term})
         os.close(theirs)
         self.drawn = ''
         self._decoder = codecs.getincrementaldecoder('utf-8')()
@@ -142,6 +146,17 @@ class Terminal:
             assert select.select([self._ours], [], [], left)[0], self.drawn
             self._read()
         self.drawn = self.drawn.partition(text)[2]
+
+    def redraw_until(self, text: str) -> None:
+        """Wait until ``text`` is there when all is drawn anew, not only what has changed."""
+        end = time.monotonic() + PATIENCE
+        while text not in self.drawn:
+            assert time.monotonic() < end, self.drawn
+            self.drawn = ''
+            self.press(CONTROL_L)
+            while select.select([self._ours], [], [], 0.5)[0] and text not in self.drawn \
+                    and len(self.drawn) < 65536:
+                self._read()
 
     def press(self, keys: str) -> None:
         os.write(self._ours, keys.encode())
@@ -215,7 +230,7 @@ def test_bit_is_toggled_after_a_question(simulator: Process) -> None:
         screen.press('tlamp\r')
         screen.wait_for('write 1 to lamp, which is 0 now? [y/N]')
         screen.press('y\r')
-        screen.wait_for('lamp [1] written')
+        screen.redraw_until('lamp [1] written')
         screen.press('trecipe\r')
         screen.wait_for('there is no single bit of this name')
         screen.press('\rq')
