@@ -40,8 +40,7 @@ NODE = '/cell/line_a'
 ARGUMENTS = ('-r', '__ns:=/cell', '-r', '__node:=line_a')
 
 # These would say how large a terminal is, whatever it is.
-_ENVIRONMENT = {name: value for name, value in os.environ.items()
-                if name not in ('LINES', 'COLUMNS')}
+_SIZES = ('LINES', 'COLUMNS')
 
 
 @pytest.fixture(scope='module')
@@ -127,9 +126,10 @@ class Terminal:
     def __init__(self, *args: str, term: str = 'xterm-256color') -> None:
         self._ours, theirs = pty.openpty()
         termios.tcsetwinsize(theirs, (60, 120))
+        environment = {name: os.environ[name] for name in os.environ if name not in _SIZES}
         self.process = subprocess.Popen(
             [sys.executable, '-m', 'abdf1_ros', 'monitor', *args], stdin=theirs, stdout=theirs,
-            stderr=theirs, env=_ENVIRONMENT | {'TERM': term})
+            stderr=theirs, env=environment | {'TERM': term})
         os.close(theirs)
         self.drawn = ''
         self._decoder = codecs.getincrementaldecoder('utf-8')()
@@ -226,7 +226,7 @@ def test_keys_lead_to_the_parts_of_the_picture(simulator: Process) -> None:
 def test_bit_is_toggled_after_a_question(simulator: Process) -> None:
     with terminal('--node', NODE, '--write') as screen:
         screen.wait_for('t toggle')
-        screen.wait_for('lamp')
+        screen.redraw_until(' lamp ')
         screen.press('tlamp\r')
         screen.wait_for('write 1 to lamp, which is 0 now? [y/N]')
         screen.press('y\r')
