@@ -108,7 +108,7 @@ _LAST_WORDS = Duration(seconds=0.5)
 # Nothing that came before the end is still waiting when nothing comes for so long (s), and a
 # publisher that never rests is not waited for any longer than the other.
 QUIET = 0.05
-LAST_WRITES = 0.5
+LAST_WRITES = 1.5
 
 _MOST_NAMES = 5  # in a line of the log
 _MOST_REMARKS = 20  # about both files, in the log
