@@ -43,7 +43,7 @@ from abdf1_ros.cli.terminal import (
     seconds_option,
     whole_option,
 )
-from abdf1_ros.conform import client, data, master, peer, slave
+from abdf1_ros.conform import asking, client, data, master, peer, slave
 from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import Check
 from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
@@ -65,7 +65,7 @@ _EXIT_FAILED = 1
 _EXIT_USAGE = 2
 _INTERRUPTED = 130
 
-_MODULES = (slave, master, peer, client, data)  # importing them enters their cases
+_MODULES = (slave, master, peer, client, data, asking)  # importing them enters their cases
 
 _NOBODY = 'not one byte came: is anybody there? cable, port, speed, power'
 

@@ -17,8 +17,8 @@ The conformance kit: one end of a line, played by script against whatever stands
 
 ``codec`` makes and reads bytes, ``wire`` sends and hears them, ``case`` says what a case is and
 runs it, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer`` and ``client`` hold
-the cases, named after what stands at the other end; ``data`` holds those of the commands, which
-both disciplines carry. ``report`` tells.
+the cases, named after what stands at the other end; ``data`` and ``asking`` hold those of
+the commands, which both disciplines carry. ``report`` tells.
 
 The codec is a second one on purpose, written from the manual and not from ``df1``: a rule that
 both ends of our own link broke alike would pass otherwise. Pages are cited as in ``df1``.

@@ -27,15 +27,6 @@ _CLIENT = Target.CLIENT
 _MOST_REPETITIONS = 12
 
 
-@case('command-form', 'A command has DST, SRC, CMD, STS 00 and TNS, and the check is right.',
-      'M 5-2 to 5-7, 6-3', _CLIENT)
-def command_form(end: ServerEnd) -> None:
-    command = end.next_command()
-    if len(command.data) < codec.HEADER_SIZE or command.data[2] & 0x40 or command.data[3]:
-        raise Failed('a command with STS 00', command.data.hex(' '))
-    end.finish(command)
-
-
 @case('nak-repeated', 'A message answered with DLE NAK is sent again.', 'M 4-5', _CLIENT)
 def nak_repeated(end: ServerEnd) -> None:
     first = end.next_command()
@@ -129,14 +120,3 @@ def embedded_response(end: ServerEnd) -> None:
     begun, rest = codec.divided(codec.message(end.serve(command.data), end.wire.check))
     end.wire.send(begun + codec.ACK + rest)
     end.wire.expect(SymbolKind.ACK, 'DLE ACK for a reply with an embedded response')
-
-
-@case('tns-differs', 'Each new command has another TNS.', 'M 6-7', _CLIENT)
-def tns_differs(end: ServerEnd) -> None:
-    seen = []
-    for _ in range(3):
-        command = end.next_command()
-        seen.append(command.data[4:6])
-        end.finish(command)
-    if len(set(seen)) < len(seen):
-        raise Failed('three different TNS', ', '.join(tns.hex(' ') for tns in seen))

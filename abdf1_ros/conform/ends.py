@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -95,8 +96,8 @@ def check_reply(command: bytes, reply: bytes) -> bytes:
     return reply
 
 
-class MasterEnd:
-    """A half-duplex master that talks to one slave, ``station``; ``own`` is its own address."""
+class _AskingEnd(ABC):
+    """What both ends that ask have: whom they ask (``station``), as whom, and with which TNS."""
 
     def __init__(self, wire: Wire, station: int, own: int, numbering: Numbering,
                  words: Words = Words()) -> None:
@@ -105,6 +106,29 @@ class MasterEnd:
         self.own = own
         self.words = words
         self.numbering = numbering
+
+    def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
+        """Return the link data of a command: an echo of nothing, if not told otherwise."""
+        return header(self.station, self.own, cmd,
+                      self.numbering.take() if tns is None else tns) + body
+
+    @abstractmethod
+    def deliver(self, command: bytes) -> None:
+        """Send a message that has to be acknowledged."""
+
+    @abstractmethod
+    def collect(self, acknowledge: bool = True) -> bytes:
+        """Return the link data of the reply."""
+
+    def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
+        """Carry out a command."""
+        command = self.command(cmd, body, tns)
+        self.deliver(command)
+        return check_reply(command, self.collect())
+
+
+class MasterEnd(_AskingEnd):
+    """A half-duplex master that talks to one slave, ``station``; ``own`` is its own address."""
 
     def settle(self) -> None:
         """Take all that the slave still holds, so that a case begins with an empty one."""
@@ -116,11 +140,6 @@ class MasterEnd:
                 return
             if symbol.kind is SymbolKind.MESSAGE and symbol.is_good:
                 self.wire.send(codec.ACK)
-
-    def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
-        """Return the link data of a command: an echo of nothing, if not told otherwise."""
-        return header(self.station, self.own, cmd,
-                      self.numbering.take() if tns is None else tns) + body
 
     def send(self, command: bytes) -> None:
         """Send a message to the slave."""
@@ -155,23 +174,9 @@ class MasterEnd:
             self.wire.rest(POLL_PAUSE)
         raise Failed('the reply, asked for by polls', 'no message')
 
-    def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
-        """Carry out a command."""
-        command = self.command(cmd, body, tns)
-        self.deliver(command)
-        return check_reply(command, self.collect())
 
-
-class PeerEnd:
+class PeerEnd(_AskingEnd):
     """A full-duplex node that sends commands to another, ``station``."""
-
-    def __init__(self, wire: Wire, station: int, own: int, numbering: Numbering,
-                 words: Words = Words()) -> None:
-        self.wire = wire
-        self.station = station
-        self.own = own
-        self.words = words
-        self.numbering = numbering
 
     def settle(self) -> None:
         """Acknowledge what the other still wants to be rid of."""
@@ -179,11 +184,6 @@ class PeerEnd:
         while self.wire.now < end and (symbol := self.wire.hear()) is not None:
             if symbol.kind in (SymbolKind.MESSAGE, SymbolKind.ENQ):
                 self.wire.send(codec.ACK)
-
-    def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
-        """Return the link data of a command: an echo of nothing, if not told otherwise."""
-        return header(self.station, self.own, cmd,
-                      self.numbering.take() if tns is None else tns) + body
 
     def send(self, command: bytes) -> None:
         """Send a message."""
@@ -201,26 +201,24 @@ class PeerEnd:
             self.wire.send(codec.ACK)
         return symbol.data
 
-    def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
-        """Carry out a command."""
-        command = self.command(cmd, body, tns)
-        self.deliver(command)
-        return check_reply(command, self.collect())
-
 
 Serve = Callable[[bytes], bytes]
 """Executes a command: link data in, link data of the reply out."""
 
 
-class _Answering(Protocol):
+class Answering(Protocol):
+    """An end that answers commands: what the cases of ``asking`` need."""
+
     wire: Wire
 
-    def next_command(self) -> Heard: ...
+    def next_command(self) -> Heard:
+        """Wait for a good command."""
 
-    def finish(self, command: Heard) -> None: ...
+    def finish(self, command: Heard) -> None:
+        """Answer a command to its end."""
 
 
-def _settle(end: _Answering) -> None:
+def _settle(end: Answering) -> None:
     for _ in range(_MOST_TRIES):
         try:
             end.finish(end.next_command())

@@ -36,15 +36,6 @@ def poll_form(end: SlaveEnd) -> None:
         raise Failed('a poll with the right BCC', symbol.raw.hex(' '))
 
 
-@case('command-form', 'A command has DST, SRC, CMD, STS 00 and TNS; its check covers what the '
-      'manual says.', 'M 5-2 to 5-7, 6-3', _MASTER)
-def command_form(end: SlaveEnd) -> None:
-    command = end.next_command()
-    if len(command.data) < codec.HEADER_SIZE or command.data[2] & 0x40 or command.data[3]:
-        raise Failed('a command with STS 00', command.data.hex(' '))
-    end.finish(command)
-
-
 @case('no-ack-repeated', 'A message without DLE ACK is sent again, with the same TNS.',
       'M 3-13 to 3-15', _MASTER)
 def no_ack_repeated(end: SlaveEnd) -> None:
@@ -119,17 +110,6 @@ def duplicate_acknowledged(end: SlaveEnd) -> None:
         end.next_poll()
         end.reply_to(visit)
         end.wire.expect(SymbolKind.ACK, 'DLE ACK for the reply after it')
-
-
-@case('tns-differs', 'Each new command has another TNS.', 'M 6-7', _MASTER)
-def tns_differs(end: SlaveEnd) -> None:
-    seen = []
-    for _ in range(3):
-        command = end.next_command()
-        seen.append(command.data[4:6])
-        end.finish(command)
-    if len(set(seen)) < len(seen):
-        raise Failed('three different TNS', ', '.join(tns.hex(' ') for tns in seen))
 
 
 @case('waits-for-slow-answer', 'A master listens for as long as an answer may take: it sends '

@@ -21,6 +21,7 @@ of its folder. ``families`` reads the text of an address of any of them.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -31,7 +32,7 @@ from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 BITS = 16
 
 
-class Addressing:
+class Addressing(ABC):
     """
     How the places of one family's data table are written and counted.
 
@@ -43,21 +44,21 @@ class Addressing:
     files: ClassVar[Mapping[FileType, Layout]]
     has_sections: ClassVar[bool] = False
 
+    @abstractmethod
     def parse(self, text: str, access: Access | None = None) -> Address:
         """
         Read an address, reached by ``access`` where that makes a difference.
 
         Raises AddressSyntaxError or AddressRangeError, whose text says what would be right.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def show(self, address: Address) -> str:
         """Return the text that ``parse`` reads."""
-        raise NotImplementedError
 
+    @abstractmethod
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:
         """Return the number of the last element that a file of this type can have."""
-        raise NotImplementedError
 
     def slot_of(self, address: Address) -> int | None:
         """Return the I/O slot whose words are numbered by themselves, None for a file."""
