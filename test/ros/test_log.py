@@ -23,6 +23,7 @@ from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.ros.log import EventLog, LineLog, MOST_CAUSES, MOST_LINES
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
+from support.clock import Clock
 
 LINE = re.compile(r'\[(\w+)\] \[[0-9.]+\] \[log_test\]: (.*)')
 
@@ -31,16 +32,6 @@ ROUTINE = (Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RE
 LEVELS = {Severity.CRITICAL: 'FATAL', Severity.ERROR: 'ERROR', Severity.NOTICE: 'INFO'}
 
 Lines = list[tuple[str, str]]
-
-
-class Clock:
-    """A clock that stands still until it is set."""
-
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture

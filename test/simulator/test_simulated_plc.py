@@ -30,20 +30,11 @@ from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
 import pytest
+from support.clock import Clock
 from support.driver_bench import simulated_plc, store, stored
 
 HEADER = ','.join(COLUMNS)
 ACKNOWLEDGED = Control(Code.ACK)
-
-
-class Clock:
-    """A clock that stands until it is set."""
-
-    def __init__(self) -> None:
-        self.now = 50.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture
