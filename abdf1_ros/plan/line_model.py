@@ -33,7 +33,7 @@ from abdf1_ros.pccc.dialect import Dialect
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class ReadRequest:
     """One read command: ``words`` words from ``start`` on."""
 
     start: Address
@@ -48,7 +48,7 @@ class LineModel:
     duplex: Duplex
     timing: LineTiming
 
-    def read_time(self, dialect: Dialect, request: Request, station: int = 0) -> float:
+    def read_time(self, dialect: Dialect, request: ReadRequest, station: int = 0) -> float:
         """Return the seconds that a read takes of a station that answers at once."""
         _, body = dialect.read(request.start, request.words)
         stuffed = len(frames.stuff(body))

@@ -17,7 +17,7 @@ Stretches of words, and the cheapest way to put them into blocks.
 
 This is the arithmetic of the read planner; it knows nothing of PLCs. A block is one span of
 words that is read by one command. A command costs a good deal by itself and a little for each
-word, so it pays to read across gaps that are cheaper than another command.
+word, so a short gap is read as well where that is cheaper than another command.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 
-_ROUNDING = 1e-9  # what saves less saves nothing
+_ROUNDING = 1e-9  # a smaller saving is a rounding error
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -54,21 +54,20 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
-    """A block, and how often it is read: every ``period`` seconds."""
+class Candidate:
+    """A possible block; it would be read every ``period`` seconds."""
 
     span: Span
     period: float
 
 
-class Terms:
+class CostModel:
     """
-    What blocks of an area cost, and which there can be.
+    What blocks of an area cost, and which blocks are possible.
 
-    ``costs`` are seconds by number of words, from 0 up to the most that one command reads,
-    ``limit``.
-    Blocks of more than one word hold whole elements of ``per_element`` words, and none of the
-    spans in ``refused`` as a whole.
+    ``costs[n]`` is the seconds that a read of n words takes; the last n is ``limit``, the most
+    that one command reads. A block of more than one word has whole elements of ``per_element``
+    words, and does not hold all words of any span in ``refused``.
     """
 
     def __init__(self, costs: Sequence[float], per_element: int = 1,
@@ -95,31 +94,31 @@ class Terms:
         return span.aligned(self.per_element)
 
     def cost(self, block: Span) -> float:
-        """Return the seconds that a block takes; infinitely many for one that cannot be."""
+        """Return the seconds that a block takes; infinity for one that is not possible."""
         if block.first < self.first_allowed(block.end):
             return math.inf
         return self.costs[block.words]
 
 
-def cheapest(needed: Iterable[Span], terms: Terms) -> list[Span]:
+def cheapest(needed: Iterable[Span], model: CostModel) -> list[Span]:
     """
     Return the blocks that hold all ``needed`` at the least cost, in their order.
 
     Each of ``needed`` has to be a possible block by itself.
     """
     spans = without_contained(needed)
-    element = terms.per_element
+    element = model.per_element
     starts = [span.first - span.first % element for span in spans]
     least = [0.0]  # for the spans before this one
     begins: list[int] = []
     for last, span in enumerate(spans):
-        best, begin = least[last] + terms.costs[span.words], last
+        best, begin = least[last] + model.costs[span.words], last
         end = span.end + -span.end % element
-        first_allowed = terms.first_allowed(end)
+        first_allowed = model.first_allowed(end)
         for first in range(last - 1, -1, -1):
             if starts[first] < first_allowed:
                 break
-            cost = least[first] + terms.costs[end - starts[first]]
+            cost = least[first] + model.costs[end - starts[first]]
             if cost < best:
                 best, begin = cost, first
         least.append(best)
@@ -128,7 +127,7 @@ def cheapest(needed: Iterable[Span], terms: Terms) -> list[Span]:
     rest = len(spans)
     while rest:
         begin = begins[rest - 1]
-        blocks.append(terms.together(spans[begin], spans[rest - 1]))
+        blocks.append(model.together(spans[begin], spans[rest - 1]))
         rest = begin
     return blocks[::-1]
 
@@ -142,45 +141,46 @@ def without_contained(spans: Iterable[Span]) -> list[Span]:
     return kept
 
 
-def draft(needed: Mapping[float, Iterable[Span]], terms: Terms, scan_time: float) -> list[Draft]:
+def partition(needed: Mapping[float, Iterable[Span]], model: CostModel,
+              scan_time: float) -> list[Candidate]:
     """
-    Return blocks for spans that are needed every so many seconds (the keys of ``needed``).
+    Return the blocks that hold all ``needed`` spans; its keys are their periods in seconds.
 
-    What is needed seldom may be read along with what is needed often, where that is cheaper.
-    No block is taken to be read more often than every ``scan_time`` seconds.
+    Spans of a long period may share a block with spans of a short one, where that is cheaper.
+    A block is not expected to be read more often than every ``scan_time`` seconds.
     """
-    drafts: list[Draft] = []
+    candidates: list[Candidate] = []
     for period in sorted(needed):
         left = (span for span in needed[period]
-                if not any(faster.span.holds(span) for faster in drafts))
-        drafts += [Draft(span, period) for span in cheapest(left, terms)]
-    drafts.sort(key=lambda draft: draft.span)
-    while (pair := _best_pair(drafts, terms, scan_time)) is not None:
+                if not any(faster.span.holds(span) for faster in candidates))
+        candidates += [Candidate(span, period) for span in cheapest(left, model)]
+    candidates.sort(key=lambda candidate: candidate.span)
+    while (pair := _best_pair(candidates, model, scan_time)) is not None:
         one, other = pair
-        drafts[drafts.index(one)] = _joined(one, other, terms)
-        drafts.remove(other)
-        drafts.sort(key=lambda draft: draft.span)
-    return drafts
+        candidates[candidates.index(one)] = _joined(one, other, model)
+        candidates.remove(other)
+        candidates.sort(key=lambda candidate: candidate.span)
+    return candidates
 
 
-def _joined(one: Draft, other: Draft, terms: Terms) -> Draft:
-    return Draft(terms.together(one.span, other.span), min(one.period, other.period))
+def _joined(one: Candidate, other: Candidate, model: CostModel) -> Candidate:
+    return Candidate(model.together(one.span, other.span), min(one.period, other.period))
 
 
-def _best_pair(drafts: Sequence[Draft], terms: Terms,
-               scan_time: float) -> tuple[Draft, Draft] | None:
+def _best_pair(candidates: Sequence[Candidate], model: CostModel,
+               scan_time: float) -> tuple[Candidate, Candidate] | None:
     """Return the two blocks that save the most of the line's time when read together."""
-    def load(draft: Draft) -> float:
-        return terms.cost(draft.span) / max(draft.period, scan_time)
+    def load(candidate: Candidate) -> float:
+        return model.cost(candidate.span) / max(candidate.period, scan_time)
 
     best, most = None, 0.0
-    loads = [load(draft) for draft in drafts]
-    for index, one in enumerate(drafts):
-        for at in range(index + 1, len(drafts)):
-            other = drafts[at]
-            if other.span.first - one.span.first >= terms.limit:
+    loads = [load(candidate) for candidate in candidates]
+    for index, one in enumerate(candidates):
+        for at in range(index + 1, len(candidates)):
+            other = candidates[at]
+            if other.span.first - one.span.first >= model.limit:
                 break
-            saved = loads[index] + loads[at] - load(_joined(one, other, terms))
+            saved = loads[index] + loads[at] - load(_joined(one, other, model))
             if saved > most + _ROUNDING * loads[index]:
                 best, most = (one, other), saved
     return best

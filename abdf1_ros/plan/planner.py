@@ -32,12 +32,12 @@ import math
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.plan.line_model import LineModel, Request
-from abdf1_ros.plan.partition import Draft, draft, Span, Terms
+from abdf1_ros.plan.line_model import LineModel, ReadRequest
+from abdf1_ros.plan.partition import Candidate, CostModel, partition, Span
 from abdf1_ros.settings.mapping import Mapping
 
-Place = tuple[int, Area, Dialect]
-"""Station, area and way to read: what blocks never reach beyond."""
+StationArea = tuple[int, Area, Dialect]
+"""Station, area and way to read: a block lies within one such area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +45,13 @@ class Block:
     """
     What is read together: one request, or several for one mapping longer than a packet.
 
-    ``mappings`` are served by it. ``period`` is in seconds, the shortest of theirs;
-    ``line_time`` is what its transactions take on the line when the station answers at once,
-    in seconds.
+    It has the words of all ``mappings``. ``period`` is the shortest of their periods, in seconds.
+    ``line_time`` is the seconds that its transactions take on the line when the station answers
+    at once.
     """
 
     station: int
-    requests: tuple[Request, ...]
+    requests: tuple[ReadRequest, ...]
     mappings: tuple[Mapping, ...]
     period: float
     line_time: float
@@ -62,9 +62,9 @@ class Block:
         return self.mappings[0].dialect
 
     @property
-    def place(self) -> Place:
-        """Return what the block never reaches beyond."""
-        return _place(self.mappings[0])
+    def station_area(self) -> StationArea:
+        """Return the area that the block lies in."""
+        return _station_area(self.mappings[0])
 
     @property
     def start(self) -> Address:
@@ -92,19 +92,19 @@ class Block:
         return slice(at, at + 2 * mapping.codec.words)
 
     def commands(self) -> list[tuple[int, bytes]]:
-        """Return CMD, and what stands behind TNS, of each request."""
+        """Return CMD, and what stands after TNS, of each request."""
         return [self.dialect.read(request.start, request.words, self.transfer)
                 for request in self.requests]
 
     def reply_sizes(self) -> list[int]:
-        """Return the bytes behind the header of a good reply to each request."""
+        """Return the bytes after the header of a good reply to each request."""
         return [self.dialect.reply_size(request.start, request.words)
                 for request in self.requests]
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
-    """A mapping, and which words it needs how often (s)."""
+class _Demand:
+    """A mapping needs the words of ``span`` every ``period`` seconds."""
 
     mapping: Mapping
     span: Span
@@ -115,30 +115,31 @@ class Planner:
     """
     Plan reads for a line; mappings without a period get ``default_period`` (s).
 
-    ``refuse`` and ``allow`` say what stations have been found to have; plans go around the rest.
+    ``refuse`` and ``allow`` tell which words stations were found to lack or to have; no block
+    holds all words of a refused span.
     """
 
     def __init__(self, line: LineModel, default_period: float) -> None:
         self.line = line
         self._default_period = default_period
-        self._refused: defaultdict[Place, set[Span]] = defaultdict(set)
+        self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
         # Words per packet of blocks that were refused with more of them.
-        self._limits: dict[tuple[Place, Span], int] = {}
+        self._limits: dict[tuple[StationArea, Span], int] = {}
         self._costs: dict[tuple[Dialect, FileType], list[float]] = {}
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
         """Return the blocks that serve every mapping that reads."""
-        places: defaultdict[Place, list[_Wish]] = defaultdict(list)
+        areas: defaultdict[StationArea, list[_Demand]] = defaultdict(list)
         for mapping in mappings:
             if mapping.polls:
-                places[_place(mapping)].append(
-                    _Wish(mapping, _span(mapping), self._period(mapping)))
-        plans = [self._plan_place(place, group, math.inf) for place, group in places.items()]
-        # No block is read more often than all of them can be, so what the faster ones save
-        # by staying short counts for less on a line that is full.
+                areas[_station_area(mapping)].append(
+                    _Demand(mapping, _span(mapping), self._period(mapping)))
+        plans = [self._plan_area(area, group, math.inf) for area, group in areas.items()]
+        # On a full line no block is read more often than once in a poll cycle. So keeping fast
+        # blocks short saves less there than their periods promise.
         scan_time = sum(block.line_time for plan in plans for block in plan)
-        return [block for place, group in places.items()
-                for block in self._plan_place(place, group, scan_time)]
+        return [block for area, group in areas.items()
+                for block in self._plan_area(area, group, scan_time)]
 
     def split(self, block: Block) -> list[Block]:
         """
@@ -162,17 +163,17 @@ class Planner:
         limit = max(least, words // 2)
         if words <= least or limit < _whole(block.mappings):
             return []
-        self._limits[block.place, block.span] = limit
+        self._limits[block.station_area, block.span] = limit
         return [self._block(block.mappings, block.span)]
 
-    def refuse(self, place: Place, span: Span) -> None:
-        """Take note that no read at ``place`` may hold all of ``span``."""
-        self._refused[place].add(span)
+    def refuse(self, area: StationArea, span: Span) -> None:
+        """Take note that no read at ``area`` may hold all of ``span``."""
+        self._refused[area].add(span)
 
-    def allow(self, place: Place, span: Span) -> bool:
+    def allow(self, area: StationArea, span: Span) -> bool:
         """Take note that all of ``span`` can be read; return whether that is news."""
-        wrong = {other for other in self._refused[place] if span.holds(other)}
-        self._refused[place] -= wrong
+        wrong = {other for other in self._refused[area] if span.holds(other)}
+        self._refused[area] -= wrong
         return bool(wrong)
 
     def _period(self, mapping: Mapping) -> float:
@@ -180,51 +181,51 @@ class Planner:
             return self._default_period
         return mapping.period / 1000
 
-    def _plan_place(self, place: Place, wishes: Sequence[_Wish],
+    def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
                     scan_time: float) -> list[Block]:
-        """Plan the mappings of one place."""
-        refused = self._refused[place]
-        terms = self._terms(wishes[0].mapping, refused)
+        """Plan the mappings of one area."""
+        refused = self._refused[area]
+        model = self._cost_model(demands[0].mapping, refused)
         alone: defaultdict[Span, list[Mapping]] = defaultdict(list)
         together = []
-        for wish in wishes:
-            if (wish.span.words > terms.limit or (place, wish.span) in self._limits
-                    or any(map(wish.span.holds, refused))):
-                alone[wish.span].append(wish.mapping)
+        for demand in demands:
+            if (demand.span.words > model.limit or (area, demand.span) in self._limits
+                    or any(map(demand.span.holds, refused))):
+                alone[demand.span].append(demand.mapping)
             else:
-                together.append(wish)
+                together.append(demand)
         needed: defaultdict[float, list[Span]] = defaultdict(list)
-        for wish in together:
-            needed[wish.period].append(wish.span)
-        served = alone | _served(together, draft(needed, terms, scan_time))
+        for demand in together:
+            needed[demand.period].append(demand.span)
+        served = alone | _served(together, partition(needed, model, scan_time))
         return [self._block(group, span) for span, group in served.items()]
 
-    def _terms(self, example: Mapping, refused: Iterable[Span]) -> Terms:
-        """Return what blocks cost at the place of ``example``."""
+    def _cost_model(self, example: Mapping, refused: Iterable[Span]) -> CostModel:
+        """Return the cost model of the area of ``example``."""
         key = example.dialect, example.address.file_type
         if key not in self._costs:
             self._costs[key] = self._costs_of(example)
-        return Terms(self._costs[key], _per_element(example), refused)
+        return CostModel(self._costs[key], _per_element(example), refused)
 
     def _costs_of(self, example: Mapping) -> list[float]:
         """Return the seconds that a read takes, by its number of words."""
         start, per_element = example.address.at_offset(0), _per_element(example)
         costs = [0.0] * (_max_words(example) + 1)
         for words in {1, *range(per_element, len(costs), per_element)}:
-            costs[words] = self.line.read_time(example.dialect, Request(start, words))
+            costs[words] = self.line.read_time(example.dialect, ReadRequest(start, words))
         value = next((place for place in map(start.at_offset, range(per_element))
                       if place.is_value(2)), None)
         if value is not None:  # a float32 within a structure is read by itself
-            costs[2] = self.line.read_time(example.dialect, Request(value, 2))
+            costs[2] = self.line.read_time(example.dialect, ReadRequest(value, 2))
         return costs
 
     def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
         first = mappings[0]
-        limit = min(_max_words(first), self._limits.get((_place(first), span), span.words))
+        limit = min(_max_words(first), self._limits.get((_station_area(first), span), span.words))
         if span.words > limit:  # a long mapping: no packet ends within a value
             limit -= limit % _whole(mappings)
         requests = tuple(
-            Request(first.address.at_offset(at), min(limit, span.end - at))
+            ReadRequest(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))
         line_time = sum(self.line.read_time(first.dialect, request, first.station)
                         for request in requests)
@@ -232,7 +233,7 @@ class Planner:
         return Block(first.station, requests, tuple(mappings), period, line_time)
 
 
-def _place(mapping: Mapping) -> Place:
+def _station_area(mapping: Mapping) -> StationArea:
     return mapping.station, mapping.address.area, mapping.dialect
 
 
@@ -266,16 +267,17 @@ def _cover(mappings: Iterable[Mapping]) -> Span:
     return cover.aligned(_per_element(mappings[0]))
 
 
-def _served(wishes: Iterable[_Wish], drafts: Iterable[Draft]) -> dict[Span, list[Mapping]]:
-    """Return which mappings each block serves; of several blocks the slowest will do."""
+def _served(demands: Iterable[_Demand],
+            candidates: Iterable[Candidate]) -> dict[Span, list[Mapping]]:
+    """Return the mappings of each block; each mapping is in the slowest block that is enough."""
     levels: dict[float, list[Span]] = defaultdict(list)
-    for entry in sorted(drafts, key=lambda entry: (-entry.period, entry.span)):
+    for entry in sorted(candidates, key=lambda entry: (-entry.period, entry.span)):
         levels[entry.period].append(entry.span)
     served: dict[Span, list[Mapping]] = {}
-    for wish in wishes:
-        span = next(found for period, spans in levels.items() if period <= wish.period
-                    and (found := _holder(spans, wish.span)) is not None)
-        served.setdefault(span, []).append(wish.mapping)
+    for demand in demands:
+        span = next(found for period, spans in levels.items() if period <= demand.period
+                    and (found := _holder(spans, demand.span)) is not None)
+        served.setdefault(span, []).append(demand.mapping)
     return served
 
 

@@ -101,10 +101,10 @@ class Refusals:
         search = self._searches.pop(block, None)
         if search is not None:
             return self._settle(search, block, is_refused=False)
-        if not self._planner.allow(block.place, block.span):
+        if not self._planner.allow(block.station_area, block.span):
             return None
         old = [other for other in blocks
-               if other.place == block.place and other not in self._searches]
+               if other.station_area == block.station_area and other not in self._searches]
         return Change(old, self._planner.plan(
             mapping for other in old for mapping in other.mappings))
 
@@ -112,5 +112,5 @@ class Refusals:
         if not search.settle(block, is_refused):
             return None
         for span in search.findings():
-            self._planner.refuse(block.place, span)
+            self._planner.refuse(block.station_area, span)
         return Change(search.parts, self._planner.plan(search.mappings))

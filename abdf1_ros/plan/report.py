@@ -30,8 +30,8 @@ from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.plan import forecast, interlocks
-from abdf1_ros.plan.line_model import Request
-from abdf1_ros.plan.planner import Block, Place, Planner
+from abdf1_ros.plan.line_model import ReadRequest
+from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
@@ -219,9 +219,9 @@ def _period_remarks(report: Report) -> Iterator[Remark]:
 
 def _gap_remarks(report: Report) -> Iterator[Remark]:
     """Find what stands so far apart that reading it together costs much more."""
-    groups: defaultdict[tuple[Place, float], list[Block]] = defaultdict(list)
+    groups: defaultdict[tuple[StationArea, float], list[Block]] = defaultdict(list)
     for block in report.blocks:
-        groups[block.place, block.period].append(block)
+        groups[block.station_area, block.period].append(block)
     for blocks in groups.values():
         time = sum(map(report.time, blocks))
         least = _time_side_by_side(report, blocks)
@@ -237,7 +237,7 @@ def _gap_remarks(report: Report) -> Iterator[Remark]:
 
 
 def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
-    """Return the seconds that the mappings of a place would take without gaps between them."""
+    """Return the seconds that the mappings of an area would take without gaps between them."""
     mappings = [mapping for block in blocks for mapping in block.mappings]
     example = blocks[0]
     kind = example.start.file_type
@@ -245,7 +245,7 @@ def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
     if needed > 1:
         needed += -needed % example.start.layout.words
     packets = [limit] * (needed // limit) + [needed % limit] * (needed % limit > 0)
-    requests = tuple(Request(example.start, words) for words in packets)
+    requests = tuple(ReadRequest(example.start, words) for words in packets)
     model = forecast.line_model(report.network)
     line_time = sum(model.read_time(example.dialect, request, example.station)
                     for request in requests)
@@ -253,13 +253,13 @@ def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
 
 
 def _words(mappings: Iterable[Mapping]) -> set[int]:
-    """Return the offsets of all words that mappings of one place need."""
+    """Return the offsets of all words that mappings of one area need."""
     return {mapping.address.offset + number
             for mapping in mappings for number in range(mapping.codec.words)}
 
 
 def _ends(mappings: Sequence[Mapping]) -> tuple[Address, Address]:
-    """Return the first and the last word of mappings of one place."""
+    """Return the first and the last word of mappings of one area."""
     offsets = _words(mappings)
     address = mappings[0].address
     return address.at_offset(min(offsets)), last_address(address, max(offsets))

@@ -49,7 +49,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import line_model  # noqa: E402
-from abdf1_ros.plan.line_model import Request  # noqa: E402
+from abdf1_ros.plan.line_model import ReadRequest  # noqa: E402
 from abdf1_ros.plan.partition import Span  # noqa: E402
 from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
@@ -122,7 +122,7 @@ class Search:
         self._limit = example.dialect.max_read(example.address.file_type)
         start = example.address.at_offset(0)
         self._costs = {words: planner.line.read_time(
-            example.dialect, Request(start, words), example.station)
+            example.dialect, ReadRequest(start, words), example.station)
             for words in {1, *range(self._element, self._limit + 1, self._element)}}
         self._needed: dict[Span, float] = {}
         for entry in rows:

@@ -28,7 +28,7 @@ from abdf1_ros.plan.forecast import (
     PATIENCE,
     scan_time,
 )
-from abdf1_ros.plan.line_model import Request
+from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.network import Network
 import pytest
@@ -128,7 +128,7 @@ def test_needed_baud_is_the_lowest_at_which_the_periods_are_kept() -> None:
 
 @pytest.mark.parametrize('mode, transmissions', [('Master', 3), ('Peer', 2)])
 def test_tx_delay_comes_before_each_transmission(mode: str, transmissions: int) -> None:
-    request = Request(ROWS[0].address, 10)
+    request = ReadRequest(ROWS[0].address, 10)
     times = [line_model(Network(mode=mode, tx_delay=delay)).read_time(ROWS[0].dialect, request)
              for delay in (0, 20)]
     assert times[1] - times[0] == pytest.approx(transmissions * 0.02)

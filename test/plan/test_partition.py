@@ -20,7 +20,14 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 import math
 
-from abdf1_ros.plan.partition import cheapest, Draft, draft, Span, Terms, without_contained
+from abdf1_ros.plan.partition import (
+    Candidate,
+    cheapest,
+    CostModel,
+    partition,
+    Span,
+    without_contained,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -28,34 +35,34 @@ from support.groupings import groupings
 
 COMMAND, WORD, LIMIT = 50.0, 2.0, 110
 COSTS = [COMMAND + WORD * words for words in range(LIMIT + 1)]
-TERMS = Terms(COSTS)
+MODEL = CostModel(COSTS)
 
 SPANS = st.builds(lambda first, words: Span(first, first + words),
                   st.integers(0, 150), st.sampled_from([1, 1, 1, 2, 5, 20]))
 
 
-def load(drafts: Iterable[Draft], terms: Terms = TERMS) -> float:
-    return sum(terms.cost(entry.span) / entry.period for entry in drafts)
+def load(candidates: Iterable[Candidate], model: CostModel = MODEL) -> float:
+    return sum(model.cost(entry.span) / entry.period for entry in candidates)
 
 
-def least_load(wanted: Sequence[Draft], terms: Terms = TERMS) -> float:
+def least_load(wanted: Sequence[Candidate], model: CostModel = MODEL) -> float:
     """Return the least load there can be, by trying everything."""
-    def joined(group: Sequence[Draft]) -> Draft:
+    def joined(group: Sequence[Candidate]) -> Candidate:
         span = Span(min(entry.span.first for entry in group),
                     max(entry.span.end for entry in group))
         if len(group) > 1:
-            span = span.aligned(terms.per_element)
-        return Draft(span, min(entry.period for entry in group))
-    return min(load(map(joined, groups), terms) for groups in groupings(wanted))
+            span = span.aligned(model.per_element)
+        return Candidate(span, min(entry.period for entry in group))
+    return min(load(map(joined, groups), model) for groups in groupings(wanted))
 
 
 @given(st.lists(SPANS, min_size=1, max_size=6, unique=True), st.sampled_from([1, 3]))
 def test_nothing_is_cheaper_where_all_have_one_period(spans: list[Span], element: int) -> None:
-    terms = Terms(COSTS[:LIMIT // element * element + 1], element)
-    wanted = [Draft(span.aligned(element), 1.0) for span in spans]
-    blocks = cheapest([entry.span for entry in wanted], terms)
-    assert load((Draft(block, 1.0) for block in blocks), terms) == pytest.approx(
-        least_load(list(dict.fromkeys(wanted)), terms))
+    model = CostModel(COSTS[:LIMIT // element * element + 1], element)
+    wanted = [Candidate(span.aligned(element), 1.0) for span in spans]
+    blocks = cheapest([entry.span for entry in wanted], model)
+    assert load((Candidate(block, 1.0) for block in blocks), model) == pytest.approx(
+        least_load(list(dict.fromkeys(wanted)), model))
     for entry in wanted:
         assert any(block.holds(entry.span) for block in blocks)
 
@@ -67,47 +74,47 @@ def test_plan_of_several_periods_serves_all_and_is_never_worse_than_apart(
     needed = defaultdict(list)
     for span, period in wanted:
         needed[period].append(span)
-    drafts = draft(needed, TERMS, 0.0)
+    candidates = partition(needed, MODEL, 0.0)
     for span, period in wanted:
-        assert any(entry.span.holds(span) and entry.period <= period for entry in drafts)
-    apart = sum(load(Draft(span, period) for span in cheapest(spans, TERMS))
+        assert any(entry.span.holds(span) and entry.period <= period for entry in candidates)
+    apart = sum(load(Candidate(span, period) for span in cheapest(spans, MODEL))
                 for period, spans in needed.items())
-    best = least_load([Draft(span, period) for span, period in wanted])
-    assert best * (1 - 1e-9) <= load(drafts) <= apart * (1 + 1e-9)
+    best = least_load([Candidate(span, period) for span, period in wanted])
+    assert best * (1 - 1e-9) <= load(candidates) <= apart * (1 + 1e-9)
 
 
 def test_plan_of_two_periods_is_the_best_there_is() -> None:
     """A slow one beside a fast block, one within it, and one far from it."""
     needed = {0.1: [Span(0, 10), Span(14, 16)],
               1.0: [Span(12, 13), Span(16, 17), Span(60, 61)]}
-    drafts = draft(needed, TERMS, 0.0)
-    assert drafts == [Draft(Span(0, 17), 0.1), Draft(Span(60, 61), 1.0)]
-    wanted = [Draft(span, period) for period, spans in needed.items() for span in spans]
-    assert load(drafts) == pytest.approx(least_load(wanted))
+    candidates = partition(needed, MODEL, 0.0)
+    assert candidates == [Candidate(Span(0, 17), 0.1), Candidate(Span(60, 61), 1.0)]
+    wanted = [Candidate(span, period) for period, spans in needed.items() for span in spans]
+    assert load(candidates) == pytest.approx(least_load(wanted))
 
 
 def test_on_a_full_line_periods_make_no_difference() -> None:
     needed = {0.1: [Span(0, 1)], 5.0: [Span(20, 21)]}
-    assert len(draft(needed, TERMS, 0.0)) == 2
-    assert draft(needed, TERMS, 10.0) == [Draft(Span(0, 21), 0.1)]
+    assert len(partition(needed, MODEL, 0.0)) == 2
+    assert partition(needed, MODEL, 10.0) == [Candidate(Span(0, 21), 0.1)]
 
 
 @given(st.lists(SPANS, min_size=1, max_size=30), st.lists(SPANS, max_size=5))
 def test_blocks_keep_to_the_limit_and_around_what_was_refused(
         spans: list[Span], refused: list[Span]) -> None:
-    terms = Terms(COSTS, refused=refused)
+    model = CostModel(COSTS, refused=refused)
     needed = [span for span in spans if not any(map(span.holds, refused))]
-    for block in cheapest(needed, terms):
+    for block in cheapest(needed, model):
         assert block.words <= LIMIT
         assert block in needed or not any(map(block.holds, refused))
 
 
 def test_block_that_cannot_be_has_no_price() -> None:
-    terms = Terms(COSTS, refused=[Span(5, 7)])
-    assert terms.cost(Span(0, LIMIT)) == math.inf
-    assert terms.cost(Span(6, LIMIT)) < math.inf
-    assert terms.cost(Span(0, 6)) < math.inf
-    assert terms.cost(Span(10, 11 + LIMIT)) == math.inf
+    model = CostModel(COSTS, refused=[Span(5, 7)])
+    assert model.cost(Span(0, LIMIT)) == math.inf
+    assert model.cost(Span(6, LIMIT)) < math.inf
+    assert model.cost(Span(0, 6)) < math.inf
+    assert model.cost(Span(10, 11 + LIMIT)) == math.inf
 
 
 @given(st.lists(SPANS))

@@ -415,10 +415,10 @@ def test_mapping_is_read_as_often_as_it_wants(places: list[tuple[int, int]]) -> 
 def test_no_plan_holds_what_was_refused(mappings: list[Mapping],
                                         refused: list[tuple[int, int]]) -> None:
     planner = Planner(LINE, 0.1)
-    place = plan(mappings[0])[0].place
+    area = plan(mappings[0])[0].station_area
     bad = [Span(first, first + words) for first, words in refused]
     for span in bad:
-        planner.refuse(place, span)
+        planner.refuse(area, span)
     blocks = planner.plan(mappings)
     check_plan(mappings, blocks)
     for block in blocks:
@@ -426,21 +426,21 @@ def test_no_plan_holds_what_was_refused(mappings: list[Mapping],
             assert len({(mapping.address.offset, mapping.codec.words)
                         for mapping in block.mappings}) == 1
     for span in bad:
-        planner.allow(place, span)
+        planner.allow(area, span)
     assert planner.plan(mappings) == plan(*mappings)
 
 
 def test_good_mappings_are_read_together_on_both_sides_of_a_bad_one() -> None:
     mappings = [make_mapping(f'N7:{n}') for n in range(10)]
     planner = Planner(LINE, 0.1)
-    planner.refuse(plan(*mappings)[0].place, Span(4, 5))
+    planner.refuse(plan(*mappings)[0].station_area, Span(4, 5))
     assert sorted(spans(planner.plan(mappings))) == [('N7:0', 4), ('N7:4', 1), ('N7:5', 5)]
 
 
 def test_allowing_is_news_only_for_what_was_refused() -> None:
     planner = Planner(LINE, 0.1)
-    place = plan(make_mapping())[0].place
-    planner.refuse(place, Span(4, 6))
-    assert not planner.allow(place, Span(5, 9))
-    assert planner.allow(place, Span(4, 6))
-    assert not planner.allow(place, Span(4, 6))
+    area = plan(make_mapping())[0].station_area
+    planner.refuse(area, Span(4, 6))
+    assert not planner.allow(area, Span(5, 9))
+    assert planner.allow(area, Span(4, 6))
+    assert not planner.allow(area, Span(4, 6))
