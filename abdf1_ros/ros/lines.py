@@ -23,7 +23,6 @@ a line needs 1.3 ms. What goes wrong with one line stays with it.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -35,13 +34,12 @@ import time
 from typing import Any
 
 from abdf1_ros.errors import ConfigurationError, Problem
-from abdf1_ros.paths import package_version
 from abdf1_ros.ros.interlocks import END_LIMIT
-from abdf1_ros.ros.node import (
-    BridgeNode,
+from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
+from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
     LAST_WRITES,
-    LEVEL_CHECK_PERIOD,
+    make_parser,
     QUIET,
     run_ros,
 )
@@ -57,6 +55,8 @@ from std_srvs.srv import Trigger
 import yaml
 
 NODE_NAME = 'lines'
+
+_USAGE = 'lines --ros-args --params-file lines.yaml'
 
 _HELP = """\
 Run many bridges in one process, a node for each section of the parameter file.
@@ -354,10 +354,14 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 when parameters are faulty or no line can run, 1 where ROS does
     not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, args, _parse, _run)
+    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _run, args)
 
 
 def _run(given: Sequence[str], ended: threading.Event) -> int:
+    if any(text.startswith(('__node:=', '__name:=', '__ns:=')) for text in given):
+        raise ConfigurationError([Problem('arguments', (
+            'the sections of the parameter file name the nodes; __node and __ns would give all '
+            'of them one name'))])
     names = dict.fromkeys(name for path in parameter_files(given) for name in sections(path))
     node = LinesNode()
     lines = Lines(chosen([*names], node.wanted), node)
@@ -375,17 +379,3 @@ def _run(given: Sequence[str], ended: threading.Event) -> int:
         sys.stderr.flush()
         os._exit(status)
     return status
-
-
-def _parse(args: Sequence[str], ros_args: Sequence[str]) -> None:
-    """Tell who asks for help; all that is taken are ROS arguments."""
-    parser = argparse.ArgumentParser(
-        prog='lines', description=_HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
-    _, unknown = parser.parse_known_args(args)
-    if unknown:
-        parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
-                     '--ros-args, as in --ros-args --params-file lines.yaml')
-    if any(text.startswith(('__node:=', '__name:=', '__ns:=')) for text in ros_args):
-        parser.error('the sections of the parameter file name the nodes; __node and __ns would '
-                     'give all of them one name')

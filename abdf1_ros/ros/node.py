@@ -22,25 +22,18 @@ starts and destroyed after it has ended.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-import os
 from pathlib import Path
-import re
-import signal
-import sys
 import threading
 import time
-from types import FrameType
 from typing import Any
 
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Outcome, WriteResult
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.paths import package_version
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -49,11 +42,15 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import changed_text, Diagnostics, DuplicateNameWatch, speed_seen
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.log import EventLog, LineLog
-from abdf1_ros.ros.messages import (
-    ACTIVE_LAYOUT,
-    latched_qos,
-)
+from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
 from abdf1_ros.ros.parameters import Configuration, configure, configure_again
+from abdf1_ros.ros.process import (
+    EXIT_FAULT,
+    LAST_WRITES,
+    make_parser,
+    QUIET,
+    run_ros,
+)
 from abdf1_ros.ros.reads import ReadTopics
 from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.ros.writes import WriteTopics
@@ -61,29 +58,22 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
 NODE_NAME = 'abdf1'
 
-EXIT_CONFIGURATION = 2
-EXIT_FAULT = 1
+_USAGE = 'node --ros-args -p net_file:=net.csv -p map_file:=map.csv'
 
 _HELP = """\
 Read and write the data tables of PLCs over DF1, and show them as topics.
 
-parameters, behind --ros-args (docs/reference/parameters.md has all of them):
+parameters, after --ros-args (docs/reference/parameters.md has all of them):
   -p net_file:=PATH   the line, needed
   -p map_file:=PATH   what is read and written, needed
   -p port:=DEVICE     a device path or URL instead of the file's Com_Port
@@ -105,19 +95,8 @@ _FILE_PERIOD = 2.0
 # How long the end waits for its last diagnostics to arrive, where a subscriber is stuck.
 _LAST_WORDS = Duration(seconds=0.5)
 
-# Nothing that came before the end is still waiting when nothing comes for so long (s), and a
-# publisher that never rests is not waited for any longer than the other.
-QUIET = 0.05
-LAST_WRITES = 1.5
-
 _MOST_NAMES = 5  # in a line of the log
 _MOST_REMARKS = 20  # about both files, in the log
-
-# What rclpy's errors about the directory of the logs begin with.
-_LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
-
-# What they hold that are about arguments.
-_BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
 
 _RESULT_LEVELS = {
     Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
@@ -497,44 +476,7 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors and
     where ROS does not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, args, _parse, _run)
-
-
-def run_ros(name: str, args: Sequence[str] | None,
-            parse: Callable[[Sequence[str], Sequence[str]], None],
-            run: Callable[[Sequence[str], threading.Event], int]) -> int:
-    """
-    Call ``run`` in a ROS context; what keeps it from starting is told as ``name``.
-
-    ``parse`` gets the arguments without, and with, those of ROS. ``run`` is to end soon after its
-    event has been set, by a signal, and returns the exit status; that of faults is as in
-    ``main``.
-    """
-    ended = threading.Event()
-
-    def end(number: int, frame: FrameType | None) -> None:
-        ended.set()
-
-    given = list(sys.argv if args is None else args)
-    signal.signal(signal.SIGINT, end)
-    signal.signal(signal.SIGTERM, end)
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # not under nohup
-        signal.signal(signal.SIGHUP, end)
-    try:
-        parse(remove_ros_args(given)[1:], given)
-        _check_log_directory()
-        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
-        return run(given, ended)
-    except ConfigurationError as error:
-        for problem in error.problems:
-            get_logger(name).fatal(str(problem))
-        return EXIT_CONFIGURATION
-    except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
-        status, text = _refusal(error)
-        print(f'{name}: {text}', file=sys.stderr)
-        return status
-    finally:
-        rclpy.try_shutdown()
+    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _run, args)
 
 
 def _run(given: Sequence[str], ended: threading.Event) -> int:
@@ -546,48 +488,6 @@ def _run(given: Sequence[str], ended: threading.Event) -> int:
     failed = node.link.has_failed
     node.destroy_node()
     return EXIT_FAULT if failed else 0
-
-
-def _few(names: Sequence[str]) -> str:
-    """Return names as text, the first of them where there are many."""
-    more = f' and {len(names) - _MOST_NAMES} more' if len(names) > _MOST_NAMES else ''
-    return printable(', '.join(names[:_MOST_NAMES])) + more
-
-
-def _check_log_directory() -> None:
-    """Raise ConfigurationError where rclpy would not find one, and say so in three errors."""
-    if not any(os.environ.get(name) for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')):
-        raise ConfigurationError([Problem('environment', (
-            'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to one that '
-            'this user may write to'))])
-
-
-def _refusal(error: Exception) -> tuple[int, str]:
-    """
-    Return exit status and text for what rclpy does not take.
-
-    What the user has given stays wrong. All else may pass, such as a disk or a network that is
-    not there yet while the machine starts: whoever supervises the node is to try again.
-    """
-    text = printable(' '.join(str(error).split()))
-    if _LOG_FAILURES.match(text):
-        return EXIT_FAULT, f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
-    may_pass = isinstance(error, RuntimeError) and \
-        not isinstance(error, rclpy_implementation.UnknownROSArgsError)
-    if may_pass and not _BAD_ARGUMENTS.search(text):
-        return EXIT_FAULT, f'ROS does not start: {text}'
-    return EXIT_CONFIGURATION, f'bad arguments: {text}'
-
-
-def _parse(args: Sequence[str], ros_args: Sequence[str]) -> None:
-    """Tell who asks for help; all that the node takes are ROS arguments."""
-    parser = argparse.ArgumentParser(
-        prog='node', description=_HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
-    _, unknown = parser.parse_known_args(args)
-    if unknown:
-        parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
-                     '--ros-args, as in --ros-args -p net_file:=net.csv')
 
 
 def _spin(node: BridgeNode, ended: threading.Event) -> None:
@@ -606,3 +506,9 @@ def _spin(node: BridgeNode, ended: threading.Event) -> None:
         executor.spin_once(timeout_sec=QUIET)
         is_idle = time.monotonic() - begun >= QUIET
     executor.shutdown()
+
+
+def _few(names: Sequence[str]) -> str:
+    """Return names as text, the first of them where there are many."""
+    more = f' and {len(names) - _MOST_NAMES} more' if len(names) > _MOST_NAMES else ''
+    return printable(', '.join(names[:_MOST_NAMES])) + more

@@ -252,13 +252,17 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
     never.set()
 
 
-@pytest.mark.parametrize(('arguments', 'text'), [
-    (['map.csv'], 'parameters follow --ros-args'),
-    (['--ros-args', '-r', '__node:=x'], 'the sections of the parameter file name the nodes')])
-def test_arguments_that_cannot_be_meant(
-        arguments: list[str], text: str, handlers: dict[int, Callable[..., None]],
-        capsys: pytest.CaptureFixture[str]) -> None:
+def test_argument_that_is_not_of_ros_is_refused(
+        handlers: dict[int, Callable[..., None]], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:
-        main(['lines', *arguments])
+        main(['lines', 'map.csv'])
     assert ending.value.code == 2
-    assert text in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert 'usage: lines --ros-args --params-file lines.yaml' in told
+    assert 'map.csv: not known here; parameters follow --ros-args' in told
+
+
+def test_one_name_for_all_lines_is_refused(
+        handlers: dict[int, Callable[..., None]], capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
+    assert 'the sections of the parameter file name the nodes' in capfd.readouterr().err

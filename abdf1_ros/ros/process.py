@@ -1,0 +1,128 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The process of a node: signals, arguments, a ROS context, and the exit status.
+
+What is said here holds for ``node`` and for ``lines``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import os
+import re
+import signal
+import sys
+import threading
+from types import FrameType
+
+from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.paths import package_version
+from abdf1_ros.text import printable
+import rclpy
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import get_logger
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+EXIT_CONFIGURATION = 2
+EXIT_FAULT = 1
+
+# Nothing that came before the end is still waiting when nothing comes for so long (s), and a
+# publisher that never rests is not waited for any longer than the other.
+QUIET = 0.05
+LAST_WRITES = 1.5
+
+# What rclpy's errors about the directory of the logs begin with.
+_LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
+
+# What they hold that are about arguments.
+_BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
+
+
+def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
+    """Return what helps and tells the version; a node takes nothing but ROS arguments."""
+    parser = argparse.ArgumentParser(
+        prog=usage.split()[0], usage=usage, description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
+    return parser
+
+
+def run_ros(name: str, parser: argparse.ArgumentParser,
+            run: Callable[[Sequence[str], threading.Event], int],
+            args: Sequence[str] | None = None) -> int:
+    """
+    Call ``run`` in a ROS context until SIGINT, SIGTERM or SIGHUP, and return the exit status.
+
+    ``run`` gets the arguments of the process (``args``, by default its own). It is to end soon
+    after its event has been set, by a signal, and returns the status, 0 after a signal. What has
+    kept it from starting is told as ``name``: EXIT_CONFIGURATION where arguments, parameters or
+    files have to be changed, EXIT_FAULT for a reason that may pass.
+    """
+    ended = threading.Event()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        ended.set()
+
+    given = list(sys.argv if args is None else args)
+    signal.signal(signal.SIGINT, end)
+    signal.signal(signal.SIGTERM, end)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # not under nohup
+        signal.signal(signal.SIGHUP, end)
+    try:
+        if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
+            parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
+                         '--ros-args')
+        _check_log_directory()
+        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+        return run(given, ended)
+    except ConfigurationError as error:
+        for problem in error.problems:
+            get_logger(name).fatal(str(problem))
+        return EXIT_CONFIGURATION
+    except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
+        status, text = _refusal(error)
+        print(f'{name}: {text}', file=sys.stderr)
+        return status
+    finally:
+        rclpy.try_shutdown()
+
+
+def _check_log_directory() -> None:
+    """Raise ConfigurationError where rclpy would not find one, and say so in three errors."""
+    if not any(os.environ.get(name) for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')):
+        raise ConfigurationError([Problem('environment', (
+            'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to one that '
+            'this user may write to'))])
+
+
+def _refusal(error: Exception) -> tuple[int, str]:
+    """
+    Return exit status and text for what rclpy does not take.
+
+    What the user has given stays wrong. All else may pass, such as a disk or a network that is
+    not there yet while the machine starts: whoever supervises the node is to try again.
+    """
+    text = printable(' '.join(str(error).split()))
+    if _LOG_FAILURES.match(text):
+        return EXIT_FAULT, f'{text}; set ROS_LOG_DIR to a directory that this user may write to'
+    may_pass = isinstance(error, RuntimeError) and \
+        not isinstance(error, rclpy_implementation.UnknownROSArgsError)
+    if may_pass and not _BAD_ARGUMENTS.search(text):
+        return EXIT_FAULT, f'ROS does not start: {text}'
+    return EXIT_CONFIGURATION, f'bad arguments: {text}'
