@@ -186,7 +186,7 @@ class Checks:
         self._plan()
         return None
 
-    def steps(self, check: Check) -> Steps:
+    def steps(self, check: Check) -> Steps[None]:
         """Ask, and take the answer."""
         next_due = self._clock() + check.period
         try:
@@ -202,7 +202,7 @@ class Checks:
         finally:
             self._finish(check, next_due)
 
-    def _question(self, check: Check) -> Steps:
+    def _question(self, check: Check) -> Steps[None]:
         station, known = check.station, self.known(check.station)
         if check.kind is Kind.ECHO:
             yield from echo(b'')

@@ -381,7 +381,7 @@ class Driver:
         self._writes.drop(str(error), self.machine.now)
         self._read_backs.end(self.machine.now)
 
-    def _read_steps(self, job: ReadJob, now: float) -> Steps:
+    def _read_steps(self, job: ReadJob, now: float) -> Steps[None]:
         """Read one packet of a job."""
         try:
             data = yield from job.read_on(now, self.machine.late)
@@ -403,7 +403,7 @@ class Driver:
         finally:
             self._reads.ended(job, self.machine.now)
 
-    def _check_steps(self, check: Check) -> Steps:
+    def _check_steps(self, check: Check) -> Steps[None]:
         begun = self.machine.now
         try:
             yield from self.health.steps(check)
@@ -491,7 +491,7 @@ class Driver:
         for point in points:
             point.fail(str(error))
 
-    def _write_steps(self, write: Write) -> Steps:
+    def _write_steps(self, write: Write) -> Steps[None]:
         station, begun, is_answered = write.mapping.station, self.machine.now, True
         self._read_backs.overtaken(write, begun)
         try:
@@ -511,7 +511,7 @@ class Driver:
         if ending.done or ending.is_unsure:
             self._reads.refresh(write, self.machine.now)
 
-    def _own_steps(self, own: OwnWrite) -> Steps:
+    def _own_steps(self, own: OwnWrite) -> Steps[None]:
         """Write a heartbeat or a fallback."""
         write, outcome = own.write, Outcome.NOT_SENT
         if own.urgency is Urgency.FALLBACK:

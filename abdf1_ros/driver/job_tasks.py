@@ -31,7 +31,10 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandExpired, LinkError
 from abdf1_ros.pccc.dialect import Request
 
-Steps = Generator[Request, Packet, None]
+_Result = TypeVar('_Result')
+
+Steps = Generator[Request, Packet, _Result]
+"""What is done with a station: yields requests, is sent the replies, returns the result."""
 
 _With = TypeVar('_With', Packet, LinkError)
 
@@ -53,7 +56,7 @@ class JobTasks:
         self._tasks: set[JobTask] = set()
         self._waiting: deque[JobTask] = deque()
 
-    def start(self, station: int, steps: Steps, now: float, *, reply_size: int = 0,
+    def start(self, station: int, steps: Steps[None], now: float, *, reply_size: int = 0,
               expires: float = math.inf, patience: float = 0.0) -> JobTask:
         """
         Return the task of a new job, with its first command, whose reply has that size.
@@ -117,7 +120,7 @@ class JobTasks:
 class JobTask:
     """A job as the link sees it; ``taken`` is when the link took its command."""
 
-    def __init__(self, tasks: JobTasks, station: int, steps: Steps, reply_size: int,
+    def __init__(self, tasks: JobTasks, station: int, steps: Steps[None], reply_size: int,
                  expires: float) -> None:
         self.sent = False
         self.reply_size = reply_size

@@ -29,15 +29,14 @@ others leave: its period counts as four times what it takes to read everything o
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 import heapq
 import itertools
 import math
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import ReadPoint, Write
 from abdf1_ros.driver.transactions import read_packet
-from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.plan.forecast import PATIENCE, scan_time
 from abdf1_ros.plan.planner import Block
 
@@ -100,7 +99,7 @@ class ReadJob:
         """Tell whether there are packets already, and more to come."""
         return bool(self._packets)
 
-    def read_on(self, now: float, late: float) -> Generator[Request, Packet, bytes | None]:
+    def read_on(self, now: float, late: float) -> Steps[bytes | None]:
         """
         Read one packet; return all words after the last, None before.
 

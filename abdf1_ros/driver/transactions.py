@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
@@ -56,7 +56,7 @@ class Ending:
 
 
 def read_packet(block: Block, number: int,
-                command: Request) -> Generator[Request, Packet, bytes]:
+                command: Request) -> Steps[bytes]:
     """
     Read the words of one request of a block with its ``command``, made before.
 
@@ -74,7 +74,7 @@ def read_packet(block: Block, number: int,
     return block.dialect.read_data(request.start, request.words, reply)
 
 
-def read_block(block: Block) -> Generator[Request, Packet, bytes]:
+def read_block(block: Block) -> Steps[bytes]:
     """Read all words of a block; raises like ``read_packet``."""
     data = b''
     for number, command in enumerate(block.commands()):
@@ -82,7 +82,7 @@ def read_block(block: Block) -> Generator[Request, Packet, bytes]:
     return data
 
 
-def carry_out(write: Write) -> Generator[Request, Packet, Ending]:
+def carry_out(write: Write) -> Steps[Ending]:
     """Send every packet of a write, as long as each is confirmed."""
     done, detail = 0, ''
     try:
@@ -99,7 +99,7 @@ def carry_out(write: Write) -> Generator[Request, Packet, Ending]:
     return Ending(Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN, detail, done)
 
 
-def _send(write: Write, packet: int) -> Generator[Request, Packet, str]:
+def _send(write: Write, packet: int) -> Steps[str]:
     """Send one packet; return what has to be said of the way it was done, if anything."""
     try:
         check_status((yield write.commands[packet]),
@@ -113,7 +113,7 @@ def _send(write: Write, packet: int) -> Generator[Request, Packet, str]:
 
 
 def _rewrite(write: Write, packet: int,
-             refusal: RemoteError) -> Generator[Request, Packet, None]:
+             refusal: RemoteError) -> Steps[None]:
     """Do what a refused masked write should have done: read the word, write it back changed."""
     dialect = write.mapping.dialect
     address, mask, bits = write.bit_change(packet)
@@ -136,13 +136,13 @@ def _early(write: Write, outcome: Outcome, done: int, error: LinkError | RemoteE
     return Ending(Outcome.PARTLY, detail, done, error)
 
 
-def read_values(mapping: Mapping, block: Block) -> Generator[Request, Packet, Values]:
+def read_values(mapping: Mapping, block: Block) -> Steps[Values]:
     """Read a block and return the raw values of one mapping; raises like ``read_packet``."""
     words = yield from read_block(block)
     return mapping.codec.decode(words[block.slice_of(mapping)])
 
 
-def identify() -> Generator[Request, Packet, Identity]:
+def identify() -> Steps[Identity]:
     """
     Ask who is there, and a PLC-5 with a fault which one.
 
@@ -159,7 +159,7 @@ def identify() -> Generator[Request, Packet, Identity]:
         return identity  # one without typed commands: who it is counts more
 
 
-def echo(data: bytes) -> Generator[Request, Packet, None]:
+def echo(data: bytes) -> Steps[None]:
     """Have ``data`` sent back; FormatError when something else comes."""
     reply = check_status((yield diagnostics.CMD, diagnostics.Echo(data).encode()))
     if reply != data:

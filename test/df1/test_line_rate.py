@@ -35,9 +35,9 @@ def seen(real: int | None, *, words: int = 50, chunk: int = 1) -> float | None:
     setattr(rig.line, '_chunk', chunk)
     rig.start()
     for _ in range(EXCHANGES):
-        errand = rig.ask(7)
-        rig.line.run(lambda errand=errand: errand.result is not None, 10.0)
-        assert isinstance(errand.result, Packet)
+        task = rig.ask(7)
+        rig.line.run(lambda task=task: task.result is not None, 10.0)
+        assert isinstance(task.result, Packet)
         rig.run(0.05)  # the line rests, which is no slowness
     return rig.master.machine.rate.seen
 

@@ -71,7 +71,7 @@ def test_command_for_us_is_served_and_its_reply_delivered(standard: bool) -> Non
     counts = rig.master.counts()
     assert (counts['commands_received'], counts['replies_sent']) == (1, 1)
     assert not {'stale_messages', 'invalid_messages', 'enq_retries'} & counts.keys()
-    assert all(isinstance(errand.result, Packet) for errand in rig.master.all)
+    assert all(isinstance(task.result, Packet) for task in rig.master.all)
 
 
 @BOTH
@@ -232,16 +232,16 @@ def test_broadcast_of_a_slave_is_acknowledged_and_sent_to_all(standard: bool) ->
 @BOTH
 def test_broadcast_of_ours_goes_once_and_is_left_to_the_slaves(standard: bool) -> None:
     rig = bench(standard, 7, 8)
-    errand = rig.ask(BROADCAST)
+    task = rig.ask(BROADCAST)
     other = rig.ask(8)
     rig.start()
     rig.run(0.2)
-    assert errand.result == errand.command.reply()
+    assert task.result == task.command.reply()
     assert other.result == other.command.reply()
     assert [packet.dst for packet in rig[7].served] == [BROADCAST]
     log = rig.master.machine.log
     assert log[0][1] == 'C255'
-    leaves = len(master_frame(BROADCAST, errand.command.encode(), Checksum.CRC)) * 10 / 19200
+    leaves = len(master_frame(BROADCAST, task.command.encode(), Checksum.CRC)) * 10 / 19200
     assert log[1][0] == pytest.approx(leaves + BROADCAST_PAUSE)
     assert 'P255' not in rig.master.said
     counts = rig.master.counts()
@@ -271,12 +271,12 @@ def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     slave = rig[7].slave
     # The reply to the master's own command comes last, by taking away the turn of replies.
     slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
-    errand = rig.ask(7)
+    task = rig.ask(7)
     rig.run(0.49)
     assert slave.counters.acks_received == MAX_FORWARDS
     assert slave.counters.nak_retries > 0
     assert slave._held is not None
-    assert errand.result is None
+    assert task.result is None
     assert 'duplicate_messages' not in rig.master.counts()
     del slave._next_packet
     rig.run(0.5)  # the transaction ends, and what waits is passed on
@@ -420,10 +420,10 @@ def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
         others = tuple(other for other in numbers if other != number)
         rig[number].outbox = Endless(rig[number], others, limit)  # type: ignore[assignment]
     rig.start()
-    errands = [rig.ask(number) for _ in range(50) for number in numbers]
+    tasks = [rig.ask(number) for _ in range(50) for number in numbers]
     rig.run(15.0)
-    ends = [errand.ended for errand in errands]
-    assert all(isinstance(errand.result, Packet) for errand in errands)
+    ends = [task.ended for task in tasks]
+    assert all(isinstance(task.result, Packet) for task in tasks)
     assert max(after - before for before, after in itertools.pairwise(sorted(ends))) < 0.3
     assert rig.master.changes == []
     assert {number for number, *_ in rig.master.numbers()} == {2523}
@@ -437,13 +437,13 @@ def test_line_that_is_faster_than_set_waits_no_longer_for_a_silent_station(
     rig.line.char_time = 0.0  # as a network: what is written is there
     rig.start()
     for _ in range(500):
-        errand = rig.ask(7)
-        rig.line.run(lambda errand=errand: errand.result is not None, 1.0)
+        task = rig.ask(7)
+        rig.line.run(lambda task=task: task.result is not None, 1.0)
     begun = rig.clock()
     rig[7].silent = True
-    errand = rig.ask(7)
-    rig.line.run(lambda: errand.result is not None, 60.0)
-    assert isinstance(errand.result, StationInactive)
+    task = rig.ask(7)
+    rig.line.run(lambda: task.result is not None, 60.0)
+    assert isinstance(task.result, StationInactive)
     assert rig.clock() - begun < 2 * (SETTINGS.timeout + 0.05)
 
 
@@ -464,11 +464,11 @@ def test_station_that_dribbles_does_not_keep_the_line(standard: bool) -> None:
     waits = []
     for _ in range(20):
         rig.ask(7)
-        errand = rig.ask(8)
-        while errand.result is None:
+        task = rig.ask(8)
+        while task.result is None:
             rig.run(0.06)
             rig.master.machine.receive_data(bytes(1), rig.clock())
-        assert isinstance(errand.result, Packet)
-        waits.append(errand.seconds)
+        assert isinstance(task.result, Packet)
+        waits.append(task.seconds)
     # Two polls of the other one, each until its message is given up.
     assert max(waits) < 2 * (SETTINGS.timeout + 0.5)

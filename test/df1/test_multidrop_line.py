@@ -31,8 +31,8 @@ from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
-from support.multidrop import Errands, MasterNode, SlaveNode
-from support.peers import Errand
+from support.multidrop import CommandTasks, MasterNode, SlaveNode
+from support.peers import CommandTask
 from support.virtual_line import char_time, Noise, QUIET, VirtualLine
 
 MASTER, SLAVES, ASKING = 5, (1, 2, 16), (1, 2)
@@ -88,7 +88,7 @@ class Rig:
         self.replies[key] = Server(self.tables[number]).serve(command)
         return self.replies[key]
 
-    def ask(self, src: int, dst: int) -> Errand:
+    def ask(self, src: int, dst: int) -> CommandTask:
         """Queue a random read or write from one node to another."""
         address = parse_address(f'N7:{self.random.randrange(WORDS - 12)}', FAMILY)
         words = self.random.randint(1, 12)
@@ -97,11 +97,11 @@ class Rig:
             cmd, body = DIALECT.write(address, bytes(
                 self.random.choice((0x00, 0x10, 0x55, 0xFF)) for _ in range(2 * words)))
         self.tns[src] = self.tns[src] + 1 & 0xFFFF
-        node: Errands = self.nodes[src]
-        errand = node.add(Packet(dst, src, cmd, 0, self.tns[src], body))
+        node: CommandTasks = self.nodes[src]
+        task = node.add(Packet(dst, src, cmd, 0, self.tns[src], body))
         if src == MASTER:
             self.line.wake(self.master.machine)
-        return errand
+        return task
 
     def run(self, count: int) -> None:
         """Let the master and two slaves ask ``count`` times each, until all of it has ended."""
@@ -112,19 +112,19 @@ class Rig:
             if asked >= count and self.is_done():
                 return
             # Message-based polling polls a slave only when it has something for it.
-            errand = self.ask(MASTER, SLAVES[asked % 3])
-            self.line.run(lambda errand=errand: errand.result is not None, 100.0)
+            task = self.ask(MASTER, SLAVES[asked % 3])
+            self.line.run(lambda task=task: task.result is not None, 100.0)
         raise AssertionError('not everything ends')
 
     def is_done(self) -> bool:
         """Tell whether every command has its end."""
-        return all(errand.result is not None for node in self.nodes.values()
-                   for errand in node.all)
+        return all(task.result is not None for node in self.nodes.values()
+                   for task in node.all)
 
-    def results(self, src: int) -> list[Errand]:
-        """Return the errands of a node that have a good reply."""
-        return [errand for errand in self.nodes[src].all
-                if isinstance(errand.result, Packet) and errand.result.sts == 0]
+    def results(self, src: int) -> list[CommandTask]:
+        """Return the tasks of a node that have a good reply."""
+        return [task for task in self.nodes[src].all
+                if isinstance(task.result, Packet) and task.result.sts == 0]
 
 
 def noise_of(rate: float) -> Noise:
@@ -135,22 +135,22 @@ def noise_of(rate: float) -> Noise:
 def assert_exact(rig: Rig) -> None:
     """Check that nothing was executed twice, altered, or answered by anybody else."""
     assert set(rig.executed.values()) <= {1}
-    sent = {(errand.command.dst, src, errand.command.tns): errand.command
-            for src, node in rig.nodes.items() for errand in node.all}
+    sent = {(task.command.dst, src, task.command.tns): task.command
+            for src, node in rig.nodes.items() for task in node.all}
     for key, command in rig.commands.items():
         assert sent[key] == command
     for src, node in rig.nodes.items():
-        for errand in node.all:
-            key = errand.command.dst, src, errand.command.tns
-            if not isinstance(errand.result, Packet):
+        for task in node.all:
+            key = task.command.dst, src, task.command.tns
+            if not isinstance(task.result, Packet):
                 known = (CommandTimeout | StationInactive if src == MASTER
                          else CommandTimeout | NeverTaken | LineReset)
-                assert isinstance(errand.result, known)
-            elif errand.result.sts == 2:  # the master could not pass it on, as far as it knows
-                assert src in SLAVES and errand.command.dst in SLAVES
-                assert errand.result == errand.command.reply(sts=2)
+                assert isinstance(task.result, known)
+            elif task.result.sts == 2:  # the master could not pass it on, as far as it knows
+                assert src in SLAVES and task.command.dst in SLAVES
+                assert task.result == task.command.reply(sts=2)
             else:
-                assert errand.result == rig.replies[key]
+                assert task.result == rig.replies[key]
 
 
 def assert_recovers(rig: Rig) -> None:
@@ -164,13 +164,13 @@ def assert_recovers(rig: Rig) -> None:
     for src in (MASTER, *ASKING):
         for dst in rig.nodes:
             if src != dst:
-                errand = rig.ask(src, dst)
+                task = rig.ask(src, dst)
                 for _ in range(20):
-                    if errand.result is None:
+                    if task.result is None:
                         rig.ask(MASTER, src if src != MASTER else dst)
                         rig.line.run_for(0.1)
-                assert isinstance(errand.result, Packet), (src, dst)
-                assert errand.result == rig.replies[dst, src, errand.command.tns]
+                assert isinstance(task.result, Packet), (src, dst)
+                assert task.result == rig.replies[dst, src, task.command.tns]
     rig.line.run(rig.is_done, 60.0)
 
 
@@ -194,8 +194,8 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
     assert 0 <= total['eots_sent'] - ours.eots_received <= 1
     assert 0 <= ours.polls_sent - total['polls_received'] <= 1
     asked = sum(len(node.all) for node in rig.nodes.values())
-    passed_on = sum(errand.command.dst != MASTER for src in ASKING
-                    for errand in rig.nodes[src].all)
+    passed_on = sum(task.command.dst != MASTER for src in ASKING
+                    for task in rig.nodes[src].all)
     assert ours.commands_sent == len(rig.master.all) + passed_on
     assert sum(rig.executed.values()) == asked
     for counters in (ours, *theirs):
@@ -246,8 +246,8 @@ def test_noise_with_bcc(mode: str) -> None:
     rig = Rig(mode, noise=noise_of(1e-3), seed=7, checksum=Checksum.BCC)
     rig.run(20)
     for src, node in rig.nodes.items():
-        for errand in node.all:  # what a BCC does not see may be executed, but never twice
-            assert rig.executed[errand.command.dst, src, errand.command.tns] <= 1
+        for task in node.all:  # what a BCC does not see may be executed, but never twice
+            assert rig.executed[task.command.dst, src, task.command.tns] <= 1
     assert_recovers(rig)
 
 
@@ -256,5 +256,5 @@ def test_same_seed_gives_the_same_line() -> None:
     for _ in range(2):
         rig = Rig('single', noise=noise_of(1e-2), seed=3)
         rig.run(5)
-        times.append([errand.ended for node in rig.nodes.values() for errand in node.all])
+        times.append([task.ended for node in rig.nodes.values() for task in node.all])
     assert times[0] == times[1]

@@ -61,13 +61,13 @@ def later(packet: Packet, number: int) -> Packet:
 @pytest.mark.parametrize('checksum', Checksum)
 def test_normal(checksum: Checksum) -> None:
     peer = bench(checksum)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     assert peer.said() == peer.frame(COMMAND)
     assert peer.hear(ACK) == b''
     assert peer.wait(0.3) == []
-    assert errand.result is None
+    assert task.result is None
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.wait(60) == []
     assert peer.numbers() == [(2523, 1)]
     assert peer.counts() == {
@@ -89,7 +89,7 @@ def test_next_command_follows_at_once() -> None:
 @pytest.mark.parametrize('retries', [0, 1, 3])
 def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
     peer = bench(nak_retries=retries)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     message = peer.said()
     for count in range(retries):
         pause = 0.25 * count
@@ -99,8 +99,8 @@ def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
         assert peer.wait(0.01) == []
     assert peer.hear(NAK) == b''
     assert peer.wait(TIMEOUT) == []
-    assert isinstance(errand.result, StationInactive)
-    assert errand.sent
+    assert isinstance(task.result, StationInactive)
+    assert task.sent
     assert peer.numbers() == [
         *(entry for count in range(1, retries + 1)
           for entry in ((2517,), (2521, count, 2511))), (2517,), (2519, retries), (2509, 1)]
@@ -114,12 +114,12 @@ def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
 @pytest.mark.parametrize('retries', [0, 1, 3])
 def test_silence_is_answered_by_enq_until_the_limit(retries: int) -> None:
     peer = bench(enq_retries=retries)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     assert peer.said() == peer.frame(COMMAND)
     assert peer.wait(TIMEOUT * (retries + 1)) == [
         (TIMEOUT * count, ENQ) for count in range(1, retries + 1)]
     assert peer.wait(TIMEOUT) == []
-    assert isinstance(errand.result, StationInactive)
+    assert isinstance(task.result, StationInactive)
     assert peer.numbers() == [
         *(entry for count in range(1, retries + 1)
           for entry in ((2515, 0), (2522, count, 2515))), (2515, 0), (2520, retries), (2509, 1)]
@@ -132,25 +132,25 @@ def test_silence_is_answered_by_enq_until_the_limit(retries: int) -> None:
 
 def test_ack_for_the_last_enq_is_in_time() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     assert peer.wait(3 * TIMEOUT + 0.999) == [(1.0, ENQ), (2.0, ENQ), (3.0, ENQ)]
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.changes == []
 
 
 def test_nak_for_an_enq_brings_the_message_again() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     message = peer.said()
     assert peer.wait(TIMEOUT) == [(1.0, ENQ)]
     assert peer.hear(NAK) == message
     assert peer.wait(0.999) == []
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.only(2521, 2522) == [(2522, 1, 2515), (2521, 1, 2511)]
 
 
@@ -158,7 +158,7 @@ def test_limits_count_apart_and_for_each_message() -> None:
     for _ in range(2):
         peer = bench(nak_retries=2, enq_retries=2)
         for number in range(2):
-            errand = peer.begin(later(COMMAND, number))
+            task = peer.begin(later(COMMAND, number))
             message = peer.said()
             assert peer.wait(1.0) == [(1.0, ENQ)]
             assert peer.hear(NAK) == message
@@ -167,7 +167,7 @@ def test_limits_count_apart_and_for_each_message() -> None:
             assert peer.wait(0.25) == [(0.25, message)]
             assert peer.hear(ACK) == b''
             assert peer.hear_packet(later(REPLY, number)) == ACK
-            assert errand.result == later(REPLY, number)
+            assert task.result == later(REPLY, number)
             peer.wait(TIMEOUT)
 
 
@@ -186,14 +186,14 @@ def test_naks_are_paced_from_the_second_on() -> None:
     b'\x10\x02\x00\x10\x03\x55\x55'])
 def test_anything_else_is_passed_over_while_the_timer_runs(noise: bytes) -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     for _ in range(9):
         assert peer.wait(0.1) == []
         assert peer.hear(noise) in (b'', NAK)
     assert peer.wait(0.2) == [(0.1, ENQ)]
     peer.hear(ACK)
-    assert errand.result is None
+    assert task.result is None
     assert peer.only(2515) == [(2515, noise[-1])]
 
 
@@ -221,11 +221,11 @@ def test_timer_runs_on_while_messages_and_enqs_come_in() -> None:
 
 def test_reply_that_overtakes_its_ack_is_taken_as_one() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     assert peer.wait(0.5) == []
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.hear(ACK) == b''
     assert peer.wait(60) == []
     assert peer.counts()['acks_received'] == 1
@@ -301,11 +301,11 @@ def test_late_responses_after_a_failure_do_not_acknowledge_the_next_message() ->
 
 def test_reply_that_comes_after_the_failure_of_its_transfer_still_counts() -> None:
     peer = bench(enq_retries=0)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     assert peer.wait(1.05) == []
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.wait(60) == []
     assert peer.changes == []
 
@@ -340,7 +340,7 @@ def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -
     peer = bench(timing=LineTiming(char_time=0.01))
     unsent = 1
     peer.machine.unsent = lambda: unsent
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     size = len(peer.said())
     assert peer.wait(0.01 * size - 0.01) == []
     assert peer.hear(response) == b''
@@ -349,14 +349,14 @@ def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -
     assert peer.wait(1.1) == [(1.0, ENQ)]  # of the time after the last byte nothing is lost
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 def test_response_counts_while_only_our_answer_is_leaving() -> None:
     peer = bench()
     unsent = 0
     peer.machine.unsent = lambda: unsent
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     assert peer.hear_packet(THEIRS) == ACK
     unsent = len(ACK)
@@ -364,7 +364,7 @@ def test_response_counts_while_only_our_answer_is_leaving() -> None:
     unsent = 0
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 def test_early_ack_counts_on_a_link_faster_than_baud() -> None:
@@ -390,7 +390,7 @@ def test_ack_before_a_byte_of_our_message_is_handed_over_does_not_count() -> Non
 @pytest.mark.parametrize('at', [0, 1, 2, 3, 4, 6, 7])
 def test_embedded_ack_ends_the_transfer(checksum: Checksum, at: int) -> None:
     peer = bench(checksum)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     plain = message_frame(THEIRS.encode(), checksum)
     assert peer.hear(plain[:2 + at] + ACK) == b''
@@ -400,7 +400,7 @@ def test_embedded_ack_ends_the_transfer(checksum: Checksum, at: int) -> None:
     assert peer.hear(ACK) == b''
     assert peer.wait(2.0) == []
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 def test_embedded_nak_brings_the_message_again() -> None:
@@ -459,13 +459,13 @@ def test_response_waits_for_our_message_where_nobody_embeds() -> None:
 def test_ack_while_the_rest_of_our_message_is_kept_does_not_count() -> None:
     peer = bench(timing=LineTiming(char_time=0.001))
     embedding(peer)
-    errand = peer.begin(LONG)
+    task = peer.begin(LONG)
     said = peer.said()
     assert peer.hear(ACK) == b''
     rest = b''.join(data for _, data in peer.wait(0.3))
     assert said + rest == peer.frame(LONG)
     assert peer.wait(1.0)[0][1] == ENQ
-    assert errand.result is None
+    assert task.result is None
 
 
 def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
@@ -490,23 +490,23 @@ def test_embedded_response_of_the_vectors(name: str) -> None:
 
 def test_both_directions_at_once() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     assert peer.said() == peer.frame(COMMAND)
     assert peer.hear_packet(THEIRS) == ACK
     assert peer.hear(ACK) == peer.frame(OUR_REPLY)
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.hear(ACK) == b''
     assert peer.wait(60) == []
 
 
 def test_ack_of_ours_and_reply_of_theirs_in_one_burst() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     burst = ACK + peer.frame(REPLY) + peer.frame(THEIRS)
     assert peer.hear(burst) == ACK + ACK + peer.frame(OUR_REPLY)
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.served == [THEIRS]
 
 
@@ -537,13 +537,13 @@ def test_replies_and_commands_go_out_in_turns() -> None:
 def test_other_end_that_never_stops_asking_does_not_keep_us_from_asking() -> None:
     peer = bench()
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     said = b''
     for number in range(1, 5):
         assert peer.hear_packet(later(THEIRS, number)) == ACK
         said += peer.hear(ACK)
     assert peer.frame(COMMAND) in said
-    assert errand.sent
+    assert task.sent
 
 
 def test_timers_run_from_the_last_byte() -> None:
@@ -579,7 +579,7 @@ def test_tx_delay_comes_before_every_transmission() -> None:
 
 def test_nothing_heard_during_tx_delay_is_lost() -> None:
     peer = bench(timing=LineTiming(tx_delay=0.5), timeout=5.0)
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     assert peer.wait(0.6) == [(0.5, peer.frame(COMMAND))]
     assert peer.hear_packet(THEIRS) == b''
     assert peer.wait(0.1) == []
@@ -587,7 +587,7 @@ def test_nothing_heard_during_tx_delay_is_lost() -> None:
     assert peer.wait(0.3) == []
     assert peer.hear_packet(REPLY) == b''
     assert peer.wait(1.0)[0] == (0.1, ACK)
-    assert errand.result == REPLY
+    assert task.result == REPLY
     assert peer.counts()['acks_received'] == 1
 
 
@@ -606,28 +606,28 @@ def test_least_time_for_a_response() -> None:
 
 def test_message_that_has_begun_when_the_time_is_up_is_heard_out() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     reply = peer.frame(REPLY)
     peer.wait(0.95)
     peer.hear(reply[:4])
     assert peer.wait(0.09) == []
     assert peer.hear(reply[4:]) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 @pytest.mark.parametrize('begin', [STX, STX + bytes(261)])
 def test_other_end_that_dribbles_does_not_keep_us_waiting(begin: bytes) -> None:
     """A message that has begun, and then a byte every 60 ms without end."""
     peer = bench(enq_retries=1, timing=LineTiming(char_time=0.001))
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     said = [peer.hear(begin)]
-    while errand.result is None and peer.now < 200.0:
+    while task.result is None and peer.now < 200.0:
         said += [data for _, data in peer.wait(0.06)]
         said += [peer.hear(b'U')]
-    assert isinstance(errand.result, StationInactive)
-    assert errand.seconds < 2 * TIMEOUT + 1.0
+    assert isinstance(task.result, StationInactive)
+    assert task.seconds < 2 * TIMEOUT + 1.0
     assert b''.join(said) == ENQ
 
 
@@ -868,10 +868,10 @@ def test_only_the_last_message_is_remembered() -> None:
 
 def test_duplicate_reply_is_acknowledged_and_passed_over() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.hear(ACK)
     assert peer.hear_packet(REPLY) + peer.hear_packet(REPLY) == peer.frame(COMMAND) + ACK + ACK \
-        or errand.result == REPLY
+        or task.result == REPLY
     assert peer.counts()['duplicate_messages'] == 1
     assert 'stale_messages' not in peer.counts()
 
@@ -916,12 +916,12 @@ def test_sink_full() -> None:
 
 def test_reply_is_taken_with_the_sink_full() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     for number in range(MAX_WAITING_REPLIES):
         peer.hear_packet(later(THEIRS, number))
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 def test_stx_inside_a_message_begins_it_anew() -> None:
@@ -1075,35 +1075,35 @@ def test_captured_replies_answer_commands_of_the_same_numbers() -> None:
               and entry.checksum is Checksum.CRC and len(entry.frame) > 2]
     assert len(replies) == len(frames) == 3
     for reply, frame in zip(replies, frames):
-        errand = peer.begin(Packet(reply.src, reply.dst, reply.cmd & ~0x40, 0, reply.tns))
+        task = peer.begin(Packet(reply.src, reply.dst, reply.cmd & ~0x40, 0, reply.tns))
         peer.said()
         assert peer.hear(ACK) == b''
         assert peer.hear(*single_bytes(frame)) == ACK
-        assert errand.result == reply
+        assert task.result == reply
 
 
 def test_everything_byte_by_byte() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     assert peer.said() == peer.frame(COMMAND)
     line = ACK + peer.frame(THEIRS) + peer.frame(REPLY) + ACK + ENQ
     assert peer.hear(*single_bytes(line)) == ACK + peer.frame(OUR_REPLY) + ACK + ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 # Transactions
 
 def test_ack_is_no_reply() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.wait(0.4)
     peer.hear(ACK)
     assert peer.wait(CMD_TIMEOUT - 1e-6) == []
-    assert errand.result is None
+    assert task.result is None
     assert peer.wait(2e-6) == []
-    assert isinstance(errand.result, CommandTimeout)
-    assert errand.sent
+    assert isinstance(task.result, CommandTimeout)
+    assert task.sent
     assert peer.numbers() == [(2508,)]
     assert peer.counts()['command_timeouts'] == 1
     assert peer.changes == []
@@ -1111,25 +1111,25 @@ def test_ack_is_no_reply() -> None:
 
 def test_reply_is_awaited_from_the_ack_also_after_a_retry() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     assert peer.wait(1.2) == [(1.0, ENQ)]
     peer.hear(ACK)
     acknowledged = peer.now
     peer.wait(60)
-    assert isinstance(errand.result, CommandTimeout)
-    assert errand.ended == pytest.approx(acknowledged + CMD_TIMEOUT)
+    assert isinstance(task.result, CommandTimeout)
+    assert task.ended == pytest.approx(acknowledged + CMD_TIMEOUT)
 
 
 def test_late_reply_is_stale() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     peer.wait(CMD_TIMEOUT)
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
     assert peer.hear_packet(REPLY) == ACK
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
     assert peer.counts()['stale_messages'] == 1
     assert peer.counts()['replies_received'] == 1
     assert peer.numbers() == [(2508,), (2510, 1, 5, COMMAND.tns)]
@@ -1138,12 +1138,12 @@ def test_late_reply_is_stale() -> None:
 
 def test_reply_of_the_last_moment() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     peer.wait(CMD_TIMEOUT - 0.001)
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 @pytest.mark.parametrize('other', [
@@ -1151,33 +1151,33 @@ def test_reply_of_the_last_moment() -> None:
     replace(REPLY, tns=REPLY.tns ^ 1, cmd=0x46)])
 def test_reply_of_another_transaction_or_station_is_stale(other: Packet) -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     assert peer.hear_packet(other) == ACK
-    assert errand.result is None
+    assert task.result is None
     assert peer.counts()['stale_messages'] == 1
     assert peer.hear_packet(REPLY) == ACK
-    assert errand.result == REPLY
+    assert task.result == REPLY
 
 
 def test_reply_to_any_dst_counts() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     assert peer.hear_packet(replace(REPLY, dst=0)) == ACK
-    assert errand.result == replace(REPLY, dst=0)
+    assert task.result == replace(REPLY, dst=0)
 
 
 def test_reply_with_another_command_code() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     assert peer.hear_packet(replace(REPLY, cmd=0x46)) == ACK
-    assert isinstance(errand.result, WrongCommandCode)
-    assert errand.result.args == (1, 0x46, 0x4F)
+    assert isinstance(task.result, WrongCommandCode)
+    assert task.result.args == (1, 0x46, 0x4F)
     assert peer.numbers() == [(2505, 1, 0x46, 0x4F)]
     assert peer.counts()['invalid_messages'] == 1
     assert peer.stations[1].replies == 0
@@ -1187,19 +1187,19 @@ def test_reply_with_another_command_code() -> None:
 
 def test_command_with_our_tns_is_no_reply() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     theirs = Packet(5, 1, 0x0F, 0, COMMAND.tns, b'\x68')
     assert peer.hear_packet(theirs) == ACK + peer.frame(theirs.reply())
-    assert errand.result is None
+    assert task.result is None
 
 
 @pytest.mark.parametrize('allowed', [1, 2, 3])
 def test_commands_outstanding(allowed: int) -> None:
     peer = bench(max_outstanding=allowed)
     commands = [later(COMMAND, number) for number in range(6)]
-    errands = [peer.begin(command) for command in commands]
+    tasks = [peer.begin(command) for command in commands]
     said = peer.said()
     for command in commands[1:allowed]:
         assert said
@@ -1212,7 +1212,7 @@ def test_commands_outstanding(allowed: int) -> None:
         assert peer.hear(ACK) == b''
     for command in commands[-allowed:]:
         peer.hear_packet(command.reply())
-    assert [errand.result for errand in errands] == [command.reply() for command in commands]
+    assert [task.result for task in tasks] == [command.reply() for command in commands]
     assert peer.most_outstanding == allowed
 
 
@@ -1220,24 +1220,24 @@ def test_commands_outstanding(allowed: int) -> None:
 def test_replies_in_any_order_find_their_command(order: tuple[int, ...]) -> None:
     peer = bench(max_outstanding=3)
     commands = [replace(later(COMMAND, number), dst=1 + number) for number in range(3)]
-    errands = [peer.begin(command) for command in commands]
+    tasks = [peer.begin(command) for command in commands]
     assert peer.said() + peer.hear(ACK) + peer.hear(ACK) + peer.hear(ACK) == b''.join(
         map(peer.frame, commands))
     for number in order:
         reply = commands[number].reply(bytes((number,)))
-        assert errands[number].result is None
+        assert tasks[number].result is None
         assert peer.hear_packet(reply) == ACK
-        assert errands[number].result == reply
+        assert tasks[number].result == reply
 
 
 def test_same_tns_at_two_stations() -> None:
     peer = bench(max_outstanding=2)
-    errands = [peer.begin(replace(COMMAND, dst=number)) for number in (1, 2)]
+    tasks = [peer.begin(replace(COMMAND, dst=number)) for number in (1, 2)]
     peer.said()
     peer.hear(ACK, ACK)
     peer.hear_packet(replace(REPLY, src=2, data=b'two'))
     peer.hear_packet(replace(REPLY, src=1, data=b'one'))
-    assert [errand.result for errand in errands] == [
+    assert [task.result for task in tasks] == [
         replace(REPLY, src=1, data=b'one'), replace(REPLY, src=2, data=b'two')]
 
 
@@ -1282,12 +1282,12 @@ def test_overdue_command_ends_while_another_one_waits_for_its_ack() -> None:
 
 def test_reply_is_not_taken_after_its_time_although_nobody_has_looked() -> None:
     peer = bench()
-    errand = peer.begin(COMMAND)
+    task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
     peer.now += CMD_TIMEOUT + 3.0  # the process stood still
     assert peer.hear_packet(REPLY) == ACK
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
     assert peer.counts()['stale_messages'] == 1
 
 
@@ -1303,11 +1303,11 @@ def test_silent_station_is_probed_with_one_try() -> None:
     peer = bench()
     lose(peer)
     for number in range(1, 4):
-        errand = peer.begin(later(COMMAND, number))
+        task = peer.begin(later(COMMAND, number))
         assert peer.said() == peer.frame(later(COMMAND, number))
         assert peer.wait(2 * TIMEOUT) == []
-        assert isinstance(errand.result, StationInactive)
-        assert errand.seconds <= 2 * TIMEOUT
+        assert isinstance(task.result, StationInactive)
+        assert task.seconds <= 2 * TIMEOUT
     assert peer.changes == [(1, False)]
     assert peer.counts()['enq_limit_exceeded'] == len(peer.only(2520)) == 1  # not of a probe
 
@@ -1330,28 +1330,28 @@ def test_replies_that_do_not_come_in_time_are_counted_until_one_does() -> None:
 def test_refusing_station_is_probed_with_one_try() -> None:
     peer = bench()
     lose(peer)
-    errand = peer.begin(later(COMMAND, 1))
+    task = peer.begin(later(COMMAND, 1))
     peer.said()
     assert peer.hear(NAK) == b''
     assert peer.wait(TIMEOUT) == []
-    assert isinstance(errand.result, StationInactive)
+    assert isinstance(task.result, StationInactive)
     assert peer.only(2519) == []
 
 
 def test_station_comes_back_with_its_reply() -> None:
     peer = bench()
     lose(peer)
-    errand = peer.begin(later(COMMAND, 1))
+    task = peer.begin(later(COMMAND, 1))
     peer.said()
     assert peer.hear(ACK) == b''
     assert peer.changes == [(1, False)]  # an ACK names nobody
     assert peer.hear_packet(later(REPLY, 1)) == ACK
-    assert errand.result == later(REPLY, 1)
+    assert task.result == later(REPLY, 1)
     assert peer.changes == [(1, False), (1, True)]
-    errand = peer.begin(later(COMMAND, 2))
+    task = peer.begin(later(COMMAND, 2))
     peer.said()
     assert len(peer.wait(60)) == 3  # a whole cycle of ENQs again
-    assert isinstance(errand.result, StationInactive)
+    assert isinstance(task.result, StationInactive)
 
 
 def test_command_without_a_reply_leaves_its_station_active() -> None:

@@ -31,7 +31,7 @@ from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
-from support.peers import Errand, PeerNode
+from support.peers import CommandTask, PeerNode
 from support.virtual_line import char_time, Noise, QUIET, VirtualLine
 
 BAUD = 19200
@@ -54,7 +54,7 @@ class End(PeerNode):
         self.table.create(self.place(0), WORDS)
         self.executed: Counter[int] = Counter()
         self.replies: dict[int, Packet] = {}
-        self.all: list[Errand] = []
+        self.all: list[CommandTask] = []
         self._server = Server(self.table)
         self._random = rig.random
         self._tns = rig.random.randrange(0x10000)
@@ -109,9 +109,9 @@ class Rig:
         for end in self.ends:
             self.line.wake(end.machine)
         for end in self.ends:
-            for errand in list(end.all):
-                if errand.result is None:
-                    self.line.run(lambda errand=errand: errand.result is not None, 10_000.0)
+            for task in list(end.all):
+                if task.result is None:
+                    self.line.run(lambda task=task: task.result is not None, 10_000.0)
 
     def transfer_bound(self) -> float:
         """Return the longest time that a transfer may take, with what is heard out."""
@@ -138,22 +138,22 @@ def noise_of(rate: float) -> Noise:
 def assert_exact(rig: Rig) -> None:
     """Check what must hold as long as the check finds every error."""
     for asking, serving in rig.both():
-        sent = {errand.command.tns: errand.command for errand in asking.all}
+        sent = {task.command.tns: task.command for task in asking.all}
         assert set(serving.executed.values()) <= {1}
         for command in serving.served:
             assert command == sent[command.tns]
-        for errand in asking.all:
-            if isinstance(errand.result, Packet):
-                assert errand.result == serving.replies[errand.command.tns]
+        for task in asking.all:
+            if isinstance(task.result, Packet):
+                assert task.result == serving.replies[task.command.tns]
             else:
-                assert isinstance(errand.result, (CommandTimeout, StationInactive))
+                assert isinstance(task.result, (CommandTimeout, StationInactive))
 
 
 def assert_bounded(rig: Rig) -> None:
     """Check that everything has ended in time, and no more was outstanding than allowed."""
     for end in rig.ends:
-        assert all(errand.result is not None for errand in end.all)
-        assert max(errand.seconds for errand in end.all) <= rig.bound()
+        assert all(task.result is not None for task in end.all)
+        assert max(task.seconds for task in end.all) <= rig.bound()
         assert end.most_outstanding <= end.settings.max_outstanding
 
 
@@ -165,12 +165,12 @@ def assert_recovers(rig: Rig) -> None:
     for asking, serving in rig.both():
         cmd, body = dialect_of(serving.table.plc_type).read(serving.place(0), 20)
         tns = asking.all[-1].command.tns + 1 & 0xFFFF
-        errand = asking.add(Packet(serving.number, asking.number, cmd, 0, tns, body))
+        task = asking.add(Packet(serving.number, asking.number, cmd, 0, tns, body))
         rig.line.wake(asking.machine)
-        rig.line.run(lambda errand=errand: errand.result is not None, rig.bound())
-        assert isinstance(errand.result, Packet)
+        rig.line.run(lambda task=task: task.result is not None, rig.bound())
+        assert isinstance(task.result, Packet)
         data = dialect_of(serving.table.plc_type).read_data(
-            serving.place(0), 20, errand.result.data)
+            serving.place(0), 20, task.result.data)
         assert data == serving.table.read(serving.place(0), 20)
         assert asking.stations[serving.number].active
 
@@ -187,7 +187,7 @@ def test_counters_of_both_ends_agree_on_a_clean_line(checksum: Checksum, outstan
     assert_bounded(rig)
     for one, other in rig.both():
         sent, received = one.machine.counters, other.machine.counters
-        assert all(isinstance(errand.result, Packet) for errand in one.all)
+        assert all(isinstance(task.result, Packet) for task in one.all)
         assert sent.commands_sent == received.commands_received == 150
         assert sent.replies_sent == received.replies_received == 150
         assert sent.messages_sent == received.messages_received == 300
@@ -209,7 +209,7 @@ def test_noise(rate: float, outstanding: int, chunk: int) -> None:
     rig.run(300)
     assert_exact(rig)
     assert_bounded(rig)
-    replied = sum(isinstance(errand.result, Packet) for end in rig.ends for errand in end.all)
+    replied = sum(isinstance(task.result, Packet) for end in rig.ends for task in end.all)
     assert replied >= {1e-4: 598, 1e-3: 590, 1e-2: 300}[rate]
     assert_recovers(rig)
 
@@ -222,9 +222,9 @@ def test_noise_on_a_line_with_bcc(rate: float, outstanding: int) -> None:
     rig.run(200)
     assert_bounded(rig)
     for asking, serving in rig.both():
-        for errand in asking.all:
-            if isinstance(errand.result, Packet):
-                assert serving.executed[errand.command.tns] == 1
+        for task in asking.all:
+            if isinstance(task.result, Packet):
+                assert serving.executed[task.command.tns] == 1
     assert_recovers(rig)
 
 
@@ -242,7 +242,7 @@ def test_dead_line(outstanding: int) -> None:
     rig = Rig(replace(SETTINGS, max_outstanding=outstanding), noise=Noise(lost=1.0))
     rig.run(5)
     for end in rig.ends:
-        assert all(isinstance(errand.result, StationInactive) for errand in end.all)
+        assert all(isinstance(task.result, StationInactive) for task in end.all)
         assert end.changes == [(6 - end.number, False)]
         assert (end.served, end.counts()['messages_sent']) == ([], 5)
         # A whole cycle of ENQs for the first, none for the probes behind it.
@@ -266,7 +266,7 @@ def test_ack_that_waits_behind_a_long_message_is_awaited() -> None:
     rig.run(100)
     assert_exact(rig)
     for end in rig.ends:
-        assert all(isinstance(errand.result, Packet) for errand in end.all)
+        assert all(isinstance(task.result, Packet) for task in end.all)
 
 
 def test_lost_frame_on_a_line_that_is_faster_than_set_costs_no_more_than_its_retries() -> None:
@@ -294,6 +294,6 @@ def test_both_ends_embed_responses_once_one_does(rate: float, checksum: Checksum
         assert_exact(rig)
     if rate == 0.0:
         assert all(end.counts().get('enq_retries') is None for end in rig.ends)
-        assert sum(isinstance(errand.result, Packet)
-                   for end in rig.ends for errand in end.all) == 400
+        assert sum(isinstance(task.result, Packet)
+                   for end in rig.ends for task in end.all) == 400
     assert_recovers(rig)

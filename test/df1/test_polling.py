@@ -32,7 +32,7 @@ import hypothesis
 from hypothesis import given, strategies
 import pytest
 from support.multidrop import MasterBench
-from support.peers import Errand
+from support.peers import CommandTask
 
 SETTINGS = MasterSettings(
     station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
@@ -45,9 +45,9 @@ def bench(polling: PollingSettings, *, dead: tuple[int, ...] = (),
     return MasterBench(*numbers, settings=settings, polling=polling, dead=dead, **options)
 
 
-def ended(errand: Errand) -> bool:
+def ended(task: CommandTask) -> bool:
     """Tell whether a command has its end."""
-    return errand.result is not None
+    return task.result is not None
 
 
 def polls(rig: MasterBench, count: int) -> list[int]:
@@ -210,17 +210,17 @@ def test_single_and_multiple_messages_per_scan(multiple: bool, expected: list[in
 def test_commands_leave_between_polls_and_complete_in_the_order_of_the_list() -> None:
     rig = bench(PollingSettings((1, 2, 3)))
     order: list[int] = []
-    errands = [rig.ask(number) for number in (3, 2, 1)]
-    for errand in errands:
-        reply = errand.reply
-        errand.reply = lambda packet, reply=reply: (  # type: ignore[method-assign]
+    tasks = [rig.ask(number) for number in (3, 2, 1)]
+    for task in tasks:
+        reply = task.reply
+        task.reply = lambda packet, reply=reply: (  # type: ignore[method-assign]
             order.append(packet.src), reply(packet))[1]
     rig.start()
     rig.run(0.2)
     assert rig.master.said.startswith('C3 C2 C1 P1 P2 P3 P1')
     assert order == [1, 2, 3]
-    assert [errand.result for errand in errands] == [
-        errand.command.reply() for errand in errands]
+    assert [task.result for task in tasks] == [
+        task.command.reply() for task in tasks]
     assert rig.master.numbers() == [(2523, 1), (2523, 2), (2523, 3)]
 
 
@@ -228,16 +228,16 @@ def test_command_that_comes_in_the_middle_of_a_scan_leaves_before_the_next_poll(
     rig = bench(PollingSettings((1, 2, 3)))
     rig.start()
     polls(rig, 2)
-    errand = rig.ask(1)
-    rig.line.run(lambda: ended(errand), 1.0)
+    task = rig.ask(1)
+    rig.line.run(lambda: ended(task), 1.0)
     assert rig.master.said == 'P1 P2 C1 P3 P1 P2'
 
 
 def test_at_most_four_commands_between_two_polls() -> None:
     rig = bench(PollingSettings(tuple(range(10, 20))))
-    errands = [rig.ask(number) for number in range(10, 20)]
+    tasks = [rig.ask(number) for number in range(10, 20)]
     rig.start()
-    rig.line.run(lambda: all(map(ended, errands)), 5.0)
+    rig.line.run(lambda: all(map(ended, tasks)), 5.0)
     assert COMMANDS_BETWEEN_POLLS == 4
     assert rig.master.said.startswith(
         'C10 C11 C12 C13 P10 C14 C15 C16 C17 P11 C18 C19 P12 P13')
@@ -256,9 +256,9 @@ def test_thinking_times_of_stations_run_side_by_side() -> None:
     rig = bench(PollingSettings(tuple(range(10, 20))))
     for slave in rig.slaves.values():
         slave.delay = 0.3
-    errands = [rig.ask(number) for number in rig.slaves]
+    tasks = [rig.ask(number) for number in rig.slaves]
     rig.start()
-    rig.line.run(lambda: all(map(ended, errands)), 5.0)
+    rig.line.run(lambda: all(map(ended, tasks)), 5.0)
     assert rig.clock() < 0.3 + 0.35
 
 
@@ -267,9 +267,9 @@ def test_thinking_times_of_stations_run_side_by_side() -> None:
 def test_in_sequence_commands_leave_at_our_own_place(normal: tuple[int, ...],
                                                      expected: str) -> None:
     rig = bench(PollingSettings(normal, in_sequence=True))
-    errands = [rig.ask(1), rig.ask(2)]
+    tasks = [rig.ask(1), rig.ask(2)]
     rig.start()
-    rig.line.run(lambda: all(map(ended, errands)), 1.0)
+    rig.line.run(lambda: all(map(ended, tasks)), 1.0)
     assert rig.master.said.startswith(expected)
 
 
@@ -277,16 +277,16 @@ def test_in_sequence_commands_leave_at_no_other_place() -> None:
     rig = bench(PollingSettings((1, 5, 2), in_sequence=True))
     rig.start()
     rig.line.run(lambda: rig.master.said.endswith('P1 P2'), 1.0)
-    errand = rig.ask(1)
-    rig.line.run(lambda: ended(errand), 1.0)
+    task = rig.ask(1)
+    rig.line.run(lambda: ended(task), 1.0)
     assert rig.master.said.startswith('P1 P2 P1 C1 P2 P1')
 
 
 def test_our_own_place_may_be_in_the_priority_list() -> None:
     rig = bench(PollingSettings((1, 2), priority=(5,), in_sequence=True))
-    errand = rig.ask(2)
+    task = rig.ask(2)
     rig.start()
-    rig.line.run(lambda: ended(errand), 1.0)
+    rig.line.run(lambda: ended(task), 1.0)
     assert rig.master.said.startswith('C2 P1 P2')
 
 
@@ -303,14 +303,14 @@ def test_our_own_place_is_no_station_of_the_line() -> None:
 
 def test_dead_station_becomes_inactive_after_its_retries_and_its_command_fails() -> None:
     rig = bench(PollingSettings((1, 2)))
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.start()
     rig.line.run(lambda: bool(rig[1].served), 1.0)
     rig.run(0.002)
     rig[1].silent = True
-    rig.line.run(lambda: ended(errand), 5.0)
-    assert isinstance(errand.result, StationInactive)
-    assert errand.sent
+    rig.line.run(lambda: ended(task), 5.0)
+    assert isinstance(task.result, StationInactive)
+    assert task.sent
     assert rig.master.changes == [(1, False)]
     assert rig.master.said == 'C1 P1 P1 P1 P2'
     assert rig.master.counts()['enq_retries'] == SETTINGS.enq_retries
@@ -321,10 +321,10 @@ def test_dead_station_becomes_inactive_after_its_retries_and_its_command_fails()
 
 def test_station_that_does_not_take_its_command_becomes_inactive() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(1,))
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.start()
-    rig.line.run(lambda: ended(errand), 5.0)
-    assert isinstance(errand.result, StationInactive)
+    rig.line.run(lambda: ended(task), 5.0)
+    assert isinstance(task.result, StationInactive)
     assert rig.master.said == 'C1 C1 P2'
     assert rig.master.counts()['nak_retries'] == 1
     rig.forget()
@@ -336,10 +336,10 @@ def test_command_to_an_inactive_station_fails_at_once_and_was_never_sent() -> No
     rig.start(1)
     polls(rig, 2)
     rig.forget()
-    errand = rig.ask(1)
+    task = rig.ask(1)
     polls(rig, 1)
-    assert isinstance(errand.result, StationInactive)
-    assert not errand.sent
+    assert isinstance(task.result, StationInactive)
+    assert not task.sent
     assert 'C1' not in rig.master.said
 
 
@@ -352,9 +352,9 @@ def test_any_answer_makes_a_station_active(answer: str) -> None:
     polls(rig, 3)
     assert rig.master.changes == [(1, True)]
     assert len(rig.master.served) == (answer == 'message')
-    errand = rig.ask(1)
-    rig.line.run(lambda: ended(errand), 1.0)
-    assert isinstance(errand.result, Packet)
+    task = rig.ask(1)
+    rig.line.run(lambda: ended(task), 1.0)
+    assert isinstance(task.result, Packet)
 
 
 def test_inactive_station_gets_no_second_poll_and_no_retry_counts() -> None:
@@ -369,11 +369,11 @@ def test_inactive_station_gets_no_second_poll_and_no_retry_counts() -> None:
 def test_command_timeout_is_noticed_at_the_stations_own_poll() -> None:
     rig = bench(PollingSettings((1, 2)))
     rig[1].delay = 1.0
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.start()
-    rig.line.run(lambda: ended(errand), 2.0)
-    assert isinstance(errand.result, CommandTimeout)
-    assert SETTINGS.cmd_timeout <= errand.seconds < SETTINGS.cmd_timeout + 0.05
+    rig.line.run(lambda: ended(task), 2.0)
+    assert isinstance(task.result, CommandTimeout)
+    assert SETTINGS.cmd_timeout <= task.seconds < SETTINGS.cmd_timeout + 0.05
     assert rig.master.counts()['command_timeouts'] == 1
     assert rig.master.numbers() == [(2508,)]
     assert rig.master.stations[1].active
@@ -383,38 +383,38 @@ def test_command_timeout_is_noticed_at_the_stations_own_poll() -> None:
 def test_reply_that_comes_after_its_time_is_stale() -> None:
     rig = bench(PollingSettings((1,)))
     rig[1].delay = 0.7
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.start()
     rig.run(1.0)
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
     assert rig.master.counts()['stale_messages'] == 1
-    assert rig.master.numbers() == [(2508,), (2510, 1, 5, errand.command.tns)]
+    assert rig.master.numbers() == [(2508,), (2510, 1, 5, task.command.tns)]
 
 
 def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, cmd_timeout=0.001))
     rig[1].delay = 0.1  # the first reply comes late, on a line too slow for Cmd_Timeout
-    errands = [rig.ask(1) for _ in range(4)]
+    tasks = [rig.ask(1) for _ in range(4)]
     rig.start()
-    rig.line.run(lambda: ended(errands[0]), 2.0)
-    assert isinstance(errands[0].result, CommandTimeout)
+    rig.line.run(lambda: ended(tasks[0]), 2.0)
+    assert isinstance(tasks[0].result, CommandTimeout)
     rig[1].delay = 0.0
     rig.run(1.0)
-    assert [errand.result for errand in errands[1:]] == [
-        errand.command.reply() for errand in errands[1:]]
+    assert [task.result for task in tasks[1:]] == [
+        task.command.reply() for task in tasks[1:]]
     assert rig.master.counts()['stale_messages'] == 1
 
 
 def test_station_that_never_stops_sending_does_not_hold_off_the_command_timeout() -> None:
     rig = bench(PollingSettings((1,)), settings=replace(SETTINGS, cmd_timeout=0.001))
     setattr(rig[1], '_execute', lambda command: replace(command.reply(), tns=0))
-    errand = rig.ask(1)
+    task = rig.ask(1)
     for _ in range(3 * MOST_QUEUED):
         rig.message(1, 5)
     rig.start()
     rig.run(2.0)
-    assert isinstance(errand.result, CommandTimeout)
-    polled = [when for when in rig.master.times('P1') if when <= (errand.ended or 0.0)]
+    assert isinstance(task.result, CommandTimeout)
+    polled = [when for when in rig.master.times('P1') if when <= (task.ended or 0.0)]
     assert len(polled) == MOST_QUEUED + 1
 
 
@@ -425,9 +425,9 @@ def test_next_command_may_leave_after_a_timeout() -> None:
     rig.start()
     rig.run(0.6)
     rig[1].delay = 0.0
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.run(0.5)
-    assert errand.result == errand.command.reply()
+    assert task.result == task.command.reply()
 
 
 def test_nak_is_never_sent_whatever_the_setting() -> None:
@@ -444,24 +444,24 @@ def test_nak_is_never_sent_whatever_the_setting() -> None:
 def test_reply_with_a_wrong_command_code() -> None:
     rig = bench(PollingSettings((1,)))
     rig[1].slave._serve = lambda command: replace(command.reply(), cmd=0x46)
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.start()
     rig.run(0.2)
-    assert isinstance(errand.result, WrongCommandCode)
+    assert isinstance(task.result, WrongCommandCode)
     assert rig.master.numbers() == [(2505, 1, 0x46, 0x4F)]
     assert rig.master.counts()['invalid_messages'] == 1
 
 
 def test_broadcast_goes_once_and_nobody_is_polled_for_it() -> None:
     rig = bench(PollingSettings((1, 2)))
-    errand = rig.ask(BROADCAST)
+    task = rig.ask(BROADCAST)
     rig.start()
     rig.run(0.2)
     log = rig.master.machine.log
     assert [text for _, text in log[:2]] == ['C255', 'P1']
     assert log[1][0] - log[0][0] >= BROADCAST_PAUSE
-    assert errand.result == errand.command.reply()
-    assert errand.sent
+    assert task.result == task.command.reply()
+    assert task.sent
     assert [len(slave.served) for slave in rig.slaves.values()] == [1, 1]
     assert rig.master.said.count('C255') == 1
     assert [station.number for station in rig.master.stations] == [1, 2]
@@ -473,9 +473,9 @@ def test_broadcast_without_any_station_to_poll(in_sequence: bool) -> None:
     rig.start()
     rig.run(1.0)
     assert rig.master.said == ''
-    errand = rig.ask(BROADCAST)
+    task = rig.ask(BROADCAST)
     rig.run(0.2)
-    assert errand.result == errand.command.reply()
+    assert task.result == task.command.reply()
     assert rig.master.said == 'C255'
 
 
@@ -484,9 +484,9 @@ def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
     rig.start(1)
     rig.master.stations.heard(77, 0.0)  # lives, but is in no list
     rig.run(0.3)
-    errand = rig.ask(BROADCAST)
+    task = rig.ask(BROADCAST)
     rig.run(0.2)
-    assert ended(errand)
+    assert ended(task)
 
 
 def test_scan_times() -> None:
@@ -539,9 +539,9 @@ def replies_of(polling: PollingSettings | None, delay: float) -> int:
     while rig.clock() < 15.0:
         rig.line.run(lambda waiting=waiting: any(map(ended, waiting)), 5.0)
         done += filter(ended, waiting)
-        waiting = [rig.ask(errand.command.dst) if ended(errand) else errand
-                   for errand in waiting]
-    assert all(errand.result == errand.command.reply() for errand in done)
+        waiting = [rig.ask(task.command.dst) if ended(task) else task
+                   for task in waiting]
+    assert all(task.result == task.command.reply() for task in done)
     assert rig.master.changes == []
     assert not {'stale_messages', 'invalid_messages'} & rig.master.counts().keys()
     return len(done)
@@ -558,16 +558,16 @@ def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
         is_waited_for: bool) -> None:
     rig = bench(PollingSettings((1, 2)), dead=(2,))
     rig[1].delay = 9.0
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.start()
     rig.line.run(lambda: 'P2' in rig.master.said, 1.0)
     begun = rig.clock()
-    late = errand.command.reply() if is_waited_for else Packet(5, 1, 0x4F, 0, 0x77)
+    late = task.command.reply() if is_waited_for else Packet(5, 1, 0x4F, 0, 0x77)
     rig.master.machine.receive_data(message_frame(late.encode(), Checksum.CRC), begun + 0.05)
     assert rig.master.stations[1].last_heard == begun + 0.05
     assert rig.master.stations[2].last_heard is None
     assert rig.master.machine.data_to_send() == b''  # its ACK would be taken for station 2's
-    assert ended(errand) is is_waited_for
+    assert ended(task) is is_waited_for
     counts = rig.master.counts()
     assert counts['messages_received'] == counts['replies_received'] == 1
     assert counts.get('stale_messages', 0) == (not is_waited_for)
@@ -579,11 +579,11 @@ def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
 def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, enq_retries=3))
     setattr(rig.line, '_propagation', 0.06)
-    errands = [rig.ask(1), rig.ask(2)]
+    tasks = [rig.ask(1), rig.ask(2)]
     rig.start()
     rig.run(3.0)
-    assert [errand.result for errand in errands] == [
-        errand.command.reply() for errand in errands]
+    assert [task.result for task in tasks] == [
+        task.command.reply() for task in tasks]
     assert rig[1].slave.counters.acks_received + rig[2].slave.counters.acks_received == 2
     assert [len(rig[number].served) for number in (1, 2)] == [1, 1]
 
@@ -593,11 +593,11 @@ def test_command_to_a_station_that_is_never_polled_ends_by_the_clock(number: int
     rig = bench(PollingSettings((1, 2, 5)))
     rig.slaves[number] = type(rig[1])(number, rig.clock)  # another with our address, or unlisted
     rig.far._make_procedure = multidrop(list(rig.slaves.values()))
-    errand = rig.ask(number)
+    task = rig.ask(number)
     rig.start()
-    rig.line.run(lambda: ended(errand), 2.0)
-    assert isinstance(errand.result, CommandTimeout)
-    assert SETTINGS.cmd_timeout <= errand.seconds < SETTINGS.cmd_timeout + 0.1
+    rig.line.run(lambda: ended(task), 2.0)
+    assert isinstance(task.result, CommandTimeout)
+    assert SETTINGS.cmd_timeout <= task.seconds < SETTINGS.cmd_timeout + 0.1
     assert rig.master.numbers() == [(2508,)]
 
 
@@ -622,9 +622,9 @@ def test_start_is_a_clean_one() -> None:
     rig.run(0.1)
     rig.master.machine.stop(PortLost('unplugged'))
     rig.master.machine.start(rig.clock())
-    errand = rig.ask(1)
+    task = rig.ask(1)
     rig.run(0.5)
-    assert errand.result == errand.command.reply()
+    assert task.result == task.command.reply()
     assert rig.master.counts()['stale_messages'] == 1
 
 
@@ -632,10 +632,10 @@ def test_station_that_always_has_a_message_does_not_keep_the_line() -> None:
     rig = bench(PollingSettings((1, 2), multiple=True))
     for number in range(5000):
         rig[1].outbox.append(Packet(5, 1, 0x4F, 0, number))  # replies to nothing
-    errands = [rig.ask(2) for _ in range(10)]
+    tasks = [rig.ask(2) for _ in range(10)]
     rig.start()
     rig.run(3.0)
-    assert all(isinstance(errand.result, Packet) for errand in errands)
+    assert all(isinstance(task.result, Packet) for task in tasks)
 
 
 def test_one_visit_takes_no_more_messages_than_may_be_queued_before_a_reply() -> None:
@@ -660,7 +660,7 @@ def test_multiple_messages_stop_when_no_more_can_be_kept() -> None:
 def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> None:
     rig = bench(PollingSettings((1, 2)))
     rig[2].delay = 0.4
-    errand = rig.ask(2)
+    task = rig.ask(2)
     rig.start()
     rig.run(0.1)
     rig[2].deaf = True  # takes no more commands, and then dies
@@ -668,7 +668,7 @@ def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> No
     rig.line.run(lambda: (2, False) in rig.master.changes, 5.0)
     rig[2].silent = True
     rig.run(1.0)
-    assert isinstance(errand.result, StationInactive)
+    assert isinstance(task.result, StationInactive)
     assert [reply.sts for reply in rig[1].heard] == [2]
 
 
@@ -681,14 +681,14 @@ def test_every_command_ends_once_and_order_per_station_is_kept(
     polling = PollingSettings(
         tuple(range(11, 19)), tuple(range(19, 23)), group_size, multiple, in_sequence)
     rig = bench(polling, dead=tuple(dead))
-    errands = [rig.ask(number) for number in asked]
+    tasks = [rig.ask(number) for number in asked]
     rig.start()
-    rig.line.run(lambda: all(map(ended, errands)), 60.0)
-    for errand in errands:
-        kind = StationInactive if errand.command.dst in dead else Packet
-        assert isinstance(errand.result, kind)
+    rig.line.run(lambda: all(map(ended, tasks)), 60.0)
+    for task in tasks:
+        kind = StationInactive if task.command.dst in dead else Packet
+        assert isinstance(task.result, kind)
     for number, slave in rig.slaves.items():
-        mine = [errand.command for errand in errands if errand.command.dst == number]
+        mine = [task.command for task in tasks if task.command.dst == number]
         assert slave.served == ([] if number in dead else mine)
     gap = 0
     for _, text in rig.master.machine.log:

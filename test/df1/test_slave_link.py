@@ -40,14 +40,14 @@ def own(tns: int = 1, dst: int = OTHER) -> Packet:
 
 def test_command_leaves_at_a_poll_and_its_reply_ends_it() -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.wait(1.0)
     assert bench.poll() == bench.own(own())
-    assert errand.sent and errand.result is None
+    assert task.sent and task.result is None
     assert bench.hear(ACK) == b''
     assert bench.poll() == EOT
     assert bench.hear(bench.frame(own().reply(b'\x01'))) == ACK
-    assert errand.result == own().reply(b'\x01')
+    assert task.result == own().reply(b'\x01')
     assert bench.numbers() == [(2523, OTHER)]
     assert bench.counts() == {
         'polls_received': 2, 'messages_sent': 1, 'commands_sent': 1, 'acks_received': 1,
@@ -70,7 +70,7 @@ def test_one_command_is_outstanding() -> None:
 
 def test_commands_and_replies_take_turns() -> None:
     bench = SlaveBench(SETTINGS)
-    errands = [bench.add(own(number)) for number in (1, 2)]
+    tasks = [bench.add(own(number)) for number in (1, 2)]
     served = [replace(FROM_MASTER, tns=tns) for tns in (0x11, 0x12, 0x13)]
     for command in served:
         assert bench.hear(bench.frame(command)) == ACK
@@ -82,7 +82,7 @@ def test_commands_and_replies_take_turns() -> None:
         bench.hear(ACK, bench.frame(own(number).reply()))
     assert said == [bench.own(own(1)), bench.own(served[0].reply()),
                     bench.own(own(2)), bench.own(served[1].reply())]
-    assert all(errand.result is not None for errand in errands)
+    assert all(task.result is not None for task in tasks)
     assert bench.poll() == bench.own(served[2].reply())
 
 
@@ -136,29 +136,29 @@ def test_what_is_wrong_with_messages_for_us_is_told_by_number() -> None:
 
 def test_nak_leaves_a_command_that_the_master_has_taken() -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK, NAK)
-    assert errand.result is None
+    assert task.result is None
     bench.hear(bench.frame(own().reply()))
-    assert errand.result == own().reply()
+    assert task.result == own().reply()
 
 
 @pytest.mark.parametrize('traffic', [poll_frame(OTHER), EOT, message_frame(
     FROM_MASTER.reply().encode(), Checksum.CRC), poll_frame(US)[:-1] + b'\x01'])
 def test_ack_after_any_other_traffic_is_another_stations(traffic: bytes) -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(traffic, ACK)
     assert bench.poll() == bench.own(own())
     assert bench.counts()['nak_retries'] == 1
-    assert errand.result is None
+    assert task.result is None
 
 
 def test_our_own_voice_on_a_two_wire_adapter_is_no_other_traffic() -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     said = bench.poll()
     assert bench.hear(said) == b''
     bench.hear(ACK)
@@ -166,18 +166,18 @@ def test_our_own_voice_on_a_two_wire_adapter_is_no_other_traffic() -> None:
     assert bench.hear(EOT) == b''
     assert bench.hear(bench.frame(own().reply())) == ACK
     assert bench.hear(ACK) == b''  # that was us, too
-    assert errand.result == own().reply()
+    assert task.result == own().reply()
     assert bench.counts()['acks_received'] == 1
 
 
 def test_reply_with_a_wrong_command_code() -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK)
     assert bench.hear(bench.frame(replace(own().reply(), cmd=0x46))) == ACK
-    assert isinstance(errand.result, WrongCommandCode)
-    assert errand.result.args == (OTHER, 0x46, 0x4F)
+    assert isinstance(task.result, WrongCommandCode)
+    assert task.result.args == (OTHER, 0x46, 0x4F)
     assert bench.numbers() == [(2505, OTHER, 0x46, 0x4F)]
     assert bench.counts()['invalid_messages'] == 1
 
@@ -186,11 +186,11 @@ def test_reply_with_a_wrong_command_code() -> None:
     own(2).reply(), replace(own().reply(), src=9), replace(own().reply(), dst=9)])
 def test_reply_that_fits_nothing_is_stale(reply: Packet) -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK)
     assert bench.hear(bench.frame(reply)) == ACK
-    assert errand.result is None
+    assert task.result is None
     assert bench.numbers() == [(2510, reply.src, reply.dst, reply.tns)]
     assert bench.counts()['stale_messages'] == 1
 
@@ -212,33 +212,33 @@ def test_repeated_reply_is_acknowledged_and_passed_over() -> None:
 
 def test_reply_is_taken_by_a_sink_that_is_full_of_others() -> None:
     bench = SlaveBench(replace(SETTINGS, queue_size=1))
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK)
     assert bench.hear(bench.frame(FROM_MASTER)) == ACK
     assert bench.hear(bench.frame(replace(FROM_MASTER, tns=9))) == b''
     assert bench.hear(bench.frame(own().reply())) == ACK
-    assert errand.result == own().reply()
+    assert task.result == own().reply()
 
 
 def test_reply_with_an_error_is_counted_and_handed_on() -> None:
     bench = SlaveBench(SETTINGS)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK, bench.frame(own().reply(sts=2)))
-    assert errand.result == own().reply(sts=2)
+    assert task.result == own().reply(sts=2)
     assert bench.counts()['error_messages_received'] == 1
 
 
 @pytest.mark.parametrize('busy', [False, True])
 def test_command_timeout_runs_from_the_masters_ack(busy: bool) -> None:
     bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.wait(3.0)
     for _ in range(2):  # it is still held, and waits for its ACK as long as the master polls
         bench.poll()
         bench.wait(0.7)
-    assert errand.result is None
+    assert task.result is None
     bench.poll()
     bench.hear(ACK)
     begun = bench.now
@@ -246,31 +246,31 @@ def test_command_timeout_runs_from_the_masters_ack(busy: bool) -> None:
         bench.listen(2.0, OTHERS_TRAFFIC, 0.01)
     else:
         bench.wait(2.0)
-    assert isinstance(errand.result, CommandTimeout)
-    assert errand.ended is not None
-    assert 1.0 <= errand.ended - begun <= 1.26
+    assert isinstance(task.result, CommandTimeout)
+    assert task.ended is not None
+    assert 1.0 <= task.ended - begun <= 1.26
     assert bench.numbers() == [(2508,)]
     assert bench.counts()['command_timeouts'] == 1
 
 
 def test_command_without_ack_is_not_kept_for_a_master_that_is_gone() -> None:
     bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.wait(1.3)
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
     assert bench.numbers() == [(2508,)]
     assert EOT in bench.poll()
 
 
 def test_reply_that_comes_after_its_time_is_stale() -> None:
     bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK)
     bench.wait(2.0)
     bench.hear(bench.frame(own().reply()))
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
     assert bench.numbers() == [(2508,), (2510, OTHER, US, 1)]
 
 
@@ -279,48 +279,48 @@ def test_poll_timeout_fails_what_waits(busy: bool) -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=2.0)
     bench.wait(1.0)
     assert bench.poll() == EOT
-    errands = [bench.add(own(number)) for number in range(3)]
+    tasks = [bench.add(own(number)) for number in range(3)]
     polled = bench.now
     if busy:
         bench.listen(1.9, OTHERS_TRAFFIC, 0.01)
     else:
         bench.wait(1.9)
-    assert [errand.result for errand in errands] == [None] * 3
+    assert [task.result for task in tasks] == [None] * 3
     if busy:
         bench.listen(0.5, OTHERS_TRAFFIC, 0.01)
     else:
         bench.wait(0.5)
-    for errand in errands:
-        assert isinstance(errand.result, CommandTimeout)
-        assert not errand.sent
-        assert errand.ended is not None and 2.0 <= errand.ended - polled <= 2.26
+    for task in tasks:
+        assert isinstance(task.result, CommandTimeout)
+        assert not task.sent
+        assert task.ended is not None and 2.0 <= task.ended - polled <= 2.26
     assert bench.poll() == EOT
 
 
 def test_poll_timeout_begins_at_the_start() -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=2.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.wait(1.9)
-    assert errand.result is None
+    assert task.result is None
     bench.wait(0.5)
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
 
 
 def test_poll_timeout_zero_is_never() -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=0.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.wait(10_000.0)
-    assert errand.result is None
+    assert task.result is None
     assert bench.poll() == bench.own(own())
 
 
 def test_held_command_is_not_sent_any_more_after_the_poll_timeout() -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=2.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.wait(3.0)
-    assert isinstance(errand.result, CommandTimeout)
-    assert errand.sent
+    assert isinstance(task.result, CommandTimeout)
+    assert task.sent
     assert bench.poll() == EOT
 
 
@@ -334,33 +334,33 @@ def test_held_reply_survives_the_poll_timeout() -> None:
 
 def test_poll_timeout_fails_a_command_that_waits_for_its_reply() -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=2.0, cmd_timeout=100.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     bench.hear(ACK)
     bench.wait(3.0)
-    assert isinstance(errand.result, CommandTimeout)
+    assert isinstance(task.result, CommandTimeout)
 
 
 @pytest.mark.parametrize('busy', [False, True])
 def test_waiting_commands_expire_although_we_are_never_polled(busy: bool) -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=60.0, patience=1.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     if busy:
         bench.listen(1.5, OTHERS_TRAFFIC, 0.01)
     else:
         bench.wait(1.5)
-    assert isinstance(errand.result, CommandTimeout)
-    assert not errand.sent
+    assert isinstance(task.result, CommandTimeout)
+    assert not task.sent
 
 
 def test_broadcast_of_ours_is_done_when_the_master_has_it() -> None:
     bench = SlaveBench(SETTINGS)
     command = own(dst=BROADCAST)
-    errand, later = bench.add(command), bench.add(own(2))
+    task, later = bench.add(command), bench.add(own(2))
     assert bench.poll() == bench.own(command)
-    assert errand.result is None
+    assert task.result is None
     bench.hear(ACK)
-    assert errand.result == command.reply()
+    assert task.result == command.reply()
     # The master sends it to all, and we are one of them.
     assert bench.hear(bench.frame(command, BROADCAST)) == b''
     assert bench.served == [command]
@@ -378,13 +378,13 @@ def test_broadcast_is_executed_by_a_sink_that_is_full() -> None:
 
 def test_start_is_a_clean_one() -> None:
     bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
-    errand = bench.add(own(1))
+    task = bench.add(own(1))
     bench.hear(bench.frame(FROM_MASTER))
     bench.poll()
     bench.machine.stop(PortLost('unplugged'))
     bench.wait(5.0)
     bench.machine.start(bench.now)
-    assert errand.result is None  # whoever has the tasks ends them
+    assert task.result is None  # whoever has the tasks ends them
     later = bench.add(own(2))
     assert bench.poll() == bench.own(own(2))
     assert bench.hear(ACK, bench.frame(own(2).reply())) == ACK
@@ -482,15 +482,15 @@ def test_noise_during_tx_delay_does_not_take_the_answer_away() -> None:
 
 def test_what_is_overdue_ends_in_time_during_a_long_tx_delay() -> None:
     bench = SlaveBench(SETTINGS, timing=LineTiming(tx_delay=30.0), cmd_timeout=1.0)
-    errand = bench.add(own())
+    task = bench.add(own())
     bench.poll()
     assert said_within(bench, 30.1) == [(30.0, bench.own(own()))]
     bench.hear(ACK)
     begun = bench.now
     bench.poll()
     assert said_within(bench, 29.0) == []
-    assert isinstance(errand.result, CommandTimeout)
-    assert errand.ended is not None and 1.0 <= errand.ended - begun <= 1.26
+    assert isinstance(task.result, CommandTimeout)
+    assert task.ended is not None and 1.0 <= task.ended - begun <= 1.26
 
 
 def test_frame_that_breaks_off_does_not_swallow_the_next_one() -> None:
@@ -509,10 +509,10 @@ def test_bytes_come_one_by_one() -> None:
 
 def test_eot_suppression() -> None:
     bench = SlaveBench(replace(SETTINGS, eot_suppression=True))
-    errand = bench.add(own())
+    task = bench.add(own())
     assert bench.poll() == bench.own(own())
     bench.hear(ACK)
     assert bench.poll() == b''
-    assert errand.result is None
+    assert task.result is None
     assert bench.counts()['polls_received'] == 2
     assert 'eots_sent' not in bench.counts()

@@ -174,7 +174,7 @@ def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
     assert order == [*writes[:4], job, *writes[4:8], job, *writes[8:]]
 
 
-def nine_packets() -> Steps:
+def nine_packets() -> Steps[None]:
     """Yield as many requests."""
     for _ in range(9):
         yield 0x0F, b''

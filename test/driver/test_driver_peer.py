@@ -36,7 +36,7 @@ from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
-from support.peers import Errand
+from support.peers import CommandTask
 from support.virtual_line import Noise, QUIET, VirtualLine
 
 US, PLC = 5, 1
@@ -99,11 +99,11 @@ class Bench:
         place = parse_address(text, self._family)
         self._tns += 1
         cmd, body = dialect.read(place, words)
-        errand = Errand(Packet(US, PLC, cmd, 0, self._tns, body), self.clock)
-        self.plc.outbox.append(errand)  # type: ignore[arg-type]
+        task = CommandTask(Packet(US, PLC, cmd, 0, self._tns, body), self.clock)
+        self.plc.outbox.append(task)  # type: ignore[arg-type]
         self.line.wake(self.far)
-        self.line.run(lambda: errand.result is not None, 5.0)
-        reply = errand.result
+        self.line.run(lambda: task.result is not None, 5.0)
+        reply = task.result
         assert isinstance(reply, Packet), reply
         return reply.sts, dialect.read_data(place, words, reply.data) if not reply.sts else b''
 

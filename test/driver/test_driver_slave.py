@@ -36,7 +36,7 @@ import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
 from support.multidrop import MasterNode
-from support.peers import Errand
+from support.peers import CommandTask
 from support.virtual_line import char_time, Noise, QUIET, VirtualLine
 
 MASTER, US, PLC = 9, 3, 1
@@ -78,7 +78,7 @@ class Bench:
         self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
 
-    def ask(self, request: Request, station: int = US) -> Errand:
+    def ask(self, request: Request, station: int = US) -> CommandTask:
         """Let the master send a command."""
         self._tns += 1
         cmd, body = request
@@ -87,11 +87,11 @@ class Bench:
     def master_reads(self, text: str, words: int) -> bytes:
         """Return words that the master reads from us."""
         place = parse_address(text, SLC)
-        errand = self.ask(DIALECT.read(place, words))
-        self.line.run(lambda: errand.result is not None, 5.0)
-        assert isinstance(errand.result, Packet)
-        assert errand.result.sts == 0
-        return DIALECT.read_data(place, words, errand.result.data)
+        task = self.ask(DIALECT.read(place, words))
+        self.line.run(lambda: task.result is not None, 5.0)
+        assert isinstance(task.result, Packet)
+        assert task.result.sts == 0
+        return DIALECT.read_data(place, words, task.result.data)
 
 
 def serve_row(text: str, length: int = 1) -> Mapping:
@@ -229,10 +229,10 @@ def test_processor_of_a_station_behind_the_master() -> None:
 def test_master_reads_and_resets_the_counters_that_we_show() -> None:
     bench = Bench([serve_row('N7:50')])
     assert bench.master_reads('N7:50', 1) == b'\0\0'
-    errands = [bench.ask((0x06, data))
+    tasks = [bench.ask((0x06, data))
                for data in (b'\x01\0\0\x1A', b'\x07', b'\x01\0\0\x1A')]
     bench.run(1.0)
-    replies = [errand.result for errand in errands]
+    replies = [task.result for task in tasks]
     assert [reply.sts for reply in replies if isinstance(reply, Packet)] == [0, 0, 0]
     before, reset, after = (reply.data for reply in replies if isinstance(reply, Packet))
     assert (int.from_bytes(before[4:6], 'little'), reset) == (2, b'')  # messages received

@@ -34,7 +34,7 @@ class Job:
         self.replies: list[bytes] = []
         self.errors: list[LinkError] = []
 
-    def steps(self) -> Steps:
+    def steps(self) -> Steps[None]:
         """Ask twice."""
         try:
             for data in (b'a', b'b'):
@@ -89,7 +89,7 @@ def test_all_jobs_end_with_the_port() -> None:
 
 
 def test_error_in_a_job_ends_it() -> None:
-    def steps() -> Steps:
+    def steps() -> Steps[None]:
         yield 0x0F, b''
         raise ZeroDivisionError
 

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.driver.transactions import (
     carry_out,
@@ -45,14 +46,14 @@ def reply(data: bytes = b'', sts: int = 0) -> Packet:
     return Packet(5, 1, 0x4F, sts, 1, data)
 
 
-def converse(order: Generator[Request, Packet, object],
+def converse(steps: Steps[object],
              answers: Sequence[Packet | LinkError]) -> tuple[list[Request], object]:
-    """Return the requests of an order that gets these answers, and its result."""
-    requests = [next(order)]
+    """Return the requests of steps that get these answers, and their result."""
+    requests = [next(steps)]
     for answer in answers:
         try:
-            requests.append(order.throw(answer) if isinstance(answer, LinkError)
-                            else order.send(answer))
+            requests.append(steps.throw(answer) if isinstance(answer, LinkError)
+                            else steps.send(answer))
         except StopIteration as end:
             return requests, end.value
     raise AssertionError(f'it wants more: {requests}')

@@ -275,8 +275,8 @@ def test_conversation_of_a_master_and_two_slaves(noise: Noise) -> None:
     bench.start()
     for _ in range(60):
         for number in (1, 2):
-            errand = bench.ask(number)
-            bench.line.run(lambda errand=errand: errand.result is not None, 60.0)
+            task = bench.ask(number)
+            bench.line.run(lambda task=task: task.result is not None, 60.0)
     session = Session()
     entries = [entry for chunk in heard for entry in session.feed(chunk)]
     entries += session.finish()

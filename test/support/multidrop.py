@@ -32,35 +32,35 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandTimeout, LinkError
 from abdf1_ros.messages import Event
-from support.peers import Errand
+from support.peers import CommandTask
 from support.virtual_line import char_time, VirtualLine
 
 Serve = Callable[[Packet], Packet]
 
 
-class Errands:
+class CommandTasks:
     """Commands that wait for a link; after ``patience`` s of waiting they fail."""
 
     def __init__(self, clock: Callable[[], float], patience: float = float('inf')) -> None:
         self.clock = clock
-        self.waiting: deque[Errand] = deque()
-        self.all: list[Errand] = []
+        self.waiting: deque[CommandTask] = deque()
+        self.all: list[CommandTask] = []
         self.patience = patience
 
-    def add(self, command: Packet) -> Errand:
+    def add(self, command: Packet) -> CommandTask:
         """Queue a command."""
-        errand = Errand(command, self.clock)
-        self.waiting.append(errand)
-        self.all.append(errand)
-        return errand
+        task = CommandTask(command, self.clock)
+        self.waiting.append(task)
+        self.all.append(task)
+        return task
 
-    def next_task(self, now: float, busy: Container[int] = ()) -> Errand | None:
+    def next_task(self, now: float, busy: Container[int] = ()) -> CommandTask | None:
         """Return the next command for a station that is not busy."""
         self.expire(now)
-        for errand in self.waiting:
-            if errand.command.dst not in busy:
-                self.waiting.remove(errand)
-                return errand
+        for task in self.waiting:
+            if task.command.dst not in busy:
+                self.waiting.remove(task)
+                return task
         return None
 
     def next_due(self) -> float | None:
@@ -105,7 +105,7 @@ def _text(symbol: Symbol) -> str:
     return symbol.code.name
 
 
-class MasterNode(Errands):
+class MasterNode(CommandTasks):
     """A master with message-based polling, or with the standard one where ``polling`` is given."""
 
     def __init__(self, settings: MasterSettings, clock: Callable[[], float],
@@ -237,12 +237,12 @@ class MasterBench:
         """Return a station."""
         return self.slaves[number]
 
-    def ask(self, number: int, master: int = 5, cmd: int = 0x0F) -> Errand:
+    def ask(self, number: int, master: int = 5, cmd: int = 0x0F) -> CommandTask:
         """Queue a command of the master."""
         self._tns += 1
-        errand = self.master.add(Packet(number, master, cmd, 0, self._tns, b'\x68'))
+        task = self.master.add(Packet(number, master, cmd, 0, self._tns, b'\x68'))
         self.line.wake(self.master.machine)
-        return errand
+        return task
 
     def message(self, src: int, dst: int) -> Packet:
         """Let a slave send a command of its own."""
@@ -268,7 +268,7 @@ class MasterBench:
         self.master.machine.sent.clear()
 
 
-class SlaveNode(Errands):
+class SlaveNode(CommandTasks):
     """A slave that is a driver of its own, on a machine of its own."""
 
     def __init__(self, settings: SlaveSettings, clock: Callable[[], float], *,

@@ -33,7 +33,7 @@ _PRECISION = 6  # digits of a second
 _MOST_STEPS = 10_000
 
 
-class Errand:
+class CommandTask:
     """A task that remembers how and when it ended."""
 
     def __init__(self, command: Packet, clock: Callable[[], float]) -> None:
@@ -66,7 +66,7 @@ class Errand:
 
 
 class PeerNode:
-    """A peer with its machine, its errands, and all that it has done."""
+    """A peer with its machine, its tasks, and all that it has done."""
 
     def __init__(self, settings: PeerSettings, clock: Callable[[], float], *,
                  timing: LineTiming | None = None,
@@ -75,8 +75,8 @@ class PeerNode:
         self.events: list[Event] = []
         self.changes: list[tuple[int, bool]] = []
         self.served: list[Packet] = []
-        self.under_way: list[Errand] = []
-        self.errands: deque[Errand] = deque()
+        self.under_way: list[CommandTask] = []
+        self.tasks: deque[CommandTask] = deque()
         self.stations = ActiveStationList(
             on_change=lambda station: self.changes.append((station.number, station.active)))
         self.machine = Machine(
@@ -94,23 +94,23 @@ class PeerNode:
         self.served.append(command)
         return self._execute(command)
 
-    def add(self, command: Packet) -> Errand:
+    def add(self, command: Packet) -> CommandTask:
         """Queue a command."""
         self.stations.add((command.dst,))
-        errand = Errand(command, self.clock)
-        self.errands.append(errand)
-        return errand
+        task = CommandTask(command, self.clock)
+        self.tasks.append(task)
+        return task
 
-    def next_task(self, now: float, busy: Container[int] = ()) -> Errand | None:
+    def next_task(self, now: float, busy: Container[int] = ()) -> CommandTask | None:
         """Return the next command."""
-        if not self.errands or self.errands[0].command.dst in busy:
+        if not self.tasks or self.tasks[0].command.dst in busy:
             return None
-        errand = self.errands.popleft()
-        errand.begun = now
+        task = self.tasks.popleft()
+        task.begun = now
         self.under_way = [other for other in self.under_way if other.result is None]
-        self.under_way.append(errand)
+        self.under_way.append(task)
         self.most_outstanding = max(self.most_outstanding, len(self.under_way))
-        return errand
+        return task
 
     def next_due(self) -> float | None:
         """Return None: there is something to do when there is."""
@@ -147,11 +147,11 @@ class PeerBench(PeerNode):
         """Return a message as it stands on this line."""
         return message_frame(packet.encode(), self.settings.checksum)
 
-    def begin(self, command: Packet) -> Errand:
+    def begin(self, command: Packet) -> CommandTask:
         """Queue a command, and wake the peer."""
-        errand = self.add(command)
+        task = self.add(command)
         self.machine.wake(self.now)
-        return errand
+        return task
 
     def said(self) -> bytes:
         """Return what goes out now."""

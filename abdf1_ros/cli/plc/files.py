@@ -25,7 +25,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.driver.errands import Order
+from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import dialect_of, family_of, file_types_of, layout_of
@@ -115,13 +115,13 @@ def _type_by_reply(session: Session, station: int, number: int) -> FileType | No
                  if layout_of(kind, PlcType.PLC5).code == data.type_id), None)
 
 
-def _first_element(number: int) -> Order[TypedData]:
+def _first_element(number: int) -> Steps[TypedData]:
     address = Address(family_of(PlcType.PLC5).addressing, FileType.INTEGER, number, 0)
     reply = yield dialect_of(PlcType.PLC5).read(address, 1)
     return TypedData.decode(check_status(reply))
 
 
-def _element(address: Address) -> Order[bytes]:
+def _element(address: Address) -> Steps[bytes]:
     dialect, words = dialect_of(address.plc_type), address.layout.words
     reply = yield dialect.read(address, words)
     return dialect.read_data(address, words, check_status(reply))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An open line on which one order is carried out after the other."""
+"""An open line on which one request is carried out after the other."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from typing import TypeVar
 from abdf1_ros.cli.terminal import reason_of
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
-from abdf1_ros.driver.errands import Errands, Order
+from abdf1_ros.driver.job_tasks import Steps
+from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -66,9 +67,9 @@ class Session:
         routes = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         self.network = network
         self._lost: str | None = None
-        self._errands = Errands(network, absent, random.randrange(0x10000), routes)
+        self._requests = Requests(network, absent, random.randrange(0x10000), routes)
         self._link = LinkThread(
-            self._errands.machine, opened(network), on_state=self._port_changed)
+            self._requests.machine, opened(network), on_state=self._port_changed)
         self._link.start()
 
     def __enter__(self) -> Session:
@@ -81,27 +82,27 @@ class Session:
     @property
     def counters(self) -> Counters:
         """Return the counters of the line."""
-        return self._errands.counters
+        return self._requests.counters
 
     @property
     def stations(self) -> ActiveStationList:
         """Return what is known of each station."""
-        return self._errands.stations
+        return self._requests.stations
 
-    def ask(self, station: int, order: Order[_Result]) -> _Result:
-        """Carry out an order and return its result; raises what the order raises."""
-        return self.wait(self.start(station, order))
+    def ask(self, station: int, steps: Steps[_Result]) -> _Result:
+        """Carry out a request and return its result; raises what its steps raise."""
+        return self.wait(self.start(station, steps))
 
-    def start(self, station: int, order: Order[_Result],
+    def start(self, station: int, steps: Steps[_Result],
               future: Future[_Result] | None = None) -> Future[_Result]:
-        """Begin to carry out an order; ``future`` is where its result goes."""
+        """Begin to carry out a request; ``future`` is where its result goes."""
         future = future or Future()
-        self._errands.add(station, order, future.set_result, future.set_exception)
+        self._requests.add(station, steps, future.set_result, future.set_exception)
         self._link.wake()
         return future
 
     def wait(self, future: Future[_Result]) -> _Result:
-        """Return the result of an order; raises what it raises, PortLost at the latest."""
+        """Return the result of a request; raises what it raises, PortLost at the latest."""
         while True:
             try:
                 return future.result(_GLANCE)
@@ -110,7 +111,7 @@ class Session:
                     raise PortLost(self._lost) from None
 
     def close(self) -> None:
-        """End what is under way and close the port; every order has ended after this."""
+        """End what is under way and close the port; every request has ended after this."""
         self._link.stop()
 
     def _port_changed(self, state: PortState) -> None:

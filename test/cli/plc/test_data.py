@@ -123,7 +123,7 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 class InterruptedSession:
     """A session that is interrupted when its command is on the line already."""
 
-    def start(self, station: int, order: object, future: Future[Ending]) -> None:
+    def start(self, station: int, steps: object, future: Future[Ending]) -> None:
         self._future = future
         raise KeyboardInterrupt
 

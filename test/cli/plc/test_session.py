@@ -12,21 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A session on a pseudo-terminal: what becomes of orders when the port is lost."""
+"""A session on a pseudo-terminal: what becomes of requests when the port is lost."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 import threading
 
 from abdf1_ros.cli.plc.session import opened, Session
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import PortLost
-from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import Pty
@@ -91,8 +90,8 @@ def test_close_ends_what_is_under_way(line: Pty) -> None:
     assert not any(thread.name == 'df1 link' for thread in threading.enumerate())
 
 
-def test_bug_in_an_order_does_not_hang(line: Pty) -> None:
-    def broken() -> Generator[Request, Packet, None]:
+def test_bug_in_a_request_does_not_hang(line: Pty) -> None:
+    def broken() -> Steps[None]:
         raise ZeroDivisionError
         yield 0, b''  # makes it a generator
 

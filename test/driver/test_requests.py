@@ -12,22 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Errands on a virtual line: orders one after the other, over the links of both duplexes."""
+"""Requests on a virtual line: one after the other, over the links of both duplexes."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any
 
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.driver.errands import Errands
+from abdf1_ros.driver.job_tasks import Steps
+from abdf1_ros.driver.requests import Requests
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
-from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.settings.network import Network
 from support.driver_bench import simulated_plc
 from support.virtual_line import VirtualLine
@@ -37,7 +35,7 @@ NETWORK = Network(baud=115200, timeout=200, nak_retries=2, enq_retries=2, cmd_ti
 
 @dataclass
 class Ends:
-    """Who wants to know how errands end."""
+    """Who wants to know how requests end."""
 
     results: list[object] = field(default_factory=list)
     errors: list[Exception] = field(default_factory=list)
@@ -47,27 +45,27 @@ class Ends:
 
 
 class Bench:
-    """Errands at one end, an SLC that is station 1 at the other."""
+    """Requests at one end, an SLC that is station 1 at the other."""
 
     def __init__(self, absent: tuple[int, ...] = ()) -> None:
-        self.errands = Errands(NETWORK, absent, first_tns=7)
+        self.requests = Requests(NETWORK, absent, first_tns=7)
         self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
         self.far = Machine(multidrop([self.plc]), checksum=NETWORK.checksum)
-        self.line = VirtualLine(self.errands.machine, self.far, baud=115200)
+        self.line = VirtualLine(self.requests.machine, self.far, baud=115200)
         self.ends = Ends()
         self.added = 0
         self.line.start()
 
-    def add(self, station: int, order: Generator[Request, Packet, Any]) -> None:
+    def add(self, station: int, steps: Steps[Any]) -> None:
         self.added += 1
-        self.errands.add(station, order, self.ends.results.append, self.ends.errors.append)
+        self.requests.add(station, steps, self.ends.results.append, self.ends.errors.append)
 
     def run(self) -> None:
-        self.line.wake(self.errands.machine)
+        self.line.wake(self.requests.machine)
         self.line.run(lambda: self.ends.count() == self.added, 30.0)
 
 
-def test_orders_are_carried_out_in_turn() -> None:
+def test_requests_are_carried_out_in_turn() -> None:
     bench = Bench()
     bench.add(1, identify())
     bench.add(1, echo(b'\1\2\3'))
@@ -76,13 +74,13 @@ def test_orders_are_carried_out_in_turn() -> None:
     assert str(identity).startswith('SLC')
     assert nothing is None
     assert bench.ends.errors == []
-    assert bench.errands.counters.commands_sent == 2
+    assert bench.requests.counters.commands_sent == 2
 
 
-def test_order_of_several_commands_is_not_interrupted() -> None:
+def test_request_of_several_commands_is_not_interrupted() -> None:
     log = []
 
-    def twice(name: str) -> Generator[Request, Packet, None]:
+    def twice(name: str) -> Steps[None]:
         for number in range(2):
             yield diagnostics.CMD, diagnostics.Echo(b'').encode()
             log.append(f'{name}{number}')
@@ -94,8 +92,8 @@ def test_order_of_several_commands_is_not_interrupted() -> None:
     assert log == ['a0', 'a1', 'b0', 'b1']
 
 
-def test_errors_end_only_their_own_order() -> None:
-    def unusable() -> Generator[Request, Packet, None]:
+def test_errors_end_only_their_own_request() -> None:
+    def unusable() -> Steps[None]:
         yield diagnostics.CMD, diagnostics.Echo(b'').encode()
         raise FormatError('no use')
 
@@ -114,17 +112,17 @@ def test_present_station_gets_every_retry_and_an_absent_one_a_single_poll() -> N
     bench = Bench()
     bench.add(9, identify())
     bench.run()
-    assert bench.errands.counters.messages_sent == 3
-    assert bench.errands.counters.polls_sent == 0
+    assert bench.requests.counters.messages_sent == 3
+    assert bench.requests.counters.polls_sent == 0
 
     bench = Bench(absent=(9, 1))
     bench.add(9, identify())
     bench.add(1, identify())
     bench.run()
-    assert bench.errands.counters.messages_sent == 1  # to the one that has answered its poll
+    assert bench.requests.counters.messages_sent == 1  # to the one that has answered its poll
     assert len(bench.ends.results) == 1
-    assert bench.errands.stations[1].active
-    assert not bench.errands.stations[9].active
+    assert bench.requests.stations[1].active
+    assert not bench.requests.stations[9].active
 
 
 def test_no_nak_is_sent_when_a_reply_does_not_come() -> None:
@@ -134,16 +132,16 @@ def test_no_nak_is_sent_when_a_reply_does_not_come() -> None:
     bench.run()
     error, = bench.ends.errors
     assert isinstance(error, CommandTimeout)
-    assert bench.errands.counters.naks_sent == 0
+    assert bench.requests.counters.naks_sent == 0
 
 
-def test_lost_port_ends_all_orders() -> None:
+def test_lost_port_ends_all_requests() -> None:
     bench = Bench()
     bench.add(9, identify())
     bench.add(1, identify())
-    bench.line.wake(bench.errands.machine)
+    bench.line.wake(bench.requests.machine)
     bench.line.run_for(0.1)
-    bench.errands.machine.stop(PortLost('unplugged'))
+    bench.requests.machine.stop(PortLost('unplugged'))
     first, second = bench.ends.errors
     assert str(first) == str(second) == 'port lost: unplugged'
     assert isinstance(first, LinkError) and first.sent
@@ -152,15 +150,15 @@ def test_lost_port_ends_all_orders() -> None:
 
 def test_nothing_is_due_by_itself() -> None:
     bench = Bench()
-    assert bench.errands.next_due() is None
-    assert bench.errands.machine.deadline is None
+    assert bench.requests.next_due() is None
+    assert bench.requests.machine.deadline is None
 
 
-def test_other_modes_are_served_by_the_same_orders() -> None:
-    errands = Errands(Network(mode='Peer', baud=115200))
+def test_other_modes_are_served_by_the_same_requests() -> None:
+    requests = Requests(Network(mode='Peer', baud=115200))
     ends = Ends()
-    errands.add(1, identify(), ends.results.append, ends.errors.append)
-    errands.machine.start(0.0)
-    errands.machine.handle_timeout(0.1)
-    assert errands.machine.data_to_send().startswith(b'\x10\x02\x01\x05\x06\x00')
+    requests.add(1, identify(), ends.results.append, ends.errors.append)
+    requests.machine.start(0.0)
+    requests.machine.handle_timeout(0.1)
+    assert requests.machine.data_to_send().startswith(b'\x10\x02\x01\x05\x06\x00')
     assert ends.count() == 0

@@ -13,20 +13,19 @@
 # limitations under the License.
 
 """
-A line for errands: things done once, one after the other, without mappings or periods.
+Requests: what is asked of a station once, one after the other, without mappings or periods.
 
-It is the same link, with the same rules, that the driver reads and writes over.
+They use the same links, with the same rules, as the driver.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Generator, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import Procedure
-from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
@@ -34,43 +33,39 @@ from abdf1_ros.driver.job_tasks import JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
 from abdf1_ros.driver.served import Served
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
-from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.network import Network
 
 _Result = TypeVar('_Result')
 
-Order = Generator[Request, Packet, _Result]
-"""Yields requests, is sent the replies, and returns a result; ``transactions`` has such."""
-
 
 @dataclass(frozen=True, slots=True)
-class _Errand:
-    """An order for a station, and who wants to know how it ends."""
+class _Request:
+    """Steps with a station, and who wants to know how they end."""
 
     station: int
-    order: Order[Any]
+    work: Steps[Any]
     succeed: Callable[[Any], None]
     fail: Callable[[Exception], None]
 
-    def steps(self) -> Steps:
-        """Carry out the order and report its end."""
+    def steps(self) -> Steps[None]:
+        """Carry out the request and report its end."""
         try:
-            result = yield from self.order
+            result = yield from self.work
         except Abdf1Error as error:
             self.fail(error)
         else:
             self.succeed(result)
 
 
-class Errands:
+class Requests:
     """
-    Carry out orders over the line of ``network``; ``machine`` is to be run on its port.
+    Carry out requests over the line of ``network``; ``machine`` is to be run on its port.
 
     Stations that are ``absent`` get one try each until they answer, all others every retry of
     the network. ``routes`` gives the gateways of stations that are behind one. ``first_tns``
-    should be random, or we may be taken for whoever was here before us. Commands that come for
-    us are refused, but for an echo and the diagnostic status.
+    should be random, or a station may take our first command for a repetition. Commands that come
+    for us are refused, except an echo and the diagnostic status.
     """
 
     def __init__(self, network: Network, absent: Sequence[int] = (), first_tns: int = 0,
@@ -81,35 +76,35 @@ class Errands:
             self.stations.lost(number, 0.0)
         self.machine = make_machine(network, self._run, self.counters)
         self._tasks = JobTasks(network.station, first_tns)
-        self._waiting: Inbox[_Errand] = Inbox()
+        self._waiting: Inbox[_Request] = Inbox()
         served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = make_link(network, DriverSettings(nak_on_command_timeout=False),
                                self.machine, self.stations, served.serve, lambda event: None)
 
-    def add(self, station: int, order: Order[_Result], succeed: Callable[[_Result], None],
+    def add(self, station: int, work: Steps[_Result], succeed: Callable[[_Result], None],
             fail: Callable[[Exception], None]) -> None:
         """
-        Ask for an order to be carried out; may be called from any thread, then wake the link.
+        Ask for ``work`` with a station; may be called from any thread, then wake the link.
 
         Exactly one of ``succeed`` and ``fail`` is called, in the link thread.
         """
-        self._waiting.put(_Errand(station, order, succeed, fail))
+        self._waiting.put(_Request(station, work, succeed, fail))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return the next command of the order under way, or the first of the next one."""
+        """Return the next command of the request under way, or the first of the next one."""
         under_way = self._tasks.waiting(busy)
         if under_way is not None:
             return self._tasks.take(under_way, now)
-        errand = next(self._waiting.take(), None)
-        return self._tasks.start(errand.station, errand.steps(), now) if errand else None
+        request = next(self._waiting.take(), None)
+        return self._tasks.start(request.station, request.steps(), now) if request else None
 
     def next_due(self) -> float | None:
         """Return None: nothing comes by itself."""
         return None
 
     def expire(self, now: float) -> None:
-        """Do nothing: orders wait as long as they have to."""
+        """Do nothing: requests wait as long as they have to."""
 
     def _run(self) -> Procedure:
         try:
@@ -119,9 +114,9 @@ class Errands:
             raise
 
     def _end(self, error: LinkError) -> None:
-        """Leave no order without an end."""
+        """Leave no request without an end."""
         self._tasks.fail(error)
-        for errand in self._waiting.take():
+        for request in self._waiting.take():
             error = PortLost(*error.args)
             error.sent = False
-            errand.fail(error)
+            request.fail(error)
