@@ -30,7 +30,7 @@ import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.checks import Check, Checks, Kind
+from abdf1_ros.driver.checks import Check, CheckKind, Checks
 from abdf1_ros.driver.interlocks import Interlocks, OwnWrite
 from abdf1_ros.driver.job_tasks import JobTask, JobTasks
 from abdf1_ros.driver.points import Write, WriteResult
@@ -155,7 +155,7 @@ class Agenda:
 
     def check_ended(self, check: Check, begun: float, now: float) -> None:
         """Take note that a check has ended that had the line from ``begun`` on."""
-        if check.kind is not Kind.ECHO or self._stations[check.station].active:
+        if check.kind is not CheckKind.ECHO or self._stations[check.station].active:
             return
         if self.reads.others_wait:
             self._probes.spend(now - begun if check.is_probe else 0.0, now)

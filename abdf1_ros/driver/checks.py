@@ -50,7 +50,7 @@ _UNANSWERED = 30
 _NOT_ASKED = 'unknown (not asked yet)'
 
 
-class Kind(Enum):
+class CheckKind(Enum):
     """What a check is for."""
 
     ECHO = 'echo'
@@ -69,7 +69,7 @@ class Check:
     """
 
     station: int
-    kind: Kind
+    kind: CheckKind
     period: float
     due: float = 0.0
     is_probe: bool = False
@@ -114,9 +114,9 @@ class Checks:
         self._wanted = wanted or {}
         periods = {station.number: min(self._wanted.get(station.number, math.inf),
                                        period or math.inf) for station in stations}
-        self._checks = [Check(number, Kind.STATUS, often) for number, often in periods.items()
+        self._checks = [Check(number, CheckKind.STATUS, often) for number, often in periods.items()
                         if not math.isinf(often)]
-        self._checks += [Check(station.number, Kind.ECHO, ECHO_PERIOD)
+        self._checks += [Check(station.number, CheckKind.ECHO, ECHO_PERIOD)
                          for station in stations if station.number not in read]
         self._next_due = 0.0
 
@@ -195,7 +195,7 @@ class Checks:
             self._take_refusal(check, str(error))
         except LinkError as error:
             self._link_failed(check.station, error)
-            if check.kind is Kind.COUNTERS or self.known(check.station).identity is None:
+            if check.kind is CheckKind.COUNTERS or self.known(check.station).identity is None:
                 self._take_refusal(check, str(error))
                 if check.station not in self._wanted:
                     next_due += check.period * _UNANSWERED
@@ -204,9 +204,9 @@ class Checks:
 
     def _question(self, check: Check) -> Steps[None]:
         station, known = check.station, self.known(check.station)
-        if check.kind is Kind.ECHO:
+        if check.kind is CheckKind.ECHO:
             yield from echo(b'')
-        elif check.kind is Kind.STATUS:
+        elif check.kind is CheckKind.STATUS:
             identity = yield from identify()
             self._known[station] = replace(
                 known, processor=str(identity), identity=identity, told=self._clock())
@@ -216,11 +216,11 @@ class Checks:
             self._take_counters(station, decode_counters(reply, layout_of(known.identity)))
 
     def _take_refusal(self, check: Check, reason: str) -> None:
-        if check.kind is Kind.STATUS:
+        if check.kind is CheckKind.STATUS:
             self._known[check.station] = replace(
                 self.known(check.station), processor=f'unknown ({reason})', identity=None,
                 told=None)
-        elif check.kind is Kind.COUNTERS:
+        elif check.kind is CheckKind.COUNTERS:
             self._take_counters(check.station, {}, reason)
 
     def _take_counters(self, station: int, counters: Mapping[str, str],
@@ -232,11 +232,11 @@ class Checks:
 
     def _finish(self, check: Check, next_due: float) -> None:
         """Have the check done again when due; that of an absent station when it is back."""
-        if check.kind is Kind.COUNTERS:
+        if check.kind is CheckKind.COUNTERS:
             self._checks.remove(check)
         elif self._stations[check.station].active:
             check.due = next_due
-        elif check.kind is Kind.ECHO:
+        elif check.kind is CheckKind.ECHO:
             check.due = self._clock() + check.period
         self._plan()
 
@@ -244,16 +244,16 @@ class Checks:
         """Return the clock value (s) from which a check that is due wants the line."""
         station = self._stations[check.station]
         if not station.active:
-            return echo_from if check.kind is Kind.ECHO else math.inf
-        if check.kind is Kind.ECHO and station.last_heard is not None:
+            return echo_from if check.kind is CheckKind.ECHO else math.inf
+        if check.kind is CheckKind.ECHO and station.last_heard is not None:
             return station.last_heard + check.period
         return check.due
 
     def _add_request(self, station: int, now: float) -> None:
-        check = Check(station, Kind.COUNTERS, math.inf, now)
+        check = Check(station, CheckKind.COUNTERS, math.inf, now)
         if not self._stations[station].active:
             self._take_counters(station, {}, 'the station does not answer')
-        elif not any(other.station == station and other.kind is Kind.COUNTERS
+        elif not any(other.station == station and other.kind is CheckKind.COUNTERS
                      for other in self._checks):
             self._checks.append(check)
             self._plan()
@@ -265,14 +265,14 @@ class Checks:
             processor=f'unknown ({reason})', counters=known.counters,
             no_counters=known.no_counters)
         for check in [check for check in self._checks if check.station == station
-                      and check.kind is Kind.COUNTERS and not math.isinf(check.due)]:
+                      and check.kind is CheckKind.COUNTERS and not math.isinf(check.due)]:
             self._take_counters(station, {}, reason)
             self._checks.remove(check)
         self._plan()
 
     def _ask_status(self, station: int, due: float) -> None:
         for check in self._checks:
-            if check.kind is Kind.STATUS and check.station == station:
+            if check.kind is CheckKind.STATUS and check.station == station:
                 check.due = due
         self._plan()
 

@@ -33,7 +33,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda
-from abdf1_ros.driver.checks import Check, Checks, Kind
+from abdf1_ros.driver.checks import Check, CheckKind, Checks
 from abdf1_ros.driver.guards import Guards
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks import Interlocks, OwnWrite, Urgency
@@ -131,7 +131,7 @@ class Driver:
         self.health = Checks(
             self.stations, {block.station for block in blocks}, settings.processor_period,
             lambda station, error: self._link_failed(station, (), error),
-            lambda: self.machine.now, self._status_periods())
+            self._clock, self._status_periods())
         self._agenda = Agenda(
             self.stations, self.health, self._tasks, probe_time=longest_probe(network),
             patience=settings.write_timeout, report=listener.written)
@@ -312,6 +312,9 @@ class Driver:
                     self.interlocks.next_expiry(), math.inf if due is None else due)
         return None if math.isinf(first) else first
 
+    def _clock(self) -> float:
+        return self.machine.now
+
     def _station_changed(self, station: Station) -> None:
         if station.active:
             self._reads.release(station.number, self.machine.now)
@@ -409,7 +412,7 @@ class Driver:
             yield from self.health.steps(check)
         finally:
             self._agenda.check_ended(check, begun, self.machine.now)
-        if check.kind is Kind.STATUS:
+        if check.kind is CheckKind.STATUS:
             self._mode_told(check.station, begun)
 
     def _mode_told(self, station: int, asked: float) -> None:
@@ -495,20 +498,17 @@ class Driver:
         station, begun, is_answered = write.mapping.station, self.machine.now, True
         self._read_backs.overtaken(write, begun)
         try:
-            ending = yield from carry_out(write)
-            is_answered = not isinstance(ending.error, LinkError)
+            result = yield from carry_out(write, self._clock)
+            is_answered = not isinstance(result.error, LinkError)
         finally:
             self._agenda.write_ended(write, begun, self.machine.now, is_answered=is_answered)
-        if isinstance(ending.error, RemoteError):
-            self.stations[station].remote_errors += 1
-        if ending.is_unsure:
-            self._read_backs.add(write, ending, self.blocks, self.machine.now)
+        if result.is_unconfirmed:
+            self._read_backs.add(write, result, self.blocks, self.machine.now)
         else:
-            self._end_write(write, ending.outcome, ending.detail)
-        if isinstance(ending.error, LinkError) and not isinstance(ending.error, CommandExpired):
-            self._link_failed(station, (), ending.error)
-        self.interlocks.message_ended(write, ending.outcome)
-        if ending.done or ending.is_unsure:
+            self._listener.written(result)
+        self._write_failed(station, result.error)
+        self.interlocks.message_ended(write, result.outcome)
+        if result.packets_done or result.is_unconfirmed:
             self._reads.refresh(write, self.machine.now)
 
     def _own_steps(self, own: OwnWrite) -> Steps[None]:
@@ -517,14 +517,18 @@ class Driver:
         if own.urgency is Urgency.FALLBACK:
             self._read_backs.overtaken(write, self.machine.now)
         try:
-            ending = yield from carry_out(write)
-            outcome = ending.outcome
+            result = yield from carry_out(write, self._clock)
+            outcome = result.outcome
         finally:
             self._writes.ended(write)
             self.interlocks.ended(own, outcome, self.machine.now)
-        if isinstance(ending.error, RemoteError):
-            self.stations[own.station].remote_errors += 1
-        elif isinstance(ending.error, LinkError) and not isinstance(ending.error, CommandExpired):
-            self._link_failed(own.station, (), ending.error)
-        if own.urgency is Urgency.FALLBACK and (ending.done or ending.is_unsure):
+        self._write_failed(own.station, result.error)
+        if own.urgency is Urgency.FALLBACK and (result.packets_done or result.is_unconfirmed):
             self._reads.refresh(write, self.machine.now)
+
+    def _write_failed(self, station: int, error: LinkError | RemoteError | None) -> None:
+        """Count what has ended a write early, if anything has."""
+        if isinstance(error, RemoteError):
+            self.stations[station].remote_errors += 1
+        elif error is not None and not isinstance(error, CommandExpired):
+            self._link_failed(station, (), error)

@@ -30,7 +30,7 @@ from abdf1_ros.settings.mapping import Mapping
 _PAUSE_AFTER_REFUSAL = 1.0
 
 
-class Cause(Enum):
+class FallbackCause(Enum):
     """Why a fallback value is due (rule 17)."""
 
     TIMEOUT = 'timeout'
@@ -57,7 +57,7 @@ class FallbackRow:
         self.after = mapping.fallback.after / 1000
         self.refreshed = -math.inf
         self.sent = -math.inf
-        self.cause: Cause | None = None
+        self.cause: FallbackCause | None = None
         self.is_under_way = False
         self.is_held_up = False
         self.stands = False
@@ -65,10 +65,11 @@ class FallbackRow:
         self._settle_time = 2 * cmd_timeout
         self._due_since = 0.0
         self._next_try = -math.inf
-        self._is_unsure = False  # a write has ended as unknown since the last message or fallback
+        # Whether a write has ended as unknown since the last message or fallback was confirmed.
+        self._is_unconfirmed = False
         self._again_at = math.inf
 
-    def demand(self, cause: Cause, now: float) -> None:
+    def make_due(self, cause: FallbackCause, now: float) -> None:
         """Make the fallback due; the first cause is the one that is told."""
         if self.cause is None:
             self.cause, self._due_since = cause, now
@@ -91,7 +92,7 @@ class FallbackRow:
     def judge(self, now: float, youngest: float) -> None:
         """Make the fallback due when the time of the last message is up."""
         if self.cause is None and now >= self.deadline(youngest):
-            self.demand(Cause.TIMEOUT, now)
+            self.make_due(FallbackCause.TIMEOUT, now)
 
     def next_due(self, youngest: float) -> float:
         """Return when it wants the line (clock value in s), infinite for never."""
@@ -120,8 +121,8 @@ class FallbackRow:
                 self._again_at = now + _PAUSE_AFTER_REFUSAL
             return None
         self.stands = True
-        self._again_at = now + self._settle_time if self._is_unsure else math.inf
-        self._is_unsure = False
+        self._again_at = now + self._settle_time if self._is_unconfirmed else math.inf
+        self._is_unconfirmed = False
         if self.cause is None:
             return None
         self.cause = None
@@ -131,9 +132,9 @@ class FallbackRow:
         """Take note how a message of the row ended that had been sent (rule 7)."""
         if outcome is Outcome.WRITTEN:
             self.refreshed = max(self.refreshed, requested)
-            self._is_unsure, self._again_at = False, math.inf
+            self._is_unconfirmed, self._again_at = False, math.inf
         elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
-            self._is_unsure = True
+            self._is_unconfirmed = True
         else:
             return
         self.stands = False

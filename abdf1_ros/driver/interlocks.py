@@ -29,7 +29,7 @@ from enum import Enum
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.fallbacks import Cause, FallbackRow
+from abdf1_ros.driver.fallbacks import FallbackCause, FallbackRow
 from abdf1_ros.driver.heartbeats import HeartbeatRow
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes import WriteQueue
@@ -91,7 +91,7 @@ class Interlocks:
         self._is_running: dict[int, bool] = {}
         self._has_begun = False
         self._is_ending = False
-        self._has_demanded_all = False
+        self._are_all_due = False
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to write by ourselves."""
@@ -109,12 +109,12 @@ class Interlocks:
 
     def resume(self) -> None:
         """Take note that it was not the end: the next opening of the port is a first contact."""
-        self._is_ending = self._has_demanded_all = False
+        self._is_ending = self._are_all_due = False
 
     @property
     def is_over(self) -> bool:
         """Tell whether, after ``wind_down``, all stations that answer have confirmed all."""
-        return not self or self._has_demanded_all and not any(
+        return not self or self._are_all_due and not any(
             self._stations[row.mapping.station].active for row in self._unconfirmed())
 
     def unconfirmed(self) -> list[str]:
@@ -131,9 +131,9 @@ class Interlocks:
             row.begin(now)
         for fallback in self.fallbacks:
             if not self._has_begun:
-                fallback.demand(Cause.START, now)
+                fallback.make_due(FallbackCause.START, now)
             elif not fallback.mapping.serves:
-                self._demand_unless_fresh(fallback, now)
+                self._make_due_unless_fresh(fallback, now)
         self._has_begun = True
 
     def contact(self, station: int, now: float) -> None:
@@ -141,7 +141,7 @@ class Interlocks:
         for row in self._heartbeats_of(station):
             row.begin(now)
         for fallback in self._fallbacks_of(station):
-            self._demand_unless_fresh(fallback, now)
+            self._make_due_unless_fresh(fallback, now)
 
     def mode_seen(self, station: int, is_running: bool | None, now: float) -> None:
         """Take note of a station's mode; a change to RUN is a first contact (rules 2, 8)."""
@@ -153,11 +153,11 @@ class Interlocks:
             for row in self._heartbeats_of(station):
                 row.begin(now)
             for fallback in self._fallbacks_of(station):
-                fallback.demand(Cause.RUN, now)
+                fallback.make_due(FallbackCause.RUN, now)
 
-    def _demand_unless_fresh(self, fallback: FallbackRow, now: float) -> None:
+    def _make_due_unless_fresh(self, fallback: FallbackRow, now: float) -> None:
         if not fallback.is_fresh(now):
-            fallback.demand(Cause.RETURN, now)
+            fallback.make_due(FallbackCause.RETURN, now)
 
     def message_came(self, write: Write) -> None:
         """Take note of a message that was accepted (rule 3 d)."""
@@ -271,13 +271,13 @@ class Interlocks:
         for row in self.fallbacks:
             row.judge(now, youngest.get(id(row.mapping), -math.inf))
             if self._is_ending and row.cause is None and not row.stands:
-                row.demand(Cause.END, now)
+                row.make_due(FallbackCause.END, now)
                 row.is_held_up = False
             if row.mapping.serves and row.cause is not None:
                 write = row.take(now)
                 self._store(write)
                 self._fallback_ended(row, write, Outcome.WRITTEN, now)
-        self._has_demanded_all = self._is_ending
+        self._are_all_due = self._is_ending
 
     def next_expiry(self) -> float:
         """Return when a fallback of our own table is due (clock value in s)."""

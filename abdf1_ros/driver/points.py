@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
-from abdf1_ros.errors import FormatError
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
+from abdf1_ros.pccc.status import is_local
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, Publish
 from abdf1_ros.settings.values import Values, ValueType
@@ -151,9 +152,10 @@ class WriteResult:
     """
     The one result of one write to one mapping.
 
-    ``detail`` is empty for a write that went well; ``latency`` is seconds from the request. That
-    of an unsure outcome says what a read has found afterwards, or why there was none. ``request``
-    is what the requester calls it.
+    ``detail`` is empty for a write that went well; that of an unconfirmed one says what a read has
+    found afterwards, or why there was none. ``latency`` is seconds from the request. ``request``
+    is what the requester calls it. ``packets_done`` of its packets were confirmed before ``error``
+    ended it.
     """
 
     mapping: Mapping
@@ -162,6 +164,15 @@ class WriteResult:
     value: str
     latency: float
     request: str = ''
+    packets_done: int = 0
+    error: LinkError | RemoteError | None = field(default=None, compare=False)
+
+    @property
+    def is_unconfirmed(self) -> bool:
+        """Tell whether the PLC may have executed a packet that it has not confirmed."""
+        if isinstance(self.error, RemoteError):
+            return is_local(self.error)
+        return self.error is not None and self.error.sent
 
     def __str__(self) -> str:
         """Return outcome and detail."""
@@ -222,10 +233,11 @@ class Write:
             return held == self.raw if isinstance(held, str) else [*held] == [*self.raw]
         return words == codec.encode(self.raw)
 
-    def result(self, outcome: Outcome, detail: str, now: float) -> WriteResult:
+    def result(self, outcome: Outcome, detail: str, now: float, packets_done: int = 0,
+               error: LinkError | RemoteError | None = None) -> WriteResult:
         """Return how this write ended."""
         return WriteResult(self.mapping, outcome, detail, self.value, now - self.requested,
-                           self.request)
+                           self.request, packets_done, error)
 
 
 def show(values: Sequence[float] | str) -> str:

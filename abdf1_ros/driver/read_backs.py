@@ -22,20 +22,19 @@ line.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from abdf1_ros.driver.points import Write, WriteResult
-from abdf1_ros.driver.transactions import Ending
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 
 
 @dataclass(frozen=True, slots=True)
-class _Doubt:
-    """A write with an unsure ``ending``, which came at the clock value ``since`` (s)."""
+class _UnconfirmedWrite:
+    """A write and its unconfirmed ``result``, which came at the clock value ``since`` (s)."""
 
     write: Write
-    ending: Ending
+    result: WriteResult
     since: float
 
 
@@ -49,53 +48,55 @@ class ReadBacks:
     def __init__(self, patience: float, report: Callable[[WriteResult], None]) -> None:
         self._patience = patience
         self._report = report
-        self._doubts: list[_Doubt] = []
+        self._waiting: list[_UnconfirmedWrite] = []
 
-    def add(self, write: Write, ending: Ending, blocks: Iterable[Block], now: float) -> None:
-        """Take a write that has ended; where none of ``blocks`` shows it, that is its result."""
-        doubt = _Doubt(write, ending, now)
+    def add(self, write: Write, result: WriteResult, blocks: Iterable[Block],
+            now: float) -> None:
+        """Take an unconfirmed write; report at once where none of ``blocks`` reads its words."""
+        entry = _UnconfirmedWrite(write, result, now)
         if any(_shows(block, write.mapping) for block in blocks):
-            self._doubts.append(doubt)
+            self._waiting.append(entry)
         else:
-            self._tell(doubt, 'not read back: no row reads all of these words', now)
+            self._tell(entry, 'not read back: no row reads all of these words', now)
 
     def read(self, block: Block, data: bytes, started: float, now: float) -> None:
         """Compare what a block holds that was read from ``started`` (clock value in s) on."""
-        for doubt in self._doubts[:]:
-            mapping = doubt.write.mapping
-            if started >= doubt.since and _shows(block, mapping):
-                is_held = doubt.write.is_held(data[block.slice_of(mapping)])
+        for entry in self._waiting[:]:
+            mapping = entry.write.mapping
+            if started >= entry.since and _shows(block, mapping):
+                is_held = entry.write.is_held(data[block.slice_of(mapping)])
                 which = 'the value' if is_held else 'another value'
-                self._end(doubt, f'read back: the PLC holds {which}', now)
+                self._end(entry, f'read back: the PLC holds {which}', now)
 
     def overtaken(self, newer: Write, now: float) -> None:
         """End those whose words ``newer``, which goes out now, will change."""
-        for doubt in self._doubts[:]:
-            if doubt.write.overlaps(newer):
-                self._end(doubt, 'not read back: a newer write of these words has gone out', now)
+        for entry in self._waiting[:]:
+            if entry.write.overlaps(newer):
+                self._end(entry, 'not read back: a newer write of these words has gone out', now)
 
     def expire(self, now: float) -> None:
         """End those that have waited too long."""
-        for doubt in self._doubts[:]:
-            if now >= doubt.since + self._patience:
-                self._end(doubt, f'not read back within {self._patience:g} s', now)
+        for entry in self._waiting[:]:
+            if now >= entry.since + self._patience:
+                self._end(entry, f'not read back within {self._patience:g} s', now)
 
     def next_due(self) -> float | None:
         """Return when the first will have waited too long (clock value in s), None for never."""
-        return self._doubts[0].since + self._patience if self._doubts else None
+        return self._waiting[0].since + self._patience if self._waiting else None
 
     def end(self, now: float) -> None:
         """End all: there is no line any more."""
-        for doubt in self._doubts[:]:
-            self._end(doubt, 'not read back before the line went down', now)
+        for entry in self._waiting[:]:
+            self._end(entry, 'not read back before the line went down', now)
 
-    def _end(self, doubt: _Doubt, finding: str, now: float) -> None:
-        self._doubts.remove(doubt)
-        self._tell(doubt, finding, now)
+    def _end(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
+        self._waiting.remove(entry)
+        self._tell(entry, finding, now)
 
-    def _tell(self, doubt: _Doubt, finding: str, now: float) -> None:
-        ending = doubt.ending
-        self._report(doubt.write.result(ending.outcome, f'{ending.detail}; {finding}', now))
+    def _tell(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
+        write, result = entry.write, entry.result
+        self._report(replace(result, detail=f'{result.detail}; {finding}',
+                             latency=now - write.requested))
 
 
 def _shows(block: Block, mapping: Mapping) -> bool:

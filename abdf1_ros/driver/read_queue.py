@@ -157,7 +157,7 @@ class ReadJob:
         return first < end and start.offset < first + mapping.codec.words
 
 
-_Entry = tuple[float, int, ReadJob]
+_QueueEntry = tuple[float, int, ReadJob]
 """When a job is due, the ticket of the entry, and the job."""
 
 
@@ -171,7 +171,7 @@ class ReadQueue:
     def __init__(self) -> None:
         self.jobs: set[ReadJob] = set()
         self._scan_time = 0.0
-        self._heaps: dict[float, list[_Entry]] = {}
+        self._heaps: dict[float, list[_QueueEntry]] = {}
         self._tickets = itertools.count(1)
         self._turn = 0
 
@@ -213,7 +213,7 @@ class ReadQueue:
         """Return when the next job is due (clock value in s), None for never."""
         return min((heap[0][0] for heap in self._clean_heaps()), default=None)
 
-    def _next_heap(self, now: float) -> list[_Entry] | None:
+    def _next_heap(self, now: float) -> list[_QueueEntry] | None:
         """Return the heap that begins with the job to go next."""
         due = [heap for heap in self._clean_heaps() if heap[0][0] <= now]
         if len(due) < 2:
@@ -226,18 +226,18 @@ class ReadQueue:
     def _period(self, job: ReadJob) -> float:
         return job.block.period or PATIENCE * self._scan_time
 
-    def _periods_late(self, entry: _Entry, now: float) -> float:
+    def _periods_late(self, entry: _QueueEntry, now: float) -> float:
         due, _, job = entry
         return (now - due) / self._period(job)
 
-    def _clean_heaps(self) -> list[list[_Entry]]:
+    def _clean_heaps(self) -> list[list[_QueueEntry]]:
         """Return the heaps that are not empty, each beginning with an entry that counts."""
         for heap in self._heaps.values():
             while heap and not self._counts(heap[0]):
                 heapq.heappop(heap)
         return [heap for heap in self._heaps.values() if heap]
 
-    def _counts(self, entry: _Entry) -> bool:
+    def _counts(self, entry: _QueueEntry) -> bool:
         """Tell whether no later entry has replaced this one, nor other jobs its job."""
         _, ticket, job = entry
         return ticket == job.ticket and job in self.jobs

@@ -40,7 +40,7 @@ _Result = TypeVar('_Result')
 
 
 @dataclass(frozen=True, slots=True)
-class _Request:
+class _WaitingRequest:
     """Steps with a station, and who wants to know how they end."""
 
     station: int
@@ -76,7 +76,7 @@ class Requests:
             self.stations.lost(number, 0.0)
         self.machine = make_machine(network, self._run, self.counters)
         self._tasks = JobTasks(network.station, first_tns)
-        self._waiting: Inbox[_Request] = Inbox()
+        self._waiting: Inbox[_WaitingRequest] = Inbox()
         served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = make_link(network, DriverSettings(nak_on_command_timeout=False),
@@ -89,7 +89,7 @@ class Requests:
 
         Exactly one of ``succeed`` and ``fail`` is called, in the link thread.
         """
-        self._waiting.put(_Request(station, work, succeed, fail))
+        self._waiting.put(_WaitingRequest(station, work, succeed, fail))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command of the request under way, or the first of the next one."""

@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.job_tasks import Steps
-from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.diagnostic_status import decode_identity
@@ -36,23 +36,6 @@ from abdf1_ros.settings.values import Values
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """How a write ended, after ``done`` of its packets; ``error`` is what ended it early."""
-
-    outcome: Outcome
-    detail: str
-    done: int
-    error: LinkError | RemoteError | None = None
-
-    @property
-    def is_unsure(self) -> bool:
-        """Tell whether a packet may have been executed, and may not."""
-        if isinstance(self.error, RemoteError):
-            return is_local(self.error)
-        return self.error is not None and self.error.sent
 
 
 def read_packet(block: Block, number: int,
@@ -82,8 +65,8 @@ def read_block(block: Block) -> Steps[bytes]:
     return data
 
 
-def carry_out(write: Write) -> Steps[Ending]:
-    """Send every packet of a write, as long as each is confirmed."""
+def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
+    """Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds."""
     done, detail = 0, ''
     try:
         for packet in range(len(write.commands)):
@@ -91,12 +74,13 @@ def carry_out(write: Write) -> Steps[Ending]:
             done += 1
     except RemoteError as error:
         outcome = Outcome.UNKNOWN if is_local(error) else Outcome.FAILED
-        return _early(write, outcome, done, error)
+        return _ended_early(write, outcome, clock(), done, error)
     except LinkError as error:
         outcome = Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
-        return _early(write, outcome, done, error)
+        return _ended_early(write, outcome, clock(), done, error)
     is_broadcast = write.mapping.station == BROADCAST
-    return Ending(Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN, detail, done)
+    outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
+    return write.result(outcome, detail, clock(), done)
 
 
 def _send(write: Write, packet: int) -> Steps[str]:
@@ -129,11 +113,12 @@ def _rewrite(write: Write, packet: int,
     check_status((yield dialect.write(address, word(old & ~mask | bits & mask))))
 
 
-def _early(write: Write, outcome: Outcome, done: int, error: LinkError | RemoteError) -> Ending:
+def _ended_early(write: Write, outcome: Outcome, now: float, done: int,
+                 error: LinkError | RemoteError) -> WriteResult:
     if not done:
-        return Ending(outcome, str(error), done, error)
+        return write.result(outcome, str(error), now, done, error)
     detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
-    return Ending(Outcome.PARTLY, detail, done, error)
+    return write.result(Outcome.PARTLY, detail, now, done, error)
 
 
 def read_values(mapping: Mapping, block: Block) -> Steps[Values]:

@@ -39,7 +39,7 @@ class Change:
     new: Sequence[Block]
 
 
-class _Search:
+class _RefusalSearch:
     """The search for what is refused of one block."""
 
     def __init__(self, block: Block) -> None:
@@ -82,7 +82,7 @@ class Refusals:
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
-        self._searches: dict[Block, _Search] = {}
+        self._searches: dict[Block, _RefusalSearch] = {}
 
     def refused(self, block: Block) -> Change | None:
         """Take note that a station has refused a block; None: read it again all the same."""
@@ -90,7 +90,7 @@ class Refusals:
         halves = self._planner.split(block)
         if not halves:
             return self._settle(search, block, is_refused=True) if search else None
-        search = search or _Search(block)
+        search = search or _RefusalSearch(block)
         search.divide(block, halves)
         for half in halves:
             self._searches[half] = search
@@ -108,7 +108,7 @@ class Refusals:
         return Change(old, self._planner.plan(
             mapping for other in old for mapping in other.mappings))
 
-    def _settle(self, search: _Search, block: Block, is_refused: bool) -> Change | None:
+    def _settle(self, search: _RefusalSearch, block: Block, is_refused: bool) -> Change | None:
         if not search.settle(block, is_refused):
             return None
         for span in search.findings():

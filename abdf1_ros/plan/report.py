@@ -41,7 +41,7 @@ _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 
 
-class Kind(Enum):
+class RemarkKind(Enum):
     """What a remark is about; the value is what programs see."""
 
     MAP = 'map'
@@ -57,7 +57,7 @@ class Kind(Enum):
 class Remark:
     """Something odd; ``station`` is the one that it is about, None for the line."""
 
-    kind: Kind
+    kind: RemarkKind
     text: str
     station: int | None = None
 
@@ -107,7 +107,7 @@ class Report:
         found = [*setting_remarks(self.network, self.mappings)]
         if not self.mappings:
             text = 'the map has no usable row: nothing is read or written'
-            return [*found, Remark(Kind.MAP, text)]
+            return [*found, Remark(RemarkKind.MAP, text)]
         return [*found, *_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
                 *_gap_remarks(self), *_interlock_remarks(self)]
 
@@ -124,10 +124,10 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
 def setting_remarks(network: Network, mappings: Iterable[Mapping]) -> Iterator[Remark]:
     """Find what is valid and still odd in both files."""
     for text in network_remarks(network):
-        yield Remark(Kind.SETTING, text)
+        yield Remark(RemarkKind.SETTING, text)
     for mapping in mappings:
         for text in mapping.remarks:
-            yield Remark(Kind.SETTING, text, mapping.station)
+            yield Remark(RemarkKind.SETTING, text, mapping.station)
 
 
 def _row_order(block: Block) -> tuple[int, int]:
@@ -143,7 +143,7 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
             stations[mapping.station].append(mapping)
     for station, mappings in sorted(stations.items()):
         if station == network.station:
-            yield Remark(Kind.STATION, (
+            yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)} is our own Station in the net file; '
                 'two nodes of one address cannot talk'), station)
         types: dict[str, list[Mapping]] = {}
@@ -153,17 +153,17 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
             types.setdefault(mapping.plc_type.value, []).append(mapping)
         if len(types) > 1:
             kinds = ', '.join(f'{name} ({_tags(group)})' for name, group in types.items())
-            yield Remark(Kind.STATION, (
+            yield Remark(RemarkKind.STATION, (
                 f'station {station} has more than one PLC_Type: {kinds}'), station)
     yield from _gateway_remarks(network, stations)
     if network.mode == 'Peer' and 0 in (network.station, *stations):
         whose = 'our own Station is 0' if network.station == 0 else 'station 0 is in the map'
-        yield Remark(Kind.STATION, (
+        yield Remark(RemarkKind.STATION, (
             f'{whose}: a message to station 0 begins with 00, and neither BCC nor CRC notices '
             'when that is lost on a full-duplex line; any other number is safe'), 0)
     if network.mode == 'Peer' and len(stations) > 1:
         listed = ', '.join(map(str, sorted(stations)))
-        yield Remark(Kind.STATION, (
+        yield Remark(RemarkKind.STATION, (
             f'a full-duplex line has one PLC, the map has stations {listed}; only a gateway '
             'answers for several'))
 
@@ -176,11 +176,11 @@ def _gateway_remarks(network: Network,
         if via is None:
             continue
         if network.mode != 'Master':
-            yield Remark(Kind.STATION, (
+            yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)}: Via is for Mode Master; in Mode '
                 f'{network.mode} the gateway is not addressed'), station)
         elif station > 7 and set(str(station)) <= set('01234567'):
-            yield Remark(Kind.STATION, (
+            yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)} is behind gateway {via}: on Data Highway '
                 f'Plus node numbers are octal; if {station} is what a panel there shows, write '
                 f'{int(str(station), 8)}'), station)
@@ -192,11 +192,11 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
     if load > 1:
         baud = report.needed_baud()
         advice = f'{baud} baud would do' if baud else 'no baud rate is enough, only longer periods'
-        yield Remark(Kind.LOAD, (
+        yield Remark(RemarkKind.LOAD, (
             f'the periods need {load:.0%} of the time there is at {report.network.baud} baud, '
             f'so reads come late; {advice}'))
     elif load > _HIGH_LOAD:
-        yield Remark(Kind.LOAD, (
+        yield Remark(RemarkKind.LOAD, (
             f'the periods need {load:.0%} of the line; writes, repetitions and silent stations '
             'have to do with the rest'))
 
@@ -204,7 +204,7 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
 def _interlock_remarks(report: Report) -> Iterator[Remark]:
     """Find heartbeats and fallbacks whose times do not go with those of the line."""
     for text in interlocks.remarks(report.network, report.mappings, report.response_time):
-        yield Remark(Kind.INTERLOCK, text)
+        yield Remark(RemarkKind.INTERLOCK, text)
 
 
 def _period_remarks(report: Report) -> Iterator[Remark]:
@@ -212,7 +212,7 @@ def _period_remarks(report: Report) -> Iterator[Remark]:
     for block in report.blocks:
         time = report.time(block)
         if 0 < block.period < time:
-            yield Remark(Kind.PERIOD, (
+            yield Remark(RemarkKind.PERIOD, (
                 f'{_tags(block.mappings)}: a read takes {_ms(time)} ms, '
                 f'the period is {_ms(block.period)} ms'), block.station)
 
@@ -229,7 +229,7 @@ def _gap_remarks(report: Report) -> Iterator[Remark]:
             mappings = [mapping for block in blocks for mapping in block.mappings]
             first, last = _ends(mappings)
             spare = sum(block.words for block in blocks) - len(_words(mappings))
-            yield Remark(Kind.GAP, (
+            yield Remark(RemarkKind.GAP, (
                 f'station {blocks[0].station}, {first} to {last}: {len(blocks)} '
                 f'{"read" if len(blocks) == 1 else "reads"} with {spare} words that no tag '
                 f'needs take {_ms(time)} ms; side by side in the PLC the tags would take '

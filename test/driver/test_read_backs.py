@@ -22,7 +22,6 @@ from abdf1_ros.df1.frames import EOT, STX
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
-from abdf1_ros.driver.transactions import Ending
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Block, Planner
@@ -32,7 +31,6 @@ import pytest
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
-LOST = Ending(Outcome.UNKNOWN, 'lost', 0, CommandTimeout())
 PATIENCE = 2.0
 EARLY = 10.0
 
@@ -43,14 +41,16 @@ def block_of(mapping: Mapping) -> Block:
     return block
 
 
-class Doubtful:
+class Unconfirmed:
     """One write without a reply, which some block reads."""
 
     def __init__(self, read: Mapping, mapping: Mapping, values: list[float] | str) -> None:
         self.block = block_of(read)
         self.results: list[WriteResult] = []
         self.backs = ReadBacks(PATIENCE, self.results.append)
-        self.backs.add(Write(mapping, values, EARLY), LOST, [self.block], EARLY)
+        write = Write(mapping, values, EARLY)
+        lost = write.result(Outcome.UNKNOWN, 'lost', EARLY, 0, CommandTimeout())
+        self.backs.add(write, lost, [self.block], EARLY)
 
     def read(self, data: bytes, started: float = EARLY) -> None:
         """Read the block."""
@@ -81,61 +81,61 @@ OTHER = 'lost; read back: the PLC holds another value'
 def test_what_is_read_is_compared(cells: dict[str, str], values: list[float] | str, data: bytes,
                                   detail: str) -> None:
     mapping = make_mapping(command='ReadWrite', **cells)  # type: ignore[arg-type]
-    doubtful = Doubtful(mapping, mapping, values)
-    assert doubtful.details == []
-    doubtful.read(data)
-    assert doubtful.details == [detail]
-    assert doubtful.results[0].latency == 1.0
-    doubtful.read(data)
-    assert len(doubtful.results) == 1
+    unconfirmed = Unconfirmed(mapping, mapping, values)
+    assert unconfirmed.details == []
+    unconfirmed.read(data)
+    assert unconfirmed.details == [detail]
+    assert unconfirmed.results[0].latency == 1.0
+    unconfirmed.read(data)
+    assert len(unconfirmed.results) == 1
 
 
 def test_words_are_found_within_a_larger_block() -> None:
-    doubtful = Doubtful(make_mapping('N7:0', length=4), make_mapping('N7:2', 'Write'), [5])
-    doubtful.read(b'\5\0\5\0\5\0\6\0')
-    assert doubtful.details == [HELD]
+    unconfirmed = Unconfirmed(make_mapping('N7:0', length=4), make_mapping('N7:2', 'Write'), [5])
+    unconfirmed.read(b'\5\0\5\0\5\0\6\0')
+    assert unconfirmed.details == [HELD]
 
 
 @pytest.mark.parametrize(('text', 'length', 'station'), [
     ('N7:1', 2, 1), ('N7:0', 1, 2), ('N8:0', 1, 1), ('N7:2', 1, 1)])
 def test_nothing_reads_all_of_the_words(text: str, length: int, station: int) -> None:
     mapping = make_mapping(text, 'Write', length=length, station=station)
-    doubtful = Doubtful(make_mapping('N7:0', length=2), mapping, [1] * length)
-    assert doubtful.details == ['lost; not read back: no row reads all of these words']
-    assert doubtful.backs.next_due() is None
+    unconfirmed = Unconfirmed(make_mapping('N7:0', length=2), mapping, [1] * length)
+    assert unconfirmed.details == ['lost; not read back: no row reads all of these words']
+    assert unconfirmed.backs.next_due() is None
 
 
 def test_read_that_began_before_the_write_ended_says_nothing() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
-    doubtful = Doubtful(mapping, mapping, [5])
-    doubtful.read(b'\5\0', EARLY - 0.001)
-    assert doubtful.details == []
+    unconfirmed = Unconfirmed(mapping, mapping, [5])
+    unconfirmed.read(b'\5\0', EARLY - 0.001)
+    assert unconfirmed.details == []
 
 
 def test_patience_ends() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
-    doubtful = Doubtful(mapping, mapping, [5])
-    assert doubtful.backs.next_due() == EARLY + PATIENCE
-    doubtful.backs.expire(EARLY + PATIENCE - 0.001)
-    assert doubtful.details == []
-    doubtful.backs.expire(EARLY + PATIENCE)
-    assert doubtful.details == ['lost; not read back within 2 s']
-    assert doubtful.backs.next_due() is None
+    unconfirmed = Unconfirmed(mapping, mapping, [5])
+    assert unconfirmed.backs.next_due() == EARLY + PATIENCE
+    unconfirmed.backs.expire(EARLY + PATIENCE - 0.001)
+    assert unconfirmed.details == []
+    unconfirmed.backs.expire(EARLY + PATIENCE)
+    assert unconfirmed.details == ['lost; not read back within 2 s']
+    assert unconfirmed.backs.next_due() is None
 
 
 @pytest.mark.parametrize(('text', 'is_overtaken'), [('N7:0', True), ('N7:1', False)])
 def test_newer_write_ends_the_wait_for_the_same_words(text: str, is_overtaken: bool) -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
-    doubtful = Doubtful(mapping, mapping, [5])
-    doubtful.backs.overtaken(Write(make_mapping(text, 'Write'), [6], EARLY), EARLY)
-    assert doubtful.details == ([OVERTAKEN] if is_overtaken else [])
+    unconfirmed = Unconfirmed(mapping, mapping, [5])
+    unconfirmed.backs.overtaken(Write(make_mapping(text, 'Write'), [6], EARLY), EARLY)
+    assert unconfirmed.details == ([OVERTAKEN] if is_overtaken else [])
 
 
 def test_end_of_the_line() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
-    doubtful = Doubtful(mapping, mapping, [5])
-    doubtful.backs.end(EARLY)
-    assert doubtful.details == ['lost; not read back before the line went down']
+    unconfirmed = Unconfirmed(mapping, mapping, [5])
+    unconfirmed.backs.end(EARLY)
+    assert unconfirmed.details == ['lost; not read back before the line went down']
 
 
 def bench_of(text: str = 'N7:0', **cells: int) -> tuple[DriverBench, Mapping]:

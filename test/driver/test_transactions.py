@@ -20,11 +20,10 @@ from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.job_tasks import Steps
-from abdf1_ros.driver.points import Outcome, Write
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.transactions import (
     carry_out,
     echo,
-    Ending,
     identify,
     read_block,
     read_values,
@@ -39,7 +38,14 @@ from abdf1_ros.settings.network import Network
 import pytest
 from support.mappings import make_mapping
 
+LATER = 2.5
+
 STATUS = bytes.fromhex('00ee34490535 2f3033202020202020200000060000001000'.replace(' ', ''))
+
+
+def clock() -> float:
+    """Return when a write ends that has begun at 0."""
+    return LATER
 
 
 def reply(data: bytes = b'', sts: int = 0) -> Packet:
@@ -106,30 +112,30 @@ def unsent() -> LinkError:
 def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcome,
                               done: int) -> None:
     write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
-    requests, ending = converse(carry_out(write), answers)
-    assert isinstance(ending, Ending)
+    requests, result = converse(carry_out(write, clock), answers)
+    assert isinstance(result, WriteResult)
     assert requests == write.commands[:len(requests)]
-    assert (ending.outcome, ending.done) == (outcome, done)
-    assert (ending.error is None) is (outcome is Outcome.WRITTEN)
-    assert ('(after 1 of 2 packets were written)' in ending.detail) is (
+    assert (result.outcome, result.packets_done) == (outcome, done)
+    assert (result.error is None) is (outcome is Outcome.WRITTEN)
+    assert ('(after 1 of 2 packets were written)' in result.detail) is (
         outcome is Outcome.PARTLY)
 
 
-@pytest.mark.parametrize('answers, is_unsure', [
+@pytest.mark.parametrize('answers, is_unconfirmed', [
     ([reply(), reply()], False), ([reply(sts=0x10)], False), ([unsent()], False),
     ([reply(), reply(sts=0x10)], False), ([reply(), unsent()], False),
     ([reply(sts=0x02)], True), ([CommandTimeout()], True), ([reply(), CommandTimeout()], True)])
-def test_what_a_read_has_to_show(answers: list[Packet | LinkError], is_unsure: bool) -> None:
+def test_what_a_read_has_to_show(answers: list[Packet | LinkError], is_unconfirmed: bool) -> None:
     write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
-    _, ending = converse(carry_out(write), answers)
-    assert isinstance(ending, Ending)
-    assert ending.is_unsure is is_unsure
+    _, result = converse(carry_out(write, clock), answers)
+    assert isinstance(result, WriteResult)
+    assert result.is_unconfirmed is is_unconfirmed
 
 
 def test_broadcast_is_confirmed_by_nobody() -> None:
     write = Write(make_mapping('N7:0', 'Write', station=255), [7], 0.0)
-    _, ending = converse(carry_out(write), [reply()])
-    assert ending == Ending(Outcome.BROADCAST, '', 1)
+    _, result = converse(carry_out(write, clock), [reply()])
+    assert result == write.result(Outcome.BROADCAST, '', LATER, 1)
 
 
 def bit_write(processor: str | None = '5/01') -> Write:
@@ -143,29 +149,30 @@ READ = (0x0F, bytes.fromhex('A2 02 03 85 04 00'))
 
 def test_refused_bits_are_written_by_reading_their_word_and_writing_it_back() -> None:
     write = bit_write()
-    requests, ending = converse(carry_out(write), [REFUSED, reply(b'\xFF\xFE'), reply()])
+    requests, result = converse(carry_out(write, clock), [REFUSED, reply(b'\xFF\xFE'), reply()])
     assert requests == [*write.commands, READ, (0x0F, bytes.fromhex('AA 02 03 85 04 00 FF FD'))]
-    assert ending == Ending(Outcome.WRITTEN, REWRITTEN, 1)
+    assert result == write.result(Outcome.WRITTEN, REWRITTEN, LATER, 1)
     assert 'a change that the PLC made in between is lost' in REWRITTEN
 
 
 def test_masked_write_that_is_taken_is_all() -> None:
-    assert converse(carry_out(bit_write()), [reply()]) == (
-        bit_write().commands, Ending(Outcome.WRITTEN, '', 1))
+    write = bit_write()
+    assert converse(carry_out(write, clock), [reply()]) == (
+        write.commands, write.result(Outcome.WRITTEN, '', LATER, 1))
 
 
 @pytest.mark.parametrize('processor, sts', [(None, 0x10), ('5/03', 0x10), ('5/01', 0x50)])
 def test_other_refusals_of_bits_stay_failures(processor: str | None, sts: int) -> None:
-    requests, ending = converse(carry_out(bit_write(processor)), [reply(sts=sts)])
-    assert isinstance(ending, Ending)
-    assert (len(requests), ending.outcome, ending.done) == (1, Outcome.FAILED, 0)
+    requests, result = converse(carry_out(bit_write(processor), clock), [reply(sts=sts)])
+    assert isinstance(result, WriteResult)
+    assert (len(requests), result.outcome, result.packets_done) == (1, Outcome.FAILED, 0)
 
 
 def test_words_are_never_read_and_written_back() -> None:
     mapping = make_mapping('B3:4', 'Write', plc='SLC', processor='5/01')
-    requests, ending = converse(carry_out(Write(mapping, [3], 0.0)), [REFUSED])
-    assert isinstance(ending, Ending)
-    assert (len(requests), ending.outcome) == (1, Outcome.FAILED)
+    requests, result = converse(carry_out(Write(mapping, [3], 0.0), clock), [REFUSED])
+    assert isinstance(result, WriteResult)
+    assert (len(requests), result.outcome) == (1, Outcome.FAILED)
 
 
 @pytest.mark.parametrize('answers, outcome', [
@@ -176,16 +183,16 @@ def test_words_are_never_read_and_written_back() -> None:
     ([reply(b'\1\2'), CommandTimeout()], Outcome.UNKNOWN),
     ([reply(b'\1\2'), unsent()], Outcome.NOT_SENT)])
 def test_writing_back_that_fails(answers: list[Packet | LinkError], outcome: Outcome) -> None:
-    _, ending = converse(carry_out(bit_write()), [REFUSED, *answers])
-    assert isinstance(ending, Ending)
-    assert (ending.outcome, ending.done) == (outcome, 0)
-    assert ending.error is not None
+    _, result = converse(carry_out(bit_write(), clock), [REFUSED, *answers])
+    assert isinstance(result, WriteResult)
+    assert (result.outcome, result.packets_done) == (outcome, 0)
+    assert result.error is not None
 
 
 def test_reason_for_a_word_that_cannot_be_read_names_both_refusals() -> None:
-    _, ending = converse(carry_out(bit_write()), [REFUSED, reply(sts=0x50)])
-    assert isinstance(ending, Ending)
-    assert ending.detail == (
+    _, result = converse(carry_out(bit_write(), clock), [REFUSED, reply(sts=0x50)])
+    assert isinstance(result, WriteResult)
+    assert result.detail == (
         'STS 10: illegal command, format or length, or the file does not exist; its word '
         'cannot be read to be written back: '
         'STS 50: address not there, or memory protected')
@@ -194,11 +201,11 @@ def test_reason_for_a_word_that_cannot_be_read_names_both_refusals() -> None:
 def test_bits_of_two_words_of_which_one_fails_are_partly_written() -> None:
     mapping = make_mapping('B3:4/15', 'Write', plc='SLC', length=2, processor='ML1000')
     write = Write(mapping, [1, 1], 0.0)
-    requests, ending = converse(carry_out(write), [
+    requests, result = converse(carry_out(write, clock), [
         REFUSED, reply(b'\0\0'), reply(), REFUSED, CommandTimeout()])
     assert requests[3:] == [write.commands[1], (0x0F, bytes.fromhex('A2 02 03 85 05 00'))]
-    assert isinstance(ending, Ending)
-    assert (ending.outcome, ending.done) == (Outcome.PARTLY, 1)
+    assert isinstance(result, WriteResult)
+    assert (result.outcome, result.packets_done) == (Outcome.PARTLY, 1)
 
 
 def test_identify() -> None:

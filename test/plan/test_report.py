@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from abdf1_ros.plan.report import Kind, make_report, Remark, Report
+from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -43,12 +43,12 @@ def test_settings_that_are_odd_come_first_with_their_stations() -> None:
     mapping = make_mapping('N7:0', station=3)
     odd = replace(mapping, remarks=('map.csv:2:8 (Max): too much',))
     assert report_of(odd, data_bits=7).remarks()[:2] == [
-        Remark(Kind.SETTING, 'Data_Bits 7: DF1 sends bytes of 8 bits; with less the check of '
-                             'nearly every message fails'),
-        Remark(Kind.SETTING, 'map.csv:2:8 (Max): too much', 3)]
+        Remark(RemarkKind.SETTING, 'Data_Bits 7: DF1 sends bytes of 8 bits; with less the check '
+                                   'of nearly every message fails'),
+        Remark(RemarkKind.SETTING, 'map.csv:2:8 (Max): too much', 3)]
 
 
-def texts(report: Report, kind: Kind) -> list[str]:
+def texts(report: Report, kind: RemarkKind) -> list[str]:
     return [remark.text for remark in report.remarks() if remark.kind is kind]
 
 
@@ -69,7 +69,7 @@ def test_times_of_one_read(plc: str, settings: dict[str, object], line_time: flo
 
 def test_map_without_a_row_is_odd() -> None:
     remark, = report_of().remarks()
-    assert (remark.kind, remark.station) == (Kind.MAP, None)
+    assert (remark.kind, remark.station) == (RemarkKind.MAP, None)
     assert remark.text == 'the map has no usable row: nothing is read or written'
 
 
@@ -79,7 +79,7 @@ def test_map_without_a_row_is_odd() -> None:
 def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: int,
                                                 begin: str | None) -> None:
     report = report_of(make_mapping('N7:0', station=station), mode=mode, station=own)
-    found = texts(report, Kind.STATION)
+    found = texts(report, RemarkKind.STATION)
     if mode == 'Master' or begin is None:
         assert found == []
     else:
@@ -90,19 +90,19 @@ def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: in
 @pytest.mark.parametrize(('station', 'octal'), [
     (10, 8), (17, 15), (77, 63), (7, None), (18, None)])
 def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: int | None) -> None:
-    found = texts(report_of(make_mapping('N7:0', station=station, via=3)), Kind.STATION)
+    found = texts(report_of(make_mapping('N7:0', station=station, via=3)), RemarkKind.STATION)
     if octal is None:
         assert found == []
     else:
         text, = found
         assert 'on Data Highway Plus node numbers are octal' in text
         assert text.endswith(f'if {station} is what a panel there shows, write {octal}')
-    assert texts(report_of(make_mapping('N7:0', station=station)), Kind.STATION) == []
+    assert texts(report_of(make_mapping('N7:0', station=station)), RemarkKind.STATION) == []
 
 
 @pytest.mark.parametrize('mode', ['Peer', 'Slave'])
 def test_via_is_for_a_master(mode: str) -> None:
-    text, = texts(report_of(make_mapping('N7:0', station=2, via=3), mode=mode), Kind.STATION)
+    text, = texts(report_of(make_mapping('N7:0', station=2, via=3), mode=mode), RemarkKind.STATION)
     assert 'Via is for Mode Master' in text
 
 
@@ -122,17 +122,17 @@ def test_period_that_another_baud_rate_can_keep() -> None:
     report = report_of(make_mapping('N7:0', length=2, period=50, tag='speed'))
     assert report.load == pytest.approx((TWO_WORDS + ANSWERS) / 0.05)  # 148.3 %
     assert report.needed_baud() == 19200  # 27.1 ms and 20 ms of 50 ms
-    assert texts(report, Kind.LOAD) == [
+    assert texts(report, RemarkKind.LOAD) == [
         'the periods need 148% of the time there is at 9600 baud, so reads come late; '
         '19200 baud would do']
-    assert texts(report, Kind.PERIOD) == [
+    assert texts(report, RemarkKind.PERIOD) == [
         'speed: a read takes 74.2 ms, the period is 50.0 ms']
 
 
 def test_period_that_no_baud_rate_can_keep() -> None:
     report = report_of(make_mapping('N7:0', period=15))  # the answers alone take 20 ms
     assert report.needed_baud() is None
-    assert 'no baud rate is enough, only longer periods' in texts(report, Kind.LOAD)[0]
+    assert 'no baud rate is enough, only longer periods' in texts(report, RemarkKind.LOAD)[0]
 
 
 def test_together_the_periods_may_be_too_short_though_none_is() -> None:
@@ -140,16 +140,16 @@ def test_together_the_periods_may_be_too_short_though_none_is() -> None:
                 for station in (1, 2)]
     report = report_of(*mappings)
     assert report.load == pytest.approx(2 * (TWO_WORDS + ANSWERS) / 0.1)
-    assert texts(report, Kind.PERIOD) == []
-    assert len(texts(report, Kind.LOAD)) == 1
+    assert texts(report, RemarkKind.PERIOD) == []
+    assert len(texts(report, RemarkKind.LOAD)) == 1
 
 
 @pytest.mark.parametrize('period, warned', [(90, True), (95, False)])
 def test_little_time_left(period: int, warned: bool) -> None:
     # 75.2 ms are 84 % of 90 ms and 79 % of 95 ms.
     report = report_of(make_mapping('N7:0', length=2, period=period))
-    assert bool(texts(report, Kind.LOAD)) is warned
-    assert not warned or '82% of the line' in texts(report, Kind.LOAD)[0]
+    assert bool(texts(report, RemarkKind.LOAD)) is warned
+    assert not warned or '82% of the line' in texts(report, RemarkKind.LOAD)[0]
 
 
 def test_as_often_as_the_line_allows_is_no_load() -> None:
@@ -160,10 +160,10 @@ def test_as_often_as_the_line_allows_is_no_load() -> None:
 
 def test_our_own_station_is_mapped() -> None:
     mapping = make_mapping('N7:0', station=5, tag='speed')
-    assert texts(report_of(mapping), Kind.STATION) == [
+    assert texts(report_of(mapping), RemarkKind.STATION) == [
         'station 5 of speed is our own Station in the net file; '
         'two nodes of one address cannot talk']
-    assert texts(report_of(mapping, station=6), Kind.STATION) == []
+    assert texts(report_of(mapping, station=6), RemarkKind.STATION) == []
 
 
 def test_served_words_and_broadcasts_clash_with_nothing() -> None:
@@ -177,28 +177,28 @@ def test_served_words_and_broadcasts_clash_with_nothing() -> None:
 def test_two_plc_types_at_one_station() -> None:
     report = report_of(make_mapping('N7:0', tag='a'), make_mapping('F8:0', 'Write', tag='b'),
                        make_mapping('B3:0', plc='SLC', tag='c', item=2))
-    assert texts(report, Kind.STATION) == [
+    assert texts(report, RemarkKind.STATION) == [
         'station 1 has more than one PLC_Type: PLC5 (a, b), SLC (c)']
 
 
 def test_common_interface_file_is_no_second_plc() -> None:
     report = report_of(make_mapping('N7:0', plc='SLC'),
                        make_mapping('011', plc='PLC2', access='CIF', item=2))
-    assert texts(report, Kind.STATION) == []
+    assert texts(report, RemarkKind.STATION) == []
 
 
 def test_several_stations_in_full_duplex() -> None:
     mappings = [make_mapping('N7:0', station=station, item=station) for station in (1, 3)]
-    assert texts(report_of(*mappings), Kind.STATION) == []
+    assert texts(report_of(*mappings), RemarkKind.STATION) == []
     assert 'the map has stations 1, 3' in texts(report_of(*mappings, mode='Peer'),
-                                                Kind.STATION)[0]
+                                                RemarkKind.STATION)[0]
 
 
 def test_gap_that_costs_a_second_read() -> None:
     report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:200', item=2))
     assert report.scan_time == pytest.approx(2 * (ONE_WORD + ANSWERS))
     remark, = report.remarks()
-    assert (remark.kind, remark.station) == (Kind.GAP, 1)
+    assert (remark.kind, remark.station) == (RemarkKind.GAP, 1)
     assert remark.text == (
         'station 1, N7:0 to N7:200: 2 reads with 0 words that no tag needs take 144.2 ms; '
         'side by side in the PLC the tags would take 74.2 ms')
@@ -209,7 +209,7 @@ def test_gap_that_is_read_across() -> None:
     report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:19', item=2))
     block, = report.blocks
     assert block.words == 20
-    text, = texts(report, Kind.GAP)
+    text, = texts(report, RemarkKind.GAP)
     assert '1 read with 18 words that no tag needs' in text
 
 
@@ -219,11 +219,11 @@ def test_neighbours_have_no_gap() -> None:
 
 def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:
     report = report_of(make_mapping('T4:0.ACC', item=1), make_mapping('T4:200.ACC', item=2))
-    text, = texts(report, Kind.GAP)
+    text, = texts(report, RemarkKind.GAP)
     assert text.startswith('station 1, T4:0.ACC to T4:200.ACC: 2 reads')
 
 
 def test_many_tags_are_not_all_named() -> None:
     report = report_of(*(make_mapping(f'N7:{number}', period=20, tag=f't{number}', item=number)
                          for number in range(5)))
-    assert texts(report, Kind.PERIOD)[0].startswith('t0, t1, t2 and 2 more: a read takes')
+    assert texts(report, RemarkKind.PERIOD)[0].startswith('t0, t1, t2 and 2 more: a read takes')

@@ -196,11 +196,11 @@ def _is_confirmed(session: Session, writing: data.Writing) -> bool:
 def _carry_out(session: Session, writing: data.Writing) -> int:
     """Write, show what the PLC holds after it, and return the exit status."""
     mapping = writing.mapping
-    ending = writing.carry_out(session)
-    text = ending.outcome.value + (f': {ending.detail}' if ending.detail else '')
-    if ending.outcome is not Outcome.WRITTEN:
+    result = writing.carry_out(session)
+    text = str(result)
+    if result.outcome is not Outcome.WRITTEN:
         _complain(f'{mapping.address} of station {mapping.station}: {text}')
-        return EXIT_UNKNOWN if ending.outcome in _UNCERTAIN else EXIT_FAILED
+        return EXIT_UNKNOWN if result.outcome in _UNCERTAIN else EXIT_FAILED
     try:
         place = f'{mapping.address} of station {mapping.station}'
         print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)

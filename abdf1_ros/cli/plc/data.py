@@ -21,10 +21,11 @@ from collections.abc import Mapping as MappingType
 from concurrent.futures import Future
 from dataclasses import replace
 import re
+import time
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.driver.points import Outcome, Write
-from abdf1_ros.driver.transactions import carry_out, Ending, identify, read_values
+from abdf1_ros.driver.points import Outcome, Write, WriteResult
+from abdf1_ros.driver.transactions import carry_out, identify, read_values
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.address import Address
@@ -122,19 +123,19 @@ class Writing:
 
     def __init__(self, mapping: Mapping, texts: Sequence[str]) -> None:
         self.mapping = mapping
-        self._write = Write(mapping, parse_values(mapping, texts), 0.0)
+        self._write = Write(mapping, parse_values(mapping, texts), time.monotonic())
 
     @property
     def value(self) -> str:
         """Return what is to be written, for people."""
         return self._write.value
 
-    def carry_out(self, session: Session) -> Ending:
+    def carry_out(self, session: Session) -> WriteResult:
         """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
-        future: Future[Ending] = Future()
+        future: Future[WriteResult] = Future()
         try:
             # Inside, as an interrupt may come while the command is on the line already.
-            session.start(self.mapping.station, carry_out(self._write), future)
+            session.start(self.mapping.station, carry_out(self._write, time.monotonic), future)
             return session.wait(future)
         except (KeyboardInterrupt, PortLost) as error:
             session.close()
@@ -142,7 +143,8 @@ class Writing:
             if failure is None:
                 return future.result()
             is_sent = getattr(failure, 'sent', True)
-            return Ending(Outcome.UNKNOWN if is_sent else Outcome.NOT_SENT, str(failure), 0)
+            outcome = Outcome.UNKNOWN if is_sent else Outcome.NOT_SENT
+            return self._write.result(outcome, str(failure), time.monotonic())
 
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:

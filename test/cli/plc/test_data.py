@@ -30,8 +30,7 @@ from abdf1_ros.cli.plc.data import (
     Writing,
 )
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.driver.points import Outcome
-from abdf1_ros.driver.transactions import Ending
+from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.settings.mapping import Mapping
@@ -123,7 +122,7 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 class InterruptedSession:
     """A session that is interrupted when its command is on the line already."""
 
-    def start(self, station: int, steps: object, future: Future[Ending]) -> None:
+    def start(self, station: int, steps: object, future: Future[WriteResult]) -> None:
         self._future = future
         raise KeyboardInterrupt
 
@@ -132,8 +131,8 @@ class InterruptedSession:
 
 
 def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
-    ending = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession()))
-    assert (ending.outcome, ending.detail) == (Outcome.UNKNOWN, 'port lost: closed')
+    result = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession()))
+    assert (result.outcome, result.detail) == (Outcome.UNKNOWN, 'port lost: closed')
 
 
 @pytest.mark.parametrize('model, processor', [
