@@ -24,6 +24,11 @@ a warm-up --seconds are measured: transactions, and the processor time of this p
 polls, two reads), with frames made beforehand: the time that no driver in Python can go below, on
 this machine in this minute. "driver" has a listener that only counts; "driver and publish"
 publishes every value with rclpy, as the node does, and is left out where there is no ROS.
+They take turns, as the machine is faster in some seconds than in others: the last columns are
+the median and the least of what each round has shown as a multiple of its own system calls.
+
+"without waiting" is the driver alone, on a line in memory: the best of several loops, and how many
+calls of Python functions (entries of generators included) and of C functions a transaction is.
 "troubles" counts errors and retries.
 
 Run it as "python test/benchmarks/cpu_time.py"; without ROS it needs nothing but the package.
@@ -32,12 +37,16 @@ Run it as "python test/benchmarks/cpu_time.py"; without ROS it needs nothing but
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from importlib.util import find_spec
 import itertools
 import os
 from pathlib import Path
 import signal
+from statistics import median
 import sys
 import time
 import tty
@@ -60,6 +69,7 @@ STATION = 1
 MAPPING = block_of(STATION)
 NETWORK = Network(baud=115200)
 TRANSACTIONS = 0x10000
+_IN_MEMORY = 2000
 
 
 class Publisher(Listener):
@@ -137,6 +147,37 @@ def _take_turns(line: BareLine, talk: Iterator[list[tuple[bytes, int]]],
     return done, time.monotonic() - begun
 
 
+def measure_without_waiting(loops: int = 7) -> tuple[float, float, float]:
+    """Return s of processor time, calls of Python functions and of C functions of each."""
+    replies = [reply for _, reply in map(_frames, range(1, _IN_MEMORY + 2))]
+    best = min(_time_in_memory(replies) for _ in range(loops))
+    calls: Counter[str] = Counter()
+    sys.setprofile(lambda frame, event, argument: calls.update((event,)))
+    try:
+        _time_in_memory(replies)
+    finally:
+        sys.setprofile(None)
+    return best, calls['call'] / _IN_MEMORY, calls['c_call'] / _IN_MEMORY
+
+
+def _time_in_memory(replies: list[bytes]) -> float:
+    """Return s of processor time of a transaction."""
+    machine = Driver(NETWORK, [MAPPING], DriverSettings(), Listener()).machine
+    at_once: list[bytes] = []
+    machine.send_at_once = at_once.append
+    used = time.process_time()
+    machine.start(0.0)
+    machine.data_to_send()
+    for number, reply in enumerate(replies[:-1]):
+        now = 0.001 * number
+        for heard in frames.ACK, reply:
+            machine.handle_timeout(now)
+            machine.receive_data(heard, now)
+            machine.data_to_send()
+            assert machine.next_call is not None
+    return (time.process_time() - used) / (len(replies) - 1)
+
+
 def _take(descriptor: int, count: int) -> None:
     while count > 0:
         count -= len(os.read(descriptor, count))
@@ -183,24 +224,29 @@ def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--warm-up', type=float, default=0.5, metavar='SECONDS')
-    parser.add_argument('--seconds', type=float, default=5.0)
+    parser.add_argument('--warm-up', type=float, default=0.2, metavar='SECONDS')
+    parser.add_argument('--seconds', type=float, default=0.5)
+    parser.add_argument('--rounds', type=int, default=15)
     options = parser.parse_args()
-    print(f'reads of {WORDS} words, half duplex, {options.seconds:g} s each; '
-          f'load of the machine {os.getloadavg()[0]:.1f}')
-    print('                     transactions/s  processor time of each  troubles')
-    rate, used = measure_system_calls(options.warm_up, options.seconds)
-    print(f'{"system calls":19}  {rate:14.0f}  {1e6 * used:19.1f} us  {"":>8}', flush=True)
-    kinds: list[tuple[str, type[Listener]]] = [
-        ('driver', Listener), ('driver and publish', Publisher)]
-    for name, kind in kinds:
-        try:
-            listener = kind()
-        except ImportError:
-            continue
-        rate, used = measure(listener, options.warm_up, options.seconds)
-        print(f'{name:19}  {rate:14.0f}  {1e6 * used:19.1f} us  {listener.troubles:8d}',
-              flush=True)
+    print(f'reads of {WORDS} words, half duplex; {options.rounds} rounds of '
+          f'{options.seconds:g} s each; load of the machine {os.getloadavg()[0]:.1f}')
+    used, calls, c_calls = measure_without_waiting()
+    print(f'without waiting: {1e6 * used:.1f} us, {calls:.0f} calls of Python functions and '
+          f'{c_calls:.0f} of C functions')
+    listeners = {'driver': Listener()}
+    if find_spec('rclpy') is not None:
+        listeners['driver and publish'] = Publisher()
+    kinds = {'system calls': measure_system_calls}
+    kinds |= {name: partial(measure, listener) for name, listener in listeners.items()}
+    rounds = [{name: kind(options.warm_up, options.seconds) for name, kind in kinds.items()}
+              for _ in range(options.rounds)]
+    print('                     transactions/s  processor time of each  median ratio   least')
+    for name in kinds:
+        rate, used = (median(one[name][column] for one in rounds) for column in (0, 1))
+        ratios = [one[name][1] / one['system calls'][1] for one in rounds]
+        print(f'{name:19}  {rate:14.0f}  {1e6 * used:19.1f} us  {median(ratios):12.2f}'
+              f'  {min(ratios):6.2f}')
+    print('troubles:', sum(listener.troubles for listener in listeners.values()))
 
 
 if __name__ == '__main__':
