@@ -1,7 +1,7 @@
 # "make help" lists the targets. For GNU make 4.3 or later.
 
 PYTHON ?= python3
-DEMO_SECONDS ?= 20
+DEMO_SECONDS ?= 30
 FUZZ_SECONDS ?= 60
 MUTANTS ?= 200
 SOAK_HOURS ?= 24
@@ -65,16 +65,12 @@ $(INSTALLED): setup.py requirements/ros.txt requirements/test.txt requirements/t
 	touch $@
 
 .PHONY: demo
-demo: $(INSTALLED) ## Run bridge and simulated PLC for DEMO_SECONDS (20; 0: until Ctrl-C)
+demo: $(INSTALLED) ## Run bridge and simulated PLC for DEMO_SECONDS (30; 0: until Ctrl-C)
 	@$(PY) -m abdf1_ros demo --seconds $(DEMO_SECONDS)
 
 .PHONY: demo-peer
 demo-peer: $(INSTALLED) ## The same on a full-duplex line
 	@$(PY) -m abdf1_ros demo --peer --seconds $(DEMO_SECONDS)
-
-.PHONY: demo-heartbeats
-demo-heartbeats: $(INSTALLED) ## Show what happens when publisher, PLC program or bridge dies (40 s)
-	@$(PY) -m abdf1_ros demo --heartbeats
 
 .PHONY: test
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some

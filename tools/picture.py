@@ -17,7 +17,7 @@ Run a command and draw what it prints as a picture of a terminal.
 
 From the root, as docs/demo.svg was made::
 
-    python -m tools.picture docs/demo.svg 'make demo' python -m abdf1_ros demo --seconds 12
+    python -m tools.picture docs/demo.svg 'make demo' python -m abdf1_ros demo --seconds 1
 """
 
 from __future__ import annotations

@@ -22,7 +22,9 @@ the domain is one of our own unless ROS_DOMAIN_ID is set.
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 import math
 import os
@@ -52,11 +54,17 @@ _PATIENCE = 15.0
 _OK = DiagnosticStatus.OK
 _WRITTEN = (211, 222, 233, 244)
 _TOO_LARGE = (1, 2, 3, 5000)
+_ALIVE, _IN_CONTROL = 'simulator: station 2: ROS alive', 'simulator: station 2: ROS in control'
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What is shown: files, the simulated line, and who plays which part."""
+    """
+    What is shown: files, the simulated line, and who plays which part.
+
+    ``guarded`` is a row that is published only while the program of its PLC runs: such a PLC has a
+    ladder, which watches over ROS.
+    """
 
     title: str
     net_file: str
@@ -64,22 +72,19 @@ class Scene:
     simulator: tuple[str, ...]
     failing_station: int
     watched: str
-    surviving: str | None
+    surviving: str | None = None
+    guarded: str | None = None
     push: str | None = None
 
 
 HALF_DUPLEX = Scene(
     'A PLC-5 (station 1) and an SLC 5/03 (station 2), simulated on one half-duplex DF1 line',
-    'net.csv', 'map.csv', (), 2, 'part_counter', 'line_speed')
+    'heartbeat_net.csv', 'heartbeat_map.csv', ('--ladder', '2'), 1, 'cell_interlocks',
+    surviving='plc_alive', guarded='doors')
 FULL_DUPLEX = Scene(
     'A PLC-5 (station 1), simulated on a full-duplex DF1 line',
-    'peer_net.csv', 'peer_map.csv', ('--full-duplex', '1'), 1, 'line_speed', None,
-    'msg 1 N7:50 11 22 33 44')
-
-
-HEARTBEATS = Scene(
-    'An SLC 5/03 (station 2) whose program watches over ROS, and is watched',
-    'net.csv', 'heartbeat_map.csv', ('--ladder', '2'), 2, 'doors', None)
+    'peer_net.csv', 'peer_map.csv', ('--full-duplex', '1'), 1, 'line_speed',
+    push='msg 1 N7:50 11 22 33 44')
 
 
 class Interrupted(Exception):
@@ -94,7 +99,7 @@ class Watcher(Node):
         self.values: dict[str, Any] = {}
         self.results: list[DiagnosticStatus] = []
         self.statuses: dict[str, DiagnosticStatus] = {}
-        self.missed = 0
+        self.missed: Counter[str] = Counter()
         for mapping in mappings:
             if mapping.reads:
                 self.create_subscription(
@@ -111,7 +116,7 @@ class Watcher(Node):
         deadline = self.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
 
         def missed(event: Any) -> None:
-            self.missed += event.total_count_change
+            self.missed[mapping.tag] += event.total_count_change
 
         self.create_subscription(
             MESSAGES[mapping.message_type], topic, lambda message: None,
@@ -128,6 +133,30 @@ class Watcher(Node):
         self.statuses.update({status.name: status for status in message.status})
 
 
+class Speed:
+    """The program that commands a speed: it publishes one five times a second while it lives."""
+
+    def __init__(self, node: Node, mapping: Mapping) -> None:
+        self._message = MESSAGES[mapping.message_type]
+        self._publisher = node.create_publisher(self._message, f'/abdf1/write/{mapping.topic}', 1)
+        self._next = math.inf
+        self.value = 0
+
+    def live(self) -> None:
+        """Begin, with a command at rest."""
+        self.value, self._next = 0, time.monotonic()
+
+    def die(self) -> None:
+        """Publish nothing any more."""
+        self._next = math.inf
+
+    def run(self) -> None:
+        """Publish if it is time."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + 0.2
+            self._publisher.publish(self._message(data=[self.value]))
+
+
 class Demo:
     """Tell the story; every step waits for what it shows to have happened."""
 
@@ -141,14 +170,21 @@ class Demo:
                              '-p', f'map_file:={map_file}')
         self._simulator_args = ('--pty', str(link), *scene.simulator)
         self._children: list[subprocess.Popen[bytes]] = []
+        self._lamps: dict[str, float] = {}  # those that are on, and since when
+        self._rest = b''
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._watcher = Watcher(mappings)
+        self._speed = Speed(self._watcher, self._mappings['speed']) if scene.guarded else None
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
-        self._simulator = self._start('simulator', *self._simulator_args)
+        self._simulator = self._start('simulator', *self._simulator_args, stdout=subprocess.PIPE)
+        assert self._simulator.stdout is not None
+        os.set_blocking(self._simulator.stdout.fileno(), False)
         self._bridge = self._start('node', *self._bridge_args)
         self._title(self._scene.title)
+        if self._speed:
+            self._speed.live()
         domain = os.environ['ROS_DOMAIN_ID']
         look_on = 'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor' \
             if shutil.which('ros2') else f'{Path(sys.executable).parent / "monitor"}'
@@ -158,6 +194,10 @@ class Demo:
         if self._scene.push:
             self._show_push(self._scene.push)
         self._show_failure(f'station {self._scene.failing_station}')
+        if self._speed and self._scene.guarded:
+            self._show_death_of_publisher(self._speed)
+            self._show_death_of_program(self._speed, self._scene.guarded)
+            self._show_death_of_bridge(self._speed)
         self._show_diagnostics()
         while not seconds or time.monotonic() - self._begin < seconds:
             self._pause(5.0)
@@ -170,16 +210,31 @@ class Demo:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
             process.wait(_PATIENCE)
+        self._relay()
         self._watcher.destroy_node()
         rclpy.try_shutdown()
 
-    def _start(self, name: str, *args: str) -> subprocess.Popen[bytes]:
+    def _start(self, name: str, *args: str, stdout: int | None = None) -> subprocess.Popen[bytes]:
         # By its executable, which a signal during the imports ends quietly. A session of its own:
         # Ctrl-C is for us, who then end both in order.
         code = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
         self._children.append(subprocess.Popen(
-            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, start_new_session=True))
+            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, stdout=stdout,
+            start_new_session=True))
         return self._children[-1]
+
+    def _relay(self) -> None:
+        """Print what the simulator tells, and remember which lamps of its PLC are on."""
+        assert self._simulator.stdout is not None
+        with suppress(BlockingIOError):
+            data = os.read(self._simulator.stdout.fileno(), 65536)
+            *lines, self._rest = (self._rest + data).split(b'\n')
+            for line in lines:
+                print(line.decode(), flush=True)
+                lamp, _, state = line.decode().rpartition(' ')
+                self._lamps.pop(lamp, None)
+                if state == 'on':
+                    self._lamps[lamp] = time.monotonic()
 
     def _show_reads(self) -> None:
         polled = {tag for tag, mapping in self._mappings.items() if mapping.polls}
@@ -231,9 +286,9 @@ class Demo:
         watched = self._mappings[self._scene.watched]
         deadline = self._watcher.expect(watched)
         self._pause(1.0)
-        self._watcher.missed = 0
+        self._watcher.missed.clear()
         self._command(f'silent {self._scene.failing_station}')
-        self._wait('the loss to be noticed', lambda: self._watcher.missed > 0)
+        self._wait('the loss to be noticed', lambda: self._watcher.missed[watched.tag] > 0)
         self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of '
                   f'{deadline:.1f} s is told: no more values')
         self._wait('the station to be inactive', lambda: self._level(station) != _OK)
@@ -251,8 +306,69 @@ class Demo:
         self._say(f'the other goes on: /abdf1/read/{tag} {before} -> '
                   f'{_shown(self._watcher.values[tag])}')
 
+    def _take_control(self, speed: Speed) -> None:
+        """Let a person press reset, and the publisher command a speed."""
+        self._wait('a steady heartbeat', lambda: time.monotonic() > 3.5 + self._lamps.get(
+            _ALIVE, math.inf))
+        self._command('reset 2')
+        self._wait('the lamp', lambda: _IN_CONTROL in self._lamps)
+        speed.value = 800
+        self._wait('the speed in the PLC', lambda: self._used() == 800)
+        self._say('800 is published to /abdf1/write/speed, and the program uses it: '
+                  'used_speed is [800]')
+
+    def _used(self) -> int:
+        return int(self._watcher.values['used_speed'][0])
+
+    def _show_death_of_publisher(self, speed: Speed) -> None:
+        self._title('4. The publisher of a command dies; first a person presses reset at the PLC')
+        self._take_control(speed)
+        self._watcher.results.clear()
+        died = time.monotonic()
+        speed.die()
+        self._say('it publishes nothing any more')
+        self._wait('the fallback value',
+                   lambda: self._used() == 0 and _IN_CONTROL not in self._lamps)
+        self._say(f'{time.monotonic() - died:.1f} s later the bridge has written the Fallback, '
+                  'and the program uses [0]')
+
+    def _show_death_of_program(self, speed: Speed, tag: str) -> None:
+        self._title('5. The program of the PLC stands still, while its port goes on answering')
+        deadline = self._watcher.expect(self._mappings[tag])
+        self._pause(1.0)
+        self._watcher.missed.clear()
+        self._command('program 2')
+        self._wait('the silence to be noticed', lambda: self._watcher.missed[tag] > 0)
+        self._say(f'/abdf1/read/{tag} is withheld; a subscriber with a deadline of '
+                  f'{deadline:.1f} s is told: no more values')
+        self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
+        self._print_statuses('mappings')
+        self._command('run 2')
+        self._wait('values', lambda: self._level('mappings') == _OK)
+        self._print_statuses('mappings')
+        speed.live()
+
+    def _show_death_of_bridge(self, speed: Speed) -> None:
+        self._title('6. The bridge dies (kill -9); first another reset, as control is gone')
+        self._take_control(speed)
+        self._children.remove(self._bridge)
+        self._bridge.kill()
+        self._bridge.wait()
+        died = time.monotonic()
+        self._wait('the watchdog', lambda: _IN_CONTROL not in self._lamps)
+        self._say(f'{time.monotonic() - died:.1f} s later the watchdog of the PLC has taken the '
+                  'speed away')
+        self._title('   ... and comes back, but without a reset it gets no control')
+        self._watcher.values.clear()
+        self._bridge = self._start('node', *self._bridge_args)
+        self._wait('a heartbeat', lambda: _ALIVE in self._lamps)
+        self._wait('values', lambda: {'used_speed', 'doors'} <= self._watcher.values.keys())
+        self._wait('the diagnostics', lambda: self._level('mappings') == _OK)
+        self._say(f'800 is still published, and the program uses [{self._used()}]')
+
     def _show_diagnostics(self) -> None:
-        self._title('4. Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
+        number = 7 if self._speed else 4
+        self._title(f'{number}. Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
         self._print_statuses(*(name.partition(': ')[2] for name in self._watcher.statuses))
         self._say('the counters of the line that are not 0:')
         for pair in self._watcher.statuses['abdf1: counters'].values:
@@ -286,9 +402,11 @@ class Demo:
         while time.monotonic() < end:
             if condition():
                 return True
-            for process in (self._simulator, self._bridge):
-                if process.poll() is not None:
-                    raise Interrupted('a process has ended; see above')
+            if any(process.poll() is not None for process in self._children):
+                raise Interrupted('a process has ended; see above')
+            self._relay()
+            if self._speed:
+                self._speed.run()
             rclpy.spin_once(self._watcher, timeout_sec=0.05)
         return condition()
 
@@ -297,85 +415,6 @@ class Demo:
 
     def _say(self, text: str) -> None:
         print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
-
-
-class HeartbeatDemo(Demo):
-    """
-    The three deaths: of the publisher, of the bridge, of the program of the PLC.
-
-    What the lamps of the PLC say is printed by the simulator.
-    """
-
-    _speed = 0
-    _next_message = math.inf
-
-    def run(self, seconds: float) -> None:
-        """Tell the story; ``seconds`` do not shorten it."""
-        self._simulator = self._start('simulator', *self._simulator_args)
-        self._bridge = self._start('node', *self._bridge_args)
-        self._title(self._scene.title)
-        self._publisher = self._watcher.create_publisher(
-            MESSAGES[self._mappings['speed'].message_type], '/abdf1/write/speed', 10)
-        self._wait('values', lambda: 'doors' in self._watcher.values)
-        self._take_control('1. Somebody publishes a speed, and a person resets the PLC')
-        self._title('2. The publisher dies')
-        self._next_message = math.inf
-        self._wait('the fallback value', lambda: self._used() == 0)
-        self._say('the program of the PLC uses 0; the result on ~/write_results: '
-                  f'"{self._fallback_result()}"')
-        self._take_control('   ... and comes back; control needs another reset')
-        self._title('3. The program of the PLC stands still, while its port answers')
-        deadline = self._watcher.expect(self._mappings['doors'])
-        self._pause(1.0)
-        self._watcher.missed = 0
-        self._command('program 2')
-        self._wait('the silence to be noticed', lambda: self._watcher.missed > 0)
-        self._say('/abdf1/read/doors is withheld; a subscriber with a deadline of '
-                  f'{deadline:.1f} s is told')
-        self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
-        self._print_statuses('mappings')
-        self._command('run 2')
-        self._take_control('   ... and runs again')
-        self._title('4. The bridge dies (kill -9)')
-        self._bridge.kill()
-        self._bridge.wait()
-        self._pause_without_bridge(4.5)
-        self._say('the watchdog of the PLC has taken the speed away, 3 s after the last heartbeat')
-
-    def _take_control(self, title: str) -> None:
-        self._title(title)
-        self._speed, self._next_message = 0, 0.0
-        self._pause(4.5)
-        self._command('reset 2')
-        self._pause(0.5)
-        self._speed = 800
-        self._wait('the speed in the PLC', lambda: self._used() == 800)
-        self._say('speed 800 is published, and used by the program (N11:2)')
-
-    def _used(self) -> int:
-        return int(self._watcher.values['used_speed'][0])
-
-    def _fallback_result(self) -> str:
-        text = 'fallback value written'
-        found = [result.message for result in self._watcher.results
-                 if result.message.startswith(text)]
-        return found[-1] if found else ''
-
-    def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
-        return super()._spin_until(lambda: self._feed() or condition(), limit)
-
-    def _feed(self) -> bool:
-        """Publish the speed five times a second."""
-        if time.monotonic() >= self._next_message:
-            self._next_message = time.monotonic() + 0.2
-            self._publisher.publish(
-                MESSAGES[self._mappings['speed'].message_type](data=[self._speed]))
-        return False
-
-    def _pause_without_bridge(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            rclpy.spin_once(self._watcher, timeout_sec=0.05)
 
 
 def _shown(values: Any) -> str:
@@ -394,21 +433,17 @@ def _seconds(text: str) -> float:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo; return 0, or 1 when something did not happen."""
     parser = command_parser('demo', __doc__)
-    parser.add_argument('--seconds', type=_seconds, default=20.0,
+    parser.add_argument('--seconds', type=_seconds, default=30.0,
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
     parser.add_argument('--peer', action='store_true',
                         help='show a full-duplex line, on which the PLC writes by itself')
-    parser.add_argument('--heartbeats', action='store_true',
-                        help='show heartbeats, fallback values and guarded reads (40 s)')
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
         try:
-            line = Path(folder) / 'line'
-            demo = HeartbeatDemo(HEARTBEATS, line) if options.heartbeats else Demo(
-                FULL_DUPLEX if options.peer else HALF_DUPLEX, line)
-            return _tell(demo, options.seconds)
+            scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
+            return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
         except KeyboardInterrupt:
             print()
     return 0

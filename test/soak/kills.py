@@ -19,7 +19,9 @@ The PLC is a simulated SLC in this process, whose program is the ladder of the h
 clock tells when the machine's command (N11:2) is 0. Bridge and publisher are processes. Each kind
 of death is repeated; a histogram of the times stands beside the bound of rule 16 of
 docs/heartbeats.md: Fallback_After, the longest transaction and the writes of the Fallback for a
-publisher, the preset of the watchdog and a period for a bridge.
+publisher, the preset of the watchdog and a period for a bridge. Where the bridge lives on or ends
+in order, the time counts until the fallback value is in the PLC as well (N10:1). After each death
+whoever can comes back, and must not get control without a reset.
 
     .venv/bin/python test/soak/kills.py --rounds 20
 """
@@ -28,12 +30,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 _HERE = Path(__file__).resolve().parent
@@ -60,22 +65,23 @@ MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Requ
        'Requires_Timeout\n'
        f'beat,Heartbeat,N10:0,1,SLC,{PERIOD * 1000:.0f},,,speed,1500\n'
        f'speed,Write,N10:1,1,SLC,,0,{FALLBACK_AFTER * 1000:.0f},,\n')
+# It publishes 0 until it reads another value, and ends in order at SIGINT, with its last one.
 PUBLISHER = """
-import rclpy, sys, time
+import rclpy, select, signal, sys, time
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Int16MultiArray
-rclpy.init()
+rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
 node = rclpy.create_node('kills_publisher')
 out = node.create_publisher(Int16MultiArray, '/abdf1/write/speed', 1)
-end = time.monotonic() + float(sys.argv[1])
+is_over = []
+signal.signal(signal.SIGINT, lambda *_: is_over.append(True))
 value = 0
-begun = None
-while time.monotonic() < end:
+while not is_over:
     out.publish(Int16MultiArray(data=[value]))
-    if begun is None and out.get_subscription_count():
-        begun = time.monotonic()
-    if begun is not None and time.monotonic() - begun > float(sys.argv[2]):
-        value = 800
-    time.sleep(0.1)
+    if select.select([sys.stdin], [], [], 0.1)[0]:
+        value = int(sys.stdin.readline())
+node.destroy_node()
+rclpy.shutdown()
 """
 
 
@@ -86,13 +92,11 @@ class Cell:
         self._folder = folder
         self.in_control: list[tuple[float, bool]] = []
         self.plc = simulated_plc(1, 'SLC', time.monotonic, ('S:0', 8), ('N7:0', 8))
+        self.plc.lock = threading.RLock()  # the link's thread lets its program run as well
         ladder = Ladder(self.plc.table, round(PRESET * 100), self._lamp)
         self.plc.run_ladder(ladder)
         self.ladder = ladder
-        self.line = PtyLine(str(folder / 'plc'))
-        self.link = LinkThread(
-            Machine(multidrop([self.plc]), checksum=Checksum.CRC), self.line.open)
-        self.link.start()
+        self.plug_in()
         (folder / 'net.csv').write_text(NET.format(port=self.line.name), encoding='utf-8')
         (folder / 'map.csv').write_text(MAP, encoding='utf-8')
         self.bridge: subprocess.Popen[bytes] | None = None
@@ -101,6 +105,18 @@ class Cell:
     def _lamp(self, at: float, lamp: Lamp, is_on: bool) -> None:
         if lamp is Lamp.IN_CONTROL:
             self.in_control.append((at, is_on))
+
+    def plug_in(self) -> None:
+        """Give the bridge a port, with the PLC at its other end."""
+        self.line = PtyLine(str(self._folder / 'plc'))
+        self.link = LinkThread(
+            Machine(multidrop([self.plc]), checksum=Checksum.CRC), self.line.open)
+        self.link.start()
+
+    def pull(self) -> None:
+        """Take the port away; the PLC runs on."""
+        self.link.stop()
+        self.line.close()
 
     def wait(self, condition: Callable[[], bool], what: str, seconds: float = 40.0) -> None:
         """Let the PLC run until something is so."""
@@ -120,6 +136,10 @@ class Cell:
         """Return the command that the machine uses, N11:2."""
         return self.ladder._get(11, 2)
 
+    def written(self) -> int:
+        """Return the command that the bridge has written, N10:1."""
+        return self.ladder._get(10, 1)
+
     def start_bridge(self) -> None:
         self.bridge = subprocess.Popen(
             [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', '-p',
@@ -127,9 +147,33 @@ class Cell:
              f'map_file:={self._folder / "map.csv"}', '--log-level', 'fatal'],
             stderr=subprocess.DEVNULL)
 
-    def start_publisher(self, seconds: float = 600.0) -> None:
+    def crash_bridge(self) -> None:
+        """Kill the bridge, and start it again at once, as a supervisor does."""
+        self.signal_bridge(signal.SIGKILL)
+        assert self.bridge is not None
+        self.bridge.wait()
+        self.start_bridge()
+
+    def signal_bridge(self, number: signal.Signals) -> None:
+        """Send a signal to the bridge, if there is one."""
+        if self.bridge is not None:
+            self.bridge.send_signal(number)
+
+    def start_publisher(self) -> None:
         self.publisher = subprocess.Popen(
-            [sys.executable, '-c', PUBLISHER, str(seconds), '4.5'], stderr=subprocess.DEVNULL)
+            [sys.executable, '-c', PUBLISHER], stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+    def signal_publisher(self, number: signal.Signals) -> None:
+        """Send a signal to the publisher, if there is one."""
+        if self.publisher is not None:
+            self.publisher.send_signal(number)
+
+    def publish(self, value: int) -> None:
+        """Have the publisher publish another value."""
+        assert self.publisher is not None
+        assert self.publisher.stdin is not None
+        self.publisher.stdin.write(f'{value}\n'.encode())
+        self.publisher.stdin.flush()
 
     def take_control(self) -> None:
         """Bring all to work: bridge, publisher, a reset of the PLC, and a speed of 800."""
@@ -142,12 +186,29 @@ class Cell:
         while not self.ladder.is_on(Lamp.IN_CONTROL) and time.monotonic() < give_up:
             self.ladder.press_reset()
             self.rest(0.3)
+        self.publish(800)
         self.wait(lambda: self.used() == 800, 'the speed')
 
-    def until_fallen(self) -> float:
-        """Return when the machine's command became 0."""
+    def until_fallen(self, is_written: bool) -> float:
+        """
+        Return when the machine's command became 0.
+
+        ``is_written``: not before the bridge has written the fallback value.
+        """
         self.wait(lambda: self.used() == 0, 'the output to fall back')
-        return next(at for at, is_on in reversed(self.in_control) if not is_on)
+        fallen = next(at for at, is_on in reversed(self.in_control) if not is_on)
+        if not is_written or self.written() == 0:
+            return fallen
+        self.wait(lambda: self.written() == 0, 'the fallback value')
+        return time.monotonic()
+
+    def recover(self) -> None:
+        """Bring back who can come back, and see that nobody has control by itself."""
+        self.plc.faults.silent = False
+        for process in (self.bridge, self.publisher):
+            if process is not None and process.poll() is None:
+                process.send_signal(signal.SIGCONT)
+        self.rest(1.5)
 
     def stop_publisher(self) -> None:
         """End the publisher, so that the next round begins with a command at rest."""
@@ -162,22 +223,43 @@ class Cell:
                 process.send_signal(signal.SIGCONT)
                 process.kill()
                 process.wait()
-        self.link.stop()
-        self.line.close()
+        with suppress(OSError):
+            self.pull()
 
 
-def _signal_bridge(number: signal.Signals) -> Callable[[Cell], None]:
-    def kill(cell: Cell) -> None:
-        assert cell.bridge is not None
-        cell.bridge.send_signal(number)
-    return kill
+@dataclass(frozen=True, slots=True)
+class Death:
+    """
+    How something dies, and within how many seconds the output has to have fallen back.
+
+    ``is_written`` tells that the fallback value has to be in the PLC by then. ``after`` goes on
+    with it, and brings back what it took.
+    """
+
+    kill: Callable[[Cell], None]
+    bound: float
+    is_written: bool = False
+    after: Callable[[Cell], None] = Cell.recover
 
 
-def _signal_publisher(number: signal.Signals) -> Callable[[Cell], None]:
-    def kill(cell: Cell) -> None:
-        assert cell.publisher is not None
-        cell.publisher.send_signal(number)
-    return kill
+def _bridge(number: signal.Signals, bound: float, is_written: bool = False) -> Death:
+    return Death(lambda cell: cell.signal_bridge(number), bound, is_written)
+
+
+def _publisher(number: signal.Signals) -> Death:
+    return Death(lambda cell: cell.signal_publisher(number), BY_BRIDGE, is_written=True)
+
+
+def _crash_on(cell: Cell) -> None:
+    """Crash twice more, each time when the PLC has heard of it; press reset all along."""
+    for _ in range(2):
+        cell.wait(lambda: cell.ladder.is_on(Lamp.ALIVE), 'a heartbeat after a crash')
+        cell.ladder.press_reset()
+        cell.rest(0.5)
+        cell.crash_bridge()
+        cell.ladder.press_reset()
+        cell.rest(0.5)
+    cell.recover()
 
 
 def _program(cell: Cell) -> None:
@@ -190,58 +272,57 @@ def _download(cell: Cell) -> None:
     cell.plc.set_mode(Setting.REMOTE)
 
 
-def _power(cell: Cell) -> None:
-    cell.plc.cycle_power()
+def _plug_in(cell: Cell) -> None:
+    cell.plug_in()
+    cell.recover()
 
 
-def _pull(cell: Cell) -> None:
+def _fall_silent(cell: Cell) -> None:
     cell.plc.faults.silent = True
 
 
 BY_PLC = PRESET + PERIOD + SLACK
 BY_BRIDGE = FALLBACK_AFTER + TRANSACTION + SLACK
-DEATHS: dict[str, tuple[Callable[[Cell], None], float]] = {
-    'bridge SIGKILL': (_signal_bridge(signal.SIGKILL), BY_PLC),
-    'bridge SIGSTOP': (_signal_bridge(signal.SIGSTOP), BY_PLC),
-    'bridge SIGTERM': (_signal_bridge(signal.SIGTERM), 2.0 + SLACK),
-    'bridge SIGHUP': (_signal_bridge(signal.SIGHUP), 2.0 + SLACK),
-    'publisher SIGKILL': (_signal_publisher(signal.SIGKILL), BY_BRIDGE),
-    'publisher SIGSTOP': (_signal_publisher(signal.SIGSTOP), BY_BRIDGE),
-    'publisher SIGTERM': (_signal_publisher(signal.SIGTERM), BY_BRIDGE),
-    'line dead': (_pull, BY_PLC),
-    'PROGRAM and RUN': (_program, SLACK),
-    'download': (_download, SLACK),
-    'power cycle': (_power, SLACK),
+IN_ORDER = 2.0 + SLACK
+DEATHS = {
+    'bridge SIGKILL': _bridge(signal.SIGKILL, BY_PLC),
+    'bridge SIGSTOP': _bridge(signal.SIGSTOP, BY_PLC),
+    'bridge SIGTERM': _bridge(signal.SIGTERM, IN_ORDER, is_written=True),
+    'bridge SIGHUP': _bridge(signal.SIGHUP, IN_ORDER, is_written=True),
+    'bridge crash loop': Death(Cell.crash_bridge, BY_PLC, after=_crash_on),
+    'publisher SIGKILL': _publisher(signal.SIGKILL),
+    'publisher SIGSTOP': _publisher(signal.SIGSTOP),
+    'publisher SIGTERM': _publisher(signal.SIGTERM),
+    'publisher clean exit': _publisher(signal.SIGINT),
+    'port pulled': Death(Cell.pull, BY_PLC, after=_plug_in),
+    'station silent': Death(_fall_silent, BY_PLC),
+    'PROGRAM and RUN': Death(_program, SLACK),
+    'download': Death(_download, SLACK),
+    'power cycle': Death(lambda cell: cell.plc.cycle_power(), SLACK),
 }
 
 
 def run(cell: Cell, name: str) -> float:
     """Kill once and return the seconds until the output was 0."""
-    kill, _ = DEATHS[name]
+    death = DEATHS[name]
     cell.take_control()
     died = time.monotonic()
-    kill(cell)
-    fallen = cell.until_fallen() - died
-    # Whoever comes back must not take control by itself.
-    cell.plc.faults.silent = False
-    if cell.bridge is not None and cell.bridge.poll() is None:
-        cell.bridge.send_signal(signal.SIGCONT)
-    if cell.publisher is not None and cell.publisher.poll() is None:
-        cell.publisher.send_signal(signal.SIGCONT)
-    cell.rest(1.5)
-    if cell.used() != 0:
-        raise SystemExit(f'kills: after {name} the output came back without a reset')
+    death.kill(cell)
+    fallen = cell.until_fallen(death.is_written) - died
+    changes = len(cell.in_control)
+    death.after(cell)
+    if len(cell.in_control) != changes:
+        raise SystemExit(f'kills: after {name} ROS had control again without a reset')
     cell.stop_publisher()
     return fallen
 
 
-def histogram(times: list[float]) -> str:
-    """Return how many times lie in each tenth of the longest."""
-    top = max(*times, 1e-9)
-    counts = [0] * 10
+def histogram(times: list[float], bound: float) -> str:
+    """Return how many times lie in each tenth of the bound, and how many beyond."""
+    counts = [0] * 11
     for value in times:
-        counts[min(9, int(10 * value / top))] += 1
-    return ' '.join(f'{count:2}' for count in counts)
+        counts[min(10, int(10 * value / bound))] += 1
+    return ' '.join(f'{count or ".":>2}' for count in counts)
 
 
 def main() -> int:
@@ -254,17 +335,18 @@ def main() -> int:
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['PYTHONPATH'] = str(_HERE.parent.parent)
-    print(f'{"death":18} rounds  median  longest  bound   ten steps up to the longest')
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # or, under nohup, the bridge ignores it as well
+    print(f'{"death":20} rounds median longest bound   in each tenth of the bound, and beyond')
     is_late = False
     with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
         cell = Cell(Path(folder))
         try:
             for name in options.only or DEATHS:
                 times = sorted(run(cell, name) for _ in range(options.rounds))
-                bound = DEATHS[name][1]
+                bound = DEATHS[name].bound
                 is_late |= times[-1] > bound
-                print(f'{name:18} {len(times):6} {times[len(times) // 2]:7.2f} {times[-1]:8.2f} '
-                      f'{bound:6.2f}   {histogram(times)}', flush=True)
+                print(f'{name:20} {len(times):6} {times[len(times) // 2]:6.2f} {times[-1]:7.2f} '
+                      f'{bound:5.2f}   {histogram(times, bound)}', flush=True)
         finally:
             cell.close()
     return int(is_late)
