@@ -30,6 +30,7 @@ import re
 
 from abdf1_ros.cli.main import COMMANDS as MAINS
 from abdf1_ros.messages import Message
+from abdf1_ros.ros.lines import OPTIONS
 from abdf1_ros.ros.parameters import Parameters
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.network import FIELDS, load_network
@@ -46,8 +47,7 @@ LAUNCH_ARGUMENTS = set(re.findall(
     r"DeclareLaunchArgument\(\s*'(\w+)'",
     ''.join(path.read_text('utf-8') for path in (documents.ROOT / 'launch').glob('*.py'))))
 PARAMETERS = {entry.name for entry in fields(Parameters)} | {
-    entry.parameter for entry in FIELDS.values()} | set(re.findall(
-        r"declare_parameter\('(\w+)'", (ROOT / 'abdf1_ros' / 'ros/lines.py').read_text('utf-8')))
+    entry.parameter for entry in FIELDS.values()} | OPTIONS.keys()
 TOPICS = {'read', 'write', *re.findall(r"'~/(\w+)'", (
     ROOT / 'abdf1_ros' / 'ros/node.py').read_text('utf-8'))}
 AT_HOME = {'fuzz'}  # folders that a page puts into the user's home

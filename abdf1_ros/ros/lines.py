@@ -23,9 +23,10 @@ a line needs 1.3 ms. What goes wrong with one line stays with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+import difflib
 import os
 from pathlib import Path
 import sys
@@ -33,7 +34,7 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.ros.interlocks import END_LIMIT
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
 from abdf1_ros.ros.process import (
@@ -45,6 +46,7 @@ from abdf1_ros.ros.process import (
 )
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
@@ -71,6 +73,9 @@ exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty parameters or where
 run, 1 where ROS does not start (log directory, network)
 """
 
+# The parameters of /lines, with what they are by default.
+OPTIONS: dict[str, Any] = {'lines': [], 'strict_lines': False}
+
 # A line that has ended by an internal error is started again after so long (s).
 _RESTART_AFTER = 2.0
 
@@ -79,7 +84,10 @@ _STATUS_PERIOD = 1.0
 # A service that nobody uses, for memory and time to start: 13 MiB of 264 with a hundred nodes.
 _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
 
-# The end takes no longer than this (s): what is not destroyed by then ends with the process.
+# Of the end (s): until when writes that have come are waited for, counted from its beginning; how
+# long the last diagnostics may take; and the nodes, of which those that are left end with the
+# process.
+_LATEST_WRITES = 3.0
 _LAST_WORDS = 0.5
 _DESTRUCTION = 1.0
 
@@ -96,12 +104,34 @@ class LineName:
         return f'{self.namespace.rstrip("/")}/{self.name}'
 
 
+class _Callbacks(threading.Thread):
+    """Run the callbacks of a node until ``end``; ``error`` is a bug that has ended that."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(name='callbacks', daemon=True)
+        self.error: Exception | None = None
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+
+    def run(self) -> None:
+        """Run callbacks."""
+        try:
+            self._executor.spin()
+        except Exception as error:  # a bug must not end the other lines
+            self.error = error
+
+    def end(self, give_up: float) -> None:
+        """Take no more callbacks; wait for the one that runs up to a monotonic clock value."""
+        self._executor.shutdown(timeout_sec=0)
+        self.join(max(0.0, give_up - time.monotonic()))
+
+
 class Line:
     """
     One bridge with the thread of its callbacks.
 
     ``faults`` say why it does not run; ``restarts`` counts internal errors that ended it. All
-    but that thread is called by one thread.
+    is called by one thread.
     """
 
     def __init__(self, name: LineName) -> None:
@@ -109,89 +139,136 @@ class Line:
         self.node: BridgeNode | None = None
         self.faults: tuple[str, ...] = ()
         self.restarts = 0
-        self._executor: SingleThreadedExecutor | None = None
-        self._thread: threading.Thread | None = None
-        self._error: Exception | None = None
+        self._callbacks: _Callbacks | None = None
+        self._closing: threading.Thread | None = None
         self._again: float | None = None
+        self._logger = get_logger(str(self.name).strip('/').replace('/', '.'))
 
-    def start(self) -> None:
-        """Begin; with faulty files there is no node after it."""
+    @property
+    def port(self) -> str:
+        """Return the port of a line that runs, the same text for all names of a device."""
+        if self.node is None:
+            return ''
+        name = self.node.port
+        return name.lower() if '://' in name else os.path.realpath(name)
+
+    def start(self, others: Iterable[Line] = ()) -> None:
+        """Begin; with faulty files, or the port of one of the ``others``, there is no node."""
         self.faults = ()
-        logger = get_logger(str(self.name).strip('/').replace('/', '.'))
         try:
-            node = BridgeNode(self.name.name, namespace=self.name.namespace, has_timer=False,
-                              parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
+            self.node = BridgeNode(
+                self.name.name, namespace=self.name.namespace, has_timer=False,
+                parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
         except ConfigurationError as error:
             self.faults = tuple(map(str, error.problems))
         except (NameValidationException, RuntimeError, ValueError) as error:
             self.faults = (' '.join(str(error).split()),)
-        if self.faults:
-            for fault in self.faults:
-                logger.fatal(printable(fault))
-            return
-        self.node, self._error = node, None
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._spin, name='callbacks', daemon=True)
-        self._thread.start()
-        node.start()
-
-    def _spin(self) -> None:
-        assert self._executor is not None
-        try:
-            self._executor.spin()
         except Exception as error:  # a bug must not end the other lines
-            self._error = error
+            self._begin_again(error)
+        if self.node is not None:
+            self._take_port(others)
+        for fault in self.faults:
+            self._logger.fatal(printable(fault))
+        if self.node is not None:
+            self._callbacks = _Callbacks(self.node)
+            self._callbacks.start()
+            self.node.start()
 
-    def check(self, now: float) -> None:
-        """Publish what is due; begin again after an internal error (``now`` in s)."""
+    def _take_port(self, others: Iterable[Line]) -> None:
+        """Leave a port to the line that has it: two masters on one line disturb each other."""
+        owner = next((line for line in others if line is not self and line.port == self.port),
+                     None)
+        if owner is not None and self.node is not None:
+            self.faults = (f'port: {self.node.port} is the port of {owner.name}',)
+            self.node.destroy_node()
+            self.node = None
+
+    def check(self, others: Iterable[Line]) -> None:
+        """Publish what is due; begin again after an internal error."""
         node = self.node
         if node is None:
-            if self._again is not None and now >= self._again:
+            is_closing = self._closing is not None and self._closing.is_alive()
+            if self._again is not None and time.monotonic() >= self._again and not is_closing:
                 self._again = None
-                self.start()
-        elif node.link.has_failed or self._error is not None:
-            self.restarts += 1
-            error = self._error or node.link.state.text
-            node.get_logger().error(f'ends by an internal error and begins again: {error!r}')
-            self.close(time.monotonic() + _LAST_WORDS)
-            self._again = now + _RESTART_AFTER
+                self.start(others)
+        elif node.link.has_failed:
+            self._begin_again(node.link.state.text)
+        elif self._callbacks is not None and self._callbacks.error is not None:
+            self._begin_again(self._callbacks.error)
         else:
             try:
                 node.check()
             except Exception as error:  # the same
-                self._error = error
+                self._begin_again(error)
+
+    def _begin_again(self, error: Exception | str) -> None:
+        """End the node, which may take seconds that the other lines do not have."""
+        self.restarts += 1
+        self._logger.error(f'ends by an internal error and begins again: {error!r}')
+        self._again = time.monotonic() + _RESTART_AFTER
+        node, callbacks = self.node, self._callbacks
+        if node is not None:
+            self.node, self._callbacks = None, None
+            self._closing = threading.Thread(
+                target=_close, args=(node, callbacks), name='closing', daemon=True)
+            self._closing.start()
 
     def ask_to_stop(self) -> None:
         """Begin the end of the link."""
         if self.node is not None:
             self.node.link.ask_to_stop()
 
-    def close(self, give_up: float) -> None:
-        """End the link, tell the last state, and the thread; all of it waits up to ``give_up``."""
-        node, self.node = self.node, None
-        if node is None:
-            return
-        self._say_last_words(node, give_up)
-        self._end_thread()
+    def quit(self, give_up: float) -> BridgeNode | None:  # noqa: A003
+        """End the link and the callbacks; return the node if nobody uses it any more."""
+        if self._closing is not None:
+            self._closing.join(max(0.0, give_up - time.monotonic()))
+        if self.node is not None:
+            _say_last_words(self.node, give_up)
+        if self._callbacks is not None:
+            self._callbacks.end(give_up)
+        return None if self.is_busy else self.node
+
+    @property
+    def is_busy(self) -> bool:
+        """Tell whether a thread of it still runs."""
+        return any(thread is not None and thread.is_alive()
+                   for thread in (self._callbacks, self._closing))
+
+
+def _close(node: BridgeNode, callbacks: _Callbacks | None) -> None:
+    give_up = time.monotonic() + _LAST_WORDS
+    _say_last_words(node, give_up)
+    if callbacks is not None:
+        callbacks.end(time.monotonic() + _LAST_WORDS)
+    with suppress(Exception):  # it may be broken
         node.destroy_node()
 
-    def quit(self, give_up: float) -> BridgeNode | None:  # noqa: A003
-        """Do the same, but return the node instead of destroying it."""
-        node, self.node = self.node, None
-        if node is not None:
-            self._say_last_words(node, give_up)
-            self._end_thread()
-        return node
 
-    def _say_last_words(self, node: BridgeNode, give_up: float) -> None:
-        with suppress(Exception):  # it may be broken
-            node.stop(Duration(seconds=max(0.0, give_up - time.monotonic())))
+def _say_last_words(node: BridgeNode, give_up: float) -> None:
+    with suppress(Exception):  # the same
+        node.stop(Duration(seconds=max(0.0, give_up - time.monotonic())))
 
-    def _end_thread(self) -> None:
-        if self._executor is not None and self._thread is not None:
-            self._executor.shutdown(timeout_sec=0)
-            self._thread.join(_LAST_WORDS)
+
+def _options(node: Node) -> tuple[list[str], bool]:
+    """Return which lines are wanted, and whether all have to run; raises ConfigurationError."""
+    problems = []
+    for name in getattr(node, '_parameter_overrides', {}):  # rclpy has no public way to ask
+        close = difflib.get_close_matches(name, OPTIONS, 1, 0.75)
+        if close and name not in OPTIONS:
+            problems.append(Problem(
+                f'parameter {name}', f'there is no such parameter; did you mean {close[0]}?'))
+    anything = ParameterDescriptor(dynamic_typing=True)
+    wanted, is_strict = (node.declare_parameter(name, default, anything).value
+                         for name, default in OPTIONS.items())
+    if isinstance(wanted, str) or not all(isinstance(name, str) for name in wanted):
+        problems.append(Problem('parameter lines', (
+            f"{wanted!r} should be a list of names, as in -p 'lines:=[press_plc, paint_plc]'")))
+    if not isinstance(is_strict, bool):
+        problems.append(Problem(
+            'parameter strict_lines', f'{is_strict!r} should be true or false'))
+    if problems:
+        raise ConfigurationError(problems)
+    return list(wanted), is_strict
 
 
 class LinesNode(Node):
@@ -199,9 +276,7 @@ class LinesNode(Node):
 
     def __init__(self) -> None:
         super().__init__(NODE_NAME)
-        names = self.declare_parameter('lines', Parameter.Type.STRING_ARRAY)
-        self.wanted: list[str] = list(names.value or ())
-        self.is_strict = bool(self.declare_parameter('strict_lines', False).value)
+        self.wanted, self.is_strict = _options(self)
         self.is_asked_again = False
         self._publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/reload', self._reload)
@@ -244,7 +319,7 @@ class Lines:
         for line in self.lines:
             if is_ended():
                 return
-            line.start()
+            line.start(self.lines)
             self._look()
 
     def run(self, ended: threading.Event) -> None:
@@ -256,68 +331,79 @@ class Lines:
         now = time.monotonic()
         self._executor.spin_once(timeout_sec=0)
         for line in self.lines:
-            line.check(now)
+            line.check(self.lines)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
             for line in self.lines:
                 if line.faults:
-                    line.start()
+                    line.start(self.lines)
         if now >= self._next_status:
             self._next_status = now + _STATUS_PERIOD
             self._node.publish(self.lines)
 
     def end(self) -> bool:
         """End all links, then all nodes; return whether there was time for the latter."""
+        began = time.monotonic()
         nodes = [line.node for line in self.lines if line.node is not None]
         for node in nodes:
             node.begin_end()
-        give_up = time.monotonic() + END_LIMIT  # for all of them together
         for node in nodes:
-            node.finish_end(give_up)
+            node.finish_end(began + END_LIMIT)  # for all of them together
         for line in self.lines:
             line.ask_to_stop()
         for node in nodes:
             node.link.stop()
         # Writes that have come already are refused now; whoever waits for a result gets it.
-        give_up, taken = time.monotonic() + LAST_WRITES, -1
+        give_up, taken = min(time.monotonic() + LAST_WRITES, began + _LATEST_WRITES), -1
         while taken != (taken := sum(node.writes_taken for node in nodes)) and \
                 time.monotonic() < give_up:
             time.sleep(QUIET)
         give_up = time.monotonic() + _LAST_WORDS
-        left = [line.quit(give_up) for line in self.lines]
+        left = [*filter(None, (line.quit(give_up) for line in self.lines))]
         give_up = time.monotonic() + _DESTRUCTION
         while left and time.monotonic() < give_up:
-            node_or_none = left.pop()
-            if node_or_none is not None:
-                node_or_none.destroy_node()
+            left.pop().destroy_node()
         self._executor.shutdown()
         self._node.destroy_node()
-        return not left
+        return not left and not any(line.is_busy for line in self.lines)
 
 
-def sections(path: str) -> Iterator[LineName]:
+def sections(path: str) -> list[LineName]:
     """
-    Yield the nodes that a parameter file has a section for; those with wildcards are no nodes.
+    Return the nodes that a parameter file has a section for; those with wildcards are no nodes.
 
-    Raises ConfigurationError where there is none that can be read.
+    Raises ConfigurationError where there is none that can be read, and where one comes twice:
+    only one of them would run.
     """
     try:
-        tree = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        tree = yaml.compose(Path(path).read_text(encoding='utf-8'))
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise ConfigurationError([Problem(path, ' '.join(str(error).split()))]) from None
-    yield from _sections_of('', tree)
+    found: dict[LineName, int] = {}
+    problems = []
+    for name, line in _sections_of('', tree, 1):
+        first = found.setdefault(name, line)
+        if first != line:
+            problems.append(Problem(Place(path, line), (
+                f'{printable(str(name))} has a section in line {first} already; '
+                'each line needs a name of its own')))
+    if problems:
+        raise ConfigurationError(problems)
+    return [*found]
 
 
-def _sections_of(above: str, tree: Any) -> Iterator[LineName]:
-    if not isinstance(tree, dict):
+def _sections_of(above: str, tree: yaml.Node | None, line: int) -> Iterator[tuple[LineName, int]]:
+    if not isinstance(tree, yaml.MappingNode):
         return
-    if 'ros__parameters' in tree:
+    keys = [(str(key.value).strip('/'), key.start_mark.line + 1, below)
+            for key, below in tree.value]
+    if any(key == 'ros__parameters' for key, _, _ in keys):
         namespace, _, name = above.rpartition('/')
         if '*' not in above and name != NODE_NAME:
-            yield LineName(namespace or '/', name)
+            yield LineName(namespace or '/', name), line
         return
-    for key, below in tree.items():
-        yield from _sections_of(f'{above}/{str(key).strip("/")}', below)
+    for key, number, below in keys:
+        yield from _sections_of(f'{above}/{key}', below, number)
 
 
 def parameter_files(args: Sequence[str]) -> list[str]:
@@ -358,7 +444,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _run(given: Sequence[str], ended: threading.Event) -> int:
-    if any(text.startswith(('__node:=', '__name:=', '__ns:=')) for text in given):
+    if any(word in text for text in given for word in ('__node:=', '__name:=', '__ns:=')):
         raise ConfigurationError([Problem('arguments', (
             'the sections of the parameter file name the nodes; __node and __ns would give all '
             'of them one name'))])

@@ -125,10 +125,12 @@ class BridgeNode(Node):
     def __init__(self, name: str = NODE_NAME, *, has_timer: bool = True, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
         try:
-            configuration = configure(self)
-        except ConfigurationError:
+            self._set_up(configure(self), has_timer)
+        except Exception:  # other lines of this process go on
             self.destroy_node()
             raise
+
+    def _set_up(self, configuration: Configuration, has_timer: bool) -> None:
         self._tell(configuration)
         self._log = EventLog(self.get_logger(), line_time)
         self._lines = LineLog(self.get_logger(), line_time)
@@ -148,7 +150,7 @@ class BridgeNode(Node):
         self._told_speed: float | None = None
         self._opener = PortOpener(
             self._port_settings(),
-            lambda text: self.get_logger().debug(f'{printable(self._port)}: {text}'))
+            lambda text: self.get_logger().debug(f'{printable(self.port)}: {text}'))
         if parameters.trace_file:
             self._opener.trace(
                 parameters.trace_file, parameters.trace_limit * 1e6,
@@ -175,13 +177,14 @@ class BridgeNode(Node):
             self.executor.wake()
 
     @property
-    def _port(self) -> str:
+    def port(self) -> str:
+        """Return the name of the port."""
         return self._configuration.port
 
     def _port_settings(self) -> PortSettings:
         parameters = self._configuration.parameters
         return PortSettings.of(
-            self._configuration.network, self._port, low_latency=parameters.low_latency,
+            self._configuration.network, self.port, low_latency=parameters.low_latency,
             rs485=parameters.rs485)
 
     def _make_driver(self, before: ReadTopics | None) -> tuple[Driver, ReadTopics]:
@@ -300,7 +303,7 @@ class BridgeNode(Node):
                   'request': result.request}
         self._results.publish(DiagnosticStatus(
             level=level, name=printable(mapping.tag), message=printable(str(result)),
-            hardware_id=printable(self._port),
+            hardware_id=printable(self.port),
             values=[KeyValue(key=key, value=value) for key, value in values.items()]))
 
     def happened(self, event: Event) -> None:
@@ -333,7 +336,7 @@ class BridgeNode(Node):
         self._publish_active()
         is_meant = state.is_open or self.link.is_released
         tell = self._lines.info if is_meant else self._lines.error
-        tell('the port', f'{self._port}: {state.text}')
+        tell('the port', f'{self.port}: {state.text}')
 
     def _fault(self, error: Exception) -> None:
         self.get_logger().error(f'internal error: {error!r}; please report it')
@@ -381,7 +384,7 @@ class BridgeNode(Node):
         if seen is None or self._told_speed is not None and (seen > 1) is (self._told_speed > 1):
             return
         self._told_speed = seen
-        text = f'{self._port}: Baud is {self.driver.network.baud}, ' \
+        text = f'{self.port}: Baud is {self.driver.network.baud}, ' \
                f'but the line shows {speed_seen(self.driver)}'
         if seen > 1:
             self._lines.info('the speed', text)
@@ -454,12 +457,12 @@ class BridgeNode(Node):
         if request.data:
             self.driver.resume()
             self.link.take()
-            response.success, response.message = True, f'{self._port} is being opened'
+            response.success, response.message = True, f'{self.port} is being opened'
         else:
             self.begin_end()
             self.finish_end(time.monotonic() + END_LIMIT, 'the port is left')
             response.success = self.link.release()
-            response.message = f'{self._port}: {self.link.state.text}'
+            response.message = f'{self.port}: {self.link.state.text}'
         return response
 
     def _reset_counters(self, request: Trigger.Request,

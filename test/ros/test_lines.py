@@ -22,6 +22,7 @@ from pathlib import Path
 import signal
 import threading
 import time
+from typing import Any
 
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.ros import lines as module
@@ -69,11 +70,20 @@ def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str
     assert [str(name) for name in sections(yaml_file(tmp_path, text))] == expected
 
 
+def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:
+    line = '/hall/a:\n  ros__parameters:\n    port: x\n'
+    path = yaml_file(tmp_path, f'{line}hall:\n  b:\n    ros__parameters: {{}}\n{line}')
+    with pytest.raises(ConfigurationError) as error:
+        sections(path)
+    assert str(error.value) == (
+        f'{path}:7: /hall/a has a section in line 1 already; each line needs a name of its own')
+
+
 @pytest.mark.parametrize('text', [None, '{', '\x00'])
 def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) -> None:
     path = str(tmp_path / 'nothing') if text is None else yaml_file(tmp_path, text)
     with pytest.raises(ConfigurationError, match=path):
-        list(sections(path))
+        sections(path)
 
 
 def test_parameter_files_of_the_arguments() -> None:
@@ -108,6 +118,7 @@ class Plant:
         self.observer = stack.enter_context(Observer())
         rows = ['1,PLC5,N7:0,16,7 8']
         self.plcs = {}
+        self.nodes: dict[str, BridgeNode] = {}
         for name in ('a', 'b', 'c'):
             (folder / name).mkdir()
             data = write_csv(
@@ -142,6 +153,15 @@ class Plant:
         self.observer.forget(inbox)
         return value
 
+    def make_node(self, name: str, **named: Any) -> BridgeNode:
+        """Make the node of a line."""
+        self.nodes[name] = node = BridgeNode(name, **named)
+        return node
+
+    def fail(self, name: str) -> None:
+        """Let a bug show in a line."""
+        self.nodes[name]._reads._topics = {}
+
     def end(self, handlers: dict[int, Callable[..., None]]) -> int:
         """End the process as SIGTERM does; return its exit status."""
         if self._thread.is_alive():
@@ -160,9 +180,11 @@ def handlers(monkeypatch: pytest.MonkeyPatch) -> dict[int, Callable[..., None]]:
 
 
 @pytest.fixture
-def plant(tmp_path: Path, handlers: dict[int, Callable[..., None]]) -> Iterator[Plant]:
+def plant(tmp_path: Path, handlers: dict[int, Callable[..., None]],
+          monkeypatch: pytest.MonkeyPatch) -> Iterator[Plant]:
     with ExitStack() as stack:
         plant = Plant(tmp_path, stack)
+        monkeypatch.setattr(module, 'BridgeNode', plant.make_node)
         yield plant
         plant.end(handlers)
         assert not get_default_context().ok()
@@ -215,20 +237,64 @@ def test_lines_that_are_named_run_alone(plant: Plant) -> None:
     assert line_status(plant, OK)['lines'] == '1'
 
 
+def test_two_lines_on_one_port_are_not_two_masters(plant: Plant) -> None:
+    other_name = plant.folder / 'other_name'
+    other_name.symlink_to(plant.plcs['a'].port)
+    plant.plcs['b'].port = str(other_name)
+    plant.start()
+    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    assert line_status(plant, ERROR)['/hall/b'] == f'port: {other_name} is the port of /hall/a'
+
+
+def test_internal_error_at_the_start_of_a_line(
+        plant: Plant, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
+    faults = iter([AttributeError('a bug')])
+
+    def make(name: str, **named: Any) -> BridgeNode:
+        if name == 'b' and (fault := next(faults, None)):
+            raise fault
+        return plant.make_node(name, **named)
+
+    monkeypatch.setattr(module, 'BridgeNode', make)
+    plant.start()
+    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    assert line_status(plant, OK)['restarts'] == '1'
+    assert "begins again: AttributeError('a bug')" in capfd.readouterr().err
+
+
+def test_line_that_ends_slowly_does_not_hold_up_the_others(
+        plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
+    slow, ended = threading.Event(), threading.Event()
+
+    def stop(node: BridgeNode, patience: Any) -> None:
+        slow.set()
+        assert ended.wait(PATIENCE)
+        node.link.stop()
+
+    plant.start()
+    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    monkeypatch.setattr(BridgeNode, 'stop', stop)
+    plant.fail('b')
+    plant.observer.until(slow.is_set, 'the end of a line')
+    assert until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', OK)
+    assert line_status(plant, ERROR)['/hall/b'] == 'begins again'
+    ended.set()
+    assert plant.speeds('b') == [7, 8]
+
+
 def test_internal_error_restarts_its_line_only(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
-    made = []
-    monkeypatch.setattr(module, 'BridgeNode', lambda *names, **named: made.append(
-        BridgeNode(*names, **named)) or made[-1])
     plant.start()
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
-    others = [node for node in made if node.get_name() != 'b']
-    next(node for node in made if node.get_name() == 'b')._reads._topics = {}  # a bug
-    plant.observer.until(lambda: len(made) == 4, 'another node')
+    before = {**plant.nodes}
+    plant.fail('b')
+    plant.observer.until(lambda: plant.nodes['b'] is not before['b'], 'another node')
     assert plant.speeds('b') == [7, 8]
-    assert [node.link.is_alive() for node in others] == [True, True]
+    assert [before[name].link.is_alive() for name in 'abc'] == [True, False, True]
     assert line_status(plant, OK)['restarts'] == '1'
     assert 'ends by an internal error and begins again' in capfd.readouterr().err
 
@@ -266,3 +332,18 @@ def test_one_name_for_all_lines_is_refused(
         handlers: dict[int, Callable[..., None]], capfd: pytest.CaptureFixture[str]) -> None:
     assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
     assert 'the sections of the parameter file name the nodes' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(('option', 'text'), [
+    ('lines:=a', "parameter lines: 'a' should be a list of names, as in -p 'lines:=[press_plc"),
+    ('lines:=[1]', 'should be a list of names'),
+    ('strict_lines:=3', 'parameter strict_lines: 3 should be true or false'),
+    ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
+    ('line:=[a]', 'there is no such parameter; did you mean lines?')])
+def test_options_that_cannot_be_meant(
+        plant: Plant, option: str, text: str, handlers: dict[int, Callable[..., None]],
+        capfd: pytest.CaptureFixture[str]) -> None:
+    plant.start('-p', option)
+    plant._thread.join(PATIENCE)
+    assert plant.end(handlers) == 2
+    assert text in capfd.readouterr().err
