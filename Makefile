@@ -33,6 +33,12 @@ ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH
 endif
 
+# The tests start some 300 processes. Told to write no bytecode, each would compile the package
+# again, which takes as much processor time as a third of the tests; so they keep it in .venv.
+ifdef PYTHONDONTWRITEBYTECODE
+TEST_ENV := env -u PYTHONDONTWRITEBYTECODE PYTHONPYCACHEPREFIX='$(CURDIR)/$(VENV)/bytecode'
+endif
+
 .PHONY: help
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -74,7 +80,7 @@ demo-peer: $(INSTALLED) ## The same on a full-duplex line
 
 .PHONY: test
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
-	$(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
+	$(TEST_ENV) $(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 # launch_ros asks for composition_interfaces, which has no wheel, for component containers alone.
 .PHONY: ros-tools
@@ -91,7 +97,7 @@ ros-tools: $(INSTALLED) ## Get ros2 launch, topic, security and the linters of a
 .PHONY: test-ros
 test-ros: $(INSTALLED) ## Run the tests that need these tools; what is missing fails
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" ABDF1_ROS_TOOLS=1 \
-	    AMENT_PREFIX_PATH="$(CURDIR)/$(VENV):$${AMENT_PREFIX_PATH:-}" $(PY) -m pytest \
+	    AMENT_PREFIX_PATH="$(CURDIR)/$(VENV):$${AMENT_PREFIX_PATH:-}" $(TEST_ENV) $(PY) -m pytest \
 	    test/test_ros_tools.py test/test_launch_files.py test/test_ros2_topic.py \
 	    test/test_security_policy.py test/test_ament.py $(PYTEST_ARGS)
 
