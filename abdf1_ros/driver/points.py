@@ -66,6 +66,9 @@ class ReadPoint:
         self.withheld = ''
         self.withheld_since = 0.0
         self.withholdings = 0
+        self._is_told = False
+        timeout = mapping.publish_while.timeout if mapping.publish_while else None
+        self._patience = stale_time if timeout is None else timeout / 1000
         self._codec = mapping.codec
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
@@ -97,12 +100,19 @@ class ReadPoint:
         return is_news
 
     def withhold(self, reason: str, now: float) -> bool:
-        """Take note that a value is not published; return whether that has just begun."""
-        is_news = not self.withheld
-        if is_news:
-            self.withheld_since = now
-            self.withholdings += 1
+        """
+        Take note that a value is not published; return whether that is to be told, once a cause.
+
+        At the start nothing holds; that is told when it has had its time to begin.
+        """
+        if not self.withheld:
+            self.withheld_since, self._is_told = now, False
         self.withheld, self.error = reason, None
+        is_start = self.last_good is None and now - self.withheld_since < self._patience
+        is_news = not self._is_told and not is_start
+        if is_news:
+            self._is_told = True
+            self.withholdings += 1
         return is_news
 
     def is_due(self, now: float, block_period: float) -> bool:
@@ -123,7 +133,7 @@ class ReadPoint:
         """Judge the last value."""
         if self.error is not None:
             return Freshness.FAILED
-        if self.withheld:
+        if self.withheld and self._is_told:
             return Freshness.WITHHELD
         if self.last_good is None:
             return Freshness.WAITING

@@ -23,6 +23,7 @@ from statistics import fmean
 
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.fallbacks import FallbackCause
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
@@ -365,6 +366,12 @@ class DuplicateNameWatch:
         return self.has_found != before
 
 
+def is_usual_fallback(result: WriteResult) -> bool:
+    """Tell whether a fallback value was written as at every start and every end."""
+    return result.outcome is Outcome.FALLBACK and \
+        result.detail in (FallbackCause.START.value, FallbackCause.END.value)
+
+
 class WriteLog:
     """
     Counts of writes by how they ended.
@@ -382,7 +389,8 @@ class WriteLog:
     def add(self, result: WriteResult, now: float) -> None:
         """Count a result."""
         self._counts[result.outcome] += 1
-        if result.outcome not in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED):
+        is_good = result.outcome in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED)
+        if not is_good and not is_usual_fallback(result):
             self._last_failure = result, now
 
     def lost(self, topic: str, count: int, now: float) -> None:
@@ -390,9 +398,13 @@ class WriteLog:
         self._lost += count
         self._last_loss = f'{count} to ~/write/{topic}', now
 
+    def _messages(self) -> int:
+        """Return how many results were those of messages; a fallback value answers none."""
+        return self._counts.total() - self._counts[Outcome.FALLBACK]
+
     def judge(self, now: float) -> Verdict:
         """Return WARN for a while after a write that was not confirmed, or never came."""
-        total = self._counts.total()
+        total = self._messages()
         summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
         if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
             result = self._last_failure[0]
@@ -410,12 +422,13 @@ class WriteLog:
             result, when = self._last_failure
             last = f'{result.mapping.tag} {result}', when
         return {
-            'accepted': str(counts.total() - counts[Outcome.REFUSED]),
+            'accepted': str(self._messages() - counts[Outcome.REFUSED]),
             'confirmed': str(counts[Outcome.WRITTEN]),
             'failed': str(failed),
             'unknown': str(counts[Outcome.UNKNOWN]),
             'superseded': str(counts[Outcome.SUPERSEDED]),
             'refused': str(counts[Outcome.REFUSED]),
+            'fallback values': str(counts[Outcome.FALLBACK]),
             'lost on their way': str(self._lost),
             'last loss': _with_age(self._last_loss, now),
             'last failure': _with_age(last, now),

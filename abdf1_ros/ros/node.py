@@ -39,7 +39,13 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import changed_text, Diagnostics, DuplicateNameWatch, speed_seen
+from abdf1_ros.ros.diagnostics import (
+    changed_text,
+    Diagnostics,
+    DuplicateNameWatch,
+    is_usual_fallback,
+    speed_seen,
+)
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
@@ -296,8 +302,8 @@ class BridgeNode(Node):
         mapping = result.mapping
         level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
         if level == DiagnosticStatus.ERROR or result.outcome is Outcome.FALLBACK:
-            self._lines.warning(f'writes to {mapping.tag}',
-                                f'write to {mapping.tag} {result.value}: {result}')
+            tell = self._lines.info if is_usual_fallback(result) else self._lines.warning
+            tell(f'writes to {mapping.tag}', f'write to {mapping.tag} {result.value}: {result}')
         values = {'address': str(mapping.address), 'station': str(mapping.station),
                   'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}',
                   'request': result.request}

@@ -508,15 +508,28 @@ def test_rule_14_one_change_is_no_life() -> None:
     assert cell.bench.listener.times(read) == []
 
 
+def withheld(cell: Cell) -> list[str]:
+    """Return what was told of withheld rows."""
+    return [reason for _, reason in cell.bench.listener.reasons if reason.startswith('withheld')]
+
+
 def test_rule_15_withholding_is_counted_and_told_once_a_cause() -> None:
     cell, read = counter_cell()
     for _ in range(3):
         count(cell, 5)
         cell.run(3.0)
+    assert cell.bench.driver.points[read].withholdings == len(withheld(cell)) == 3
+
+
+def test_rule_15_start_is_told_when_the_program_has_had_its_time_to_count() -> None:
+    cell, read = counter_cell()
+    cell.run(0.4)
     point = cell.bench.driver.points[read]
-    assert point.withholdings == 4
-    assert len([reason for _, reason in cell.bench.listener.reasons
-                if reason.startswith('withheld')]) == 4
+    assert (withheld(cell), point.withholdings) == ([], 0)
+    assert point.freshness(cell.now) is Freshness.WAITING
+    cell.run(0.4)
+    assert (len(withheld(cell)), point.withholdings) == (1, 1)
+    assert point.freshness(cell.now) is Freshness.WITHHELD
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:

@@ -25,6 +25,7 @@ from typing import Any
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.fallbacks import FallbackCause
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
@@ -419,7 +420,8 @@ OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
     (Outcome.NOT_SENT, {'accepted': '1', 'failed': '1'}),
     (Outcome.FAILED, {'accepted': '1', 'failed': '1'}),
     (Outcome.PARTLY, {'accepted': '1', 'failed': '1'}),
-    (Outcome.UNKNOWN, {'accepted': '1', 'unknown': '1'})]
+    (Outcome.UNKNOWN, {'accepted': '1', 'unknown': '1'}),
+    (Outcome.FALLBACK, {'fallback values': '1'})]
 
 
 @pytest.mark.parametrize(('outcome', 'expected'), OUTCOMES,
@@ -439,6 +441,17 @@ def test_every_outcome_is_counted_in_its_place(
 
 def test_writes_before_the_first(bench: Bench) -> None:
     assert bench.says('writes') == (OK, 'OK: 0 of 0 writes confirmed')
+
+
+@pytest.mark.parametrize(('cause', 'level'), [
+    (FallbackCause.START, OK), (FallbackCause.END, OK), (FallbackCause.TIMEOUT, WARN),
+    (FallbackCause.RETURN, WARN), (FallbackCause.RUN, WARN)])
+def test_fallback_value_is_no_message_and_usual_at_start_and_end(
+        bench: Bench, cause: FallbackCause, level: bytes) -> None:
+    bench.diagnostics.written(result(bench, Outcome.FALLBACK, cause.value), NOW)
+    told, text = bench.says('writes')
+    assert told == level
+    assert '0 of 0 writes confirmed' in text
 
 
 def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> None:
