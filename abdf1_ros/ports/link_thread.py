@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import os
 import select
 import threading
+import time
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.errors import PortLost
@@ -52,6 +53,7 @@ RELEASED = 'the port is left to others: polling is off'
 # What ends whatever is under way when files are read again.
 _READ_AGAIN = 'the files have been read again'
 _EXCHANGE_LIMIT = 5.0
+_GLANCE = 0.1
 
 
 class _Exchange:
@@ -62,6 +64,11 @@ class _Exchange:
         self.while_sending = while_sending
         self.reopen = reopen
         self.is_done = threading.Event()
+        self._claim = threading.Lock()
+
+    def claim(self) -> bool:
+        """Tell the first who asks that it is his: to do it, or to withdraw it."""
+        return self._claim.acquire(blocking=False)
 
 
 class _Attempt(threading.Thread):
@@ -178,7 +185,7 @@ class LinkThread(threading.Thread):
         self._is_free.clear()
         self.is_released = True
         self.wake()
-        return self._is_free.wait(_EXCHANGE_LIMIT)
+        return self._has_happened(self._is_free)
 
     def take(self) -> None:
         """Open the port again."""
@@ -190,12 +197,21 @@ class LinkThread(threading.Thread):
         """
         Go on with another machine, on the same port or one that is opened anew.
 
-        Return whether that was so within 5 s; called from one thread only.
+        Return whether that was so within 5 s; if not, it will not be so later. Called from one
+        thread only.
         """
         exchange = _Exchange(machine, while_sending, reopen)
         self._next = exchange
         self.wake()
-        return exchange.is_done.wait(_EXCHANGE_LIMIT)
+        return self._has_happened(exchange.is_done) or (
+            not exchange.claim() and self._has_happened(exchange.is_done))
+
+    def _has_happened(self, event: threading.Event) -> bool:
+        """Wait for what this thread is to do, but not longer than it runs."""
+        give_up = time.monotonic() + _EXCHANGE_LIMIT
+        while not event.wait(_GLANCE) and self.is_alive() and time.monotonic() < give_up:
+            pass
+        return event.is_set()
 
     def run(self) -> None:
         """Keep the port open and the machine running."""
@@ -254,7 +270,7 @@ class LinkThread(threading.Thread):
     def _exchange(self) -> None:
         """Put the machine on the line that is to be there."""
         exchange, self._next = self._next, None
-        if exchange is not None:
+        if exchange is not None and exchange.claim():
             self._machine.stop(PortLost(_READ_AGAIN))
             self._while_sending()
             self._machine, self._while_sending = exchange.machine, exchange.while_sending

@@ -49,7 +49,7 @@ from abdf1_ros.ros.diagnostics import (
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.log import EventLog, LineLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
-from abdf1_ros.ros.parameters import Configuration, configure, configure_again
+from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
 from abdf1_ros.ros.process import (
     EXIT_FAULT,
     LAST_WRITES,
@@ -419,33 +419,37 @@ class BridgeNode(Node):
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Go on with the files as they are now, or as before where these have faults."""
         try:
-            configuration = configure_again(self, self._configuration.parameters)
+            configuration = read_again(self, self._configuration.parameters)
         except ConfigurationError as error:
             for problem in error.problems:
                 self.get_logger().error(f'{problem} (goes on as before)')
             texts = [printable(str(problem)) for problem in error.problems]
             response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_REMARKS])
             return response
-        self._tell(configuration)
         response.success = self._go_on_with(configuration)
-        left_out = len(configuration.map_problems)
-        response.message = printable(str(configuration)) + (
-            f'; {left_out} rows left out, see the log' if left_out else '')
+        response.message = printable(str(configuration))
+        if not response.success:
+            response.message = 'goes on as before: the link does not take the new files'
+            self.get_logger().error(response.message)
         return response
 
     def _go_on_with(self, configuration: Configuration) -> bool:
         """Put new files to work; return False where the link does not take them."""
-        self._configuration = configuration
-        before, old_reads = self.driver, self._reads
+        before, old_reads, old = self.driver, self._reads, self._configuration
         # For heartbeats and fallbacks new files are a new start.
         self.begin_end()
         self.finish_end(time.monotonic() + END_LIMIT, 'goes on with new files')
+        self._configuration = configuration
         driver, reads = self._make_driver(old_reads)
         reopen = self._opener.use(self._port_settings())
         if not self.link.exchange(driver.machine, reads.publish_later_values, reopen):
+            self._configuration = old
+            self._opener.use(self._port_settings())
+            reads.end(old_reads)
             before.resume()
-            self.get_logger().error('the link has not taken the new files')
             return False
+        self._tell(configuration)
+        declare_again(self, configuration)
         self.driver, self._reads = driver, reads
         self._diagnostics = self._make_diagnostics(self._diagnostics)
         self._link_counters.use(driver)

@@ -158,27 +158,40 @@ def configure(node: Node) -> Configuration:
     """
     problems = _unknown_overrides(node)
     parameters = _declare_own(node, problems)
-    return _from_files(node, parameters, problems, _declare_network)
+    configuration = _from_files(
+        node, parameters, problems, _declare_network, is_strict=parameters.strict_map)
+    _declare_map(node, configuration)
+    return configuration
 
 
-def configure_again(node: Node, parameters: Parameters) -> Configuration:
+def read_again(node: Node, parameters: Parameters) -> Configuration:
     """
-    Read both files again, and declare anew what comes from them.
+    Read both files again; ``declare_again`` shows what comes from them.
 
-    Raises ConfigurationError with every fault; nothing has changed then.
+    Raises ConfigurationError with every fault, those of single rows among them: what runs is not
+    given up for a slip.
     """
-    return _from_files(node, parameters, [], _overridden_network)
+    return _from_files(node, parameters, [], _overridden_network, is_strict=True)
+
+
+def declare_again(node: Node, configuration: Configuration) -> None:
+    """Declare anew what comes from the files."""
+    _forget(node, 'net.')
+    _declare_network(node, configuration.network)
+    _forget(node, 'map.')
+    _declare_map(node, configuration)
 
 
 def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
-                overridden: Callable[[Node, Network], Network]) -> Configuration:
-    from_file = network = Network()
+                overridden: Callable[[Node, Network], Network], *, is_strict: bool,
+                ) -> Configuration:
+    network = Network()
     mappings: list[Mapping] = []
     map_problems: list[Problem] = []
     files = FileWatch((parameters.net_file, parameters.map_file))
     try:
-        from_file = load_network(_needed('net_file', parameters.net_file, problems))
-        network = overridden(node, from_file)
+        network = overridden(
+            node, load_network(_needed('net_file', parameters.net_file, problems)))
     except ConfigurationError as error:
         problems += error.problems
     try:
@@ -191,7 +204,7 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
             map_problems.append(problem)
     except ConfigurationError as error:
         problems += error.problems
-    if parameters.strict_map:
+    if is_strict:
         problems += map_problems
     polling = _polling(parameters, mappings, problems)
     port = network.port
@@ -202,15 +215,8 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
             problems += error.problems
     if problems:
         raise ConfigurationError(problems)
-    if overridden is not _declare_network:
-        _forget(node, 'net.')
-        _declare_network(node, from_file)
-    cells = _map_cells(mappings)
-    _forget(node, 'map.')
-    if parameters.expose_map_parameters:
-        _declare_map(node, cells)
     return Configuration(parameters, network, port, mappings, map_problems, polling,
-                         _ignored_overrides(node, cells), files)
+                         _ignored_overrides(node, _map_cells(mappings)), files)
 
 
 def _forget(node: Node, prefix: str) -> None:
@@ -373,8 +379,11 @@ def _map_cells(mappings: list[Mapping]) -> list[Cell]:
             for mapping in mappings for column in MAP_COLUMNS]
 
 
-def _declare_map(node: Node, cells: list[Cell]) -> None:
+def _declare_map(node: Node, configuration: Configuration) -> None:
+    if not configuration.parameters.expose_map_parameters:
+        return
     # rclpy writes the parameter's name into the descriptor, so each has one of its own.
     node.declare_parameters('', [
         (name, value, ParameterDescriptor(description=description, read_only=True))
-        for name, value, description in cells], ignore_override=True)
+        for name, value, description in _map_cells(configuration.mappings)],
+        ignore_override=True)

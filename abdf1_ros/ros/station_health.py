@@ -133,5 +133,5 @@ class LinkCounterService:
             text = 'no answer yet'
         else:
             text = health.no_counters or ', '.join(
-                f'{name} {value}' for name, value in health.counters.items())
+                f'{name} {value}' for name, value in health.counters.items()) or 'no answer'
         return f'station {station}: {text}'

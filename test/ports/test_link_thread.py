@@ -614,6 +614,50 @@ def test_other_machine_on_a_port_that_is_opened_anew(pty: Pty, link: Link) -> No
     assert [link.state().is_open, link.state().is_open] == [True, True]
 
 
+class _Stuck(_NoLine):
+    """A port that takes nothing until ``free`` is set."""
+
+    def __init__(self) -> None:
+        self.is_used = threading.Event()
+        self.free = threading.Event()
+
+    def write(self, data: bytes) -> None:
+        """Wait."""
+        self.is_used.set()
+        assert self.free.wait(PATIENCE)
+
+
+def test_machine_that_came_to_nothing_does_not_come_later(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ports.link_thread._EXCHANGE_LIMIT', 0.0)
+    port, before, after = _Stuck(), Script(Step(None, None)), Script(Step(None, None))
+    thread = LinkThread(before.machine, lambda: port)
+    thread.start()
+    assert port.is_used.wait(PATIENCE)
+    assert not thread.exchange(after.machine, lambda: None, reopen=False)
+    port.is_used.clear()
+    port.free.set()
+    monkeypatch.undo()
+    assert thread.release()
+    thread.take()
+    assert port.is_used.wait(PATIENCE)  # by whatever machine there is now
+    thread.stop()
+    assert after.ended.empty()
+
+
+@pytest.mark.parametrize('ask', [
+    LinkThread.release,
+    lambda thread: thread.exchange(Script().machine, lambda: None, reopen=False)])
+def test_thread_that_has_ended_is_not_waited_for(ask: Callable[[LinkThread], bool]) -> None:
+    thread = Impatient(Broken().machine, _NoLine, 100)
+    thread.start()
+    thread.join()
+    began = time.monotonic()
+    assert not ask(thread)
+    assert time.monotonic() - began < 2.0
+    thread.stop()
+
+
 def test_other_machine_while_there_is_no_port(tmp_path: Path, link: Link) -> None:
     after = Script(Step(b'', None))
     thread = link.start(Script().machine, tmp_path / 'line')

@@ -21,6 +21,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.files import FileWatch
@@ -54,6 +55,7 @@ class Bench:
 
     def __init__(self, folder: Path, observer: Observer, plcs: Plcs) -> None:
         self.observer = observer
+        self.plcs = plcs
         self.net, self.map = folder / 'net.csv', folder / 'map.csv'
         self.write_net(100)
         self.write_map(SPEED, RECIPE)
@@ -167,6 +169,37 @@ def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[
     assert f'{bench.net}:2:1 (Baud): Baud = "9601"' in capfd.readouterr().err
 
 
+def test_fault_in_one_row_changes_nothing(bench: Bench) -> None:
+    bench.write_map(LEVEL, 'speed,Read,N7:0,1,PLC5,none')
+    success, message = bench.reload()
+    assert not success
+    assert message.startswith(f'goes on as before: {bench.map}:3:6 (Length): ')
+    assert bench.parameter('map.level.address') is None
+    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    assert values_in(speeds.first()) == [7, 8]
+
+
+def test_link_that_does_not_take_the_files_goes_on_as_before(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments: False)
+    bench.write_net(250, 19200)
+    bench.write_map(SPEED, RECIPE, LEVEL)
+    assert bench.reload() == (
+        False, 'goes on as before: the link does not take the new files')
+    assert bench.parameter('net.timeout') == 100
+    assert bench.parameter('map.level.address') is None
+    assert bench.node._opener._settings.baud == 115200
+    assert '/abdf1/read/level' not in dict(
+        bench.node.get_publisher_names_and_types_by_node('abdf1', '/'))
+    results = bench.observer.results()
+    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    publisher.publish(Int16MultiArray(data=[1, 2]))
+    assert results.next().message == 'written'
+    monkeypatch.undo()
+    assert bench.reload()[0]
+    assert bench.parameter('net.timeout') == 250
+
+
 def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
     bench.write_net(250)
     bench.write_map(LEVEL)
@@ -200,6 +233,29 @@ def test_file_that_has_changed_is_told_once(
     assert bench.reload()[0]
     until_status(bench.diagnostics, 'link', OK,
                  lambda status: details(status)['files'] == 'as read')
+
+
+def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) -> None:
+    bench.plcs.say('silent 1')
+    client = bench.observer.node.create_client(Trigger, '/abdf1/read_link_counters')
+    bench.observer.until(client.service_is_ready, 'the service')
+    future = client.call_async(Trigger.Request())
+    bench.observer.until(lambda: bench.node._link_counters._done, 'the question')
+    bench.write_map('speed,Read,N7:0,2,PLC5,2')
+    assert bench.reload()[0]
+    bench.observer.until(future.done, 'an answer')
+    assert future.result() == Trigger.Response(success=False, message='station 1: no answer')
+
+
+def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> None:
+    assert bench.polling(False)[0]
+    bench.write_map(SPEED, LEVEL)
+    bench.write_net(100, 19200)
+    assert bench.reload()[0]
+    open_port(PortSettings(bench.port)).close()
+    assert bench.polling(True)[0]
+    levels = bench.observer.listen(Float32MultiArray, '/abdf1/read/level')
+    assert values_in(levels.first()) == [1.5]
 
 
 def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
