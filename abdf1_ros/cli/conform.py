@@ -45,7 +45,7 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.conform import asking, client, data, master, peer, slave
 from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
-from abdf1_ros.conform.codec import Check
+from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
 from abdf1_ros.conform.report import as_issue, as_json, as_junit, line_of, summary_of
 from abdf1_ros.conform.wire import Wire
@@ -55,7 +55,7 @@ from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file, package_version
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Line, PtyLine, TcpLine
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
@@ -143,7 +143,7 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
               file=sys.stderr)
         return _EXIT_USAGE
     try:
-        wire = Wire(line, Check(network.error_code), time.monotonic,
+        wire = Wire(line, BlockCheck(network.error_code), time.monotonic,
                     is_half_duplex=target.is_half_duplex, answer_time=options.answer_time)
         return _judge(options, target, cases, wire, network)
     except OSError as error:
@@ -232,12 +232,12 @@ def _server(options: argparse.Namespace, network: Network) -> Callable[[bytes], 
 
 def _open(options: argparse.Namespace, network: Network) -> _PortLine:
     """Open the line; a line of our own waits until somebody is at its other end."""
-    line: Line
+    line: Endpoint
     if options.tcp is not None:
         host, _, port = options.tcp.rpartition(':')
-        line = TcpLine(host or '127.0.0.1', int(port))
+        line = TcpEndpoint(host or '127.0.0.1', int(port))
     elif options.pty is not None:
-        line = PtyLine(options.pty)
+        line = PtyEndpoint(options.pty)
     else:
         return _PortLine(open_port(PortSettings.of(network)))
     print(f'conform: at {line.name}', file=sys.stderr, flush=True)

@@ -56,7 +56,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine, TcpLine, WAITING
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
@@ -122,7 +122,7 @@ class _FaultyPort:
         self._port.close()
 
 
-Script = list[tuple[float, str]]
+TimedCommands = list[tuple[float, str]]
 """Seconds and command."""
 
 
@@ -160,7 +160,7 @@ def _run(options: argparse.Namespace) -> int:
         line.close()
 
 
-def _play(plcs: Sequence[SimulatedPlc], line: Line, script: Script,
+def _play(plcs: Sequence[SimulatedPlc], line: Endpoint, script: TimedCommands,
           options: argparse.Namespace) -> int:
     """Let the PLCs answer on a line until it is time to end; return the exit status."""
     link = _make_thread(plcs, line, options)
@@ -174,7 +174,7 @@ def _play(plcs: Sequence[SimulatedPlc], line: Line, script: Script,
     return EXIT_FAULT if link.has_failed else 0
 
 
-def _try_out(script: Script, options: argparse.Namespace) -> None:
+def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
     """Raise CommandError for a command of --at that would fail later; nothing is sent yet."""
     plcs = _load(options)
     for _, line in script:
@@ -218,7 +218,7 @@ def _run_ladder(station: str, plcs: Sequence[SimulatedPlc]) -> None:
         raise ValueError(f'--ladder {station}: {error}; it needs N10, N11, B12 and T13') from None
 
 
-def _make_thread(plcs: Sequence[SimulatedPlc], line: Line,
+def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
                  options: argparse.Namespace) -> LinkThread:
     """Return the thread that plays ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
@@ -292,16 +292,16 @@ def _scheduled(text: str) -> tuple[float, str]:
     return value, command
 
 
-def _make_line(options: argparse.Namespace) -> Line:
+def _make_line(options: argparse.Namespace) -> Endpoint:
     """Return the line; OSError says which one cannot be had."""
     try:
         if options.tcp is not None:
-            return TcpLine(*_host_and_port(options.tcp))
+            return TcpEndpoint(*_host_and_port(options.tcp))
         if options.port is not None:
-            return SerialLine(_port_settings(options))
+            return SerialEndpoint(_port_settings(options))
     except OSError as error:
         raise OSError(reason_of(options.port or f'--tcp "{options.tcp}"', error)) from None
-    return PtyLine(options.pty)
+    return PtyEndpoint(options.pty)
 
 
 def _port_settings(options: argparse.Namespace) -> PortSettings:
@@ -333,7 +333,7 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
                    counters=plc.counters)
 
 
-def _converse(plcs: Sequence[SimulatedPlc], script: Script, link: LinkThread,
+def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThread,
               options: argparse.Namespace) -> None:
     """Carry out commands as they come, until it is time to end."""
     def carry_out(line: str) -> None:

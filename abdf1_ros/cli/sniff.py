@@ -58,7 +58,7 @@ from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
-from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.session import TrafficDecoder
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.text import printable
 
@@ -92,7 +92,7 @@ class _Output:
 
     def __init__(self, options: argparse.Namespace) -> None:
         self._options = options
-        self._session: Session | None = None
+        self._session: TrafficDecoder | None = None
         self._summary = Summary(options.baud)
         self._bundle = _bundle(options)
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
@@ -102,7 +102,7 @@ class _Output:
             options.summary or not sys.stdout.isatty())
         self._next_progress = time.monotonic() + _PROGRESS_PERIOD
 
-    def begin(self, settings: dict[str, str]) -> Session:
+    def begin(self, settings: dict[str, str]) -> TrafficDecoder:
         """Return the session; what options leave open is taken from a capture's head."""
         if self._session is None:
             options, baud = self._options, settings.get('baud', '')
@@ -110,7 +110,7 @@ class _Output:
                 settings.get(name, '').lower() if chosen == _AUTO else chosen
                 for name, chosen in (('check', options.check), ('duplex', options.duplex)))
             # What the head of a capture says was a setting, and may have been the fault.
-            self._session = Session(_CHECKS.get(check), _DUPLEX.get(duplex),
+            self._session = TrafficDecoder(_CHECKS.get(check), _DUPLEX.get(duplex),
                                     is_certain=options.check != _AUTO)
             speed = whole_number(baud)
             if self._summary.baud is None and speed and speed > 0:

@@ -86,14 +86,14 @@ class CaseResult:
 CASES: list[Case] = []
 
 
-Script = Callable[[Any], None]
+CaseScript = Callable[[Any], None]
 """Plays a case with the end it is given; raises Failed or Skipped."""
 
 
 def case(name: str, rule: str, source: str, *targets: Target,
-         permission: Permission = Permission.NOTHING) -> Callable[[Script], Script]:
+         permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], CaseScript]:
     """Enter a function among the cases of ``targets``."""
-    def enter(run: Script) -> Script:
+    def enter(run: CaseScript) -> CaseScript:
         if any(other.name == name and set(other.targets) & set(targets) for other in CASES):
             raise ValueError(f'there is a case {name} already')
         CASES.append(Case(name, rule, source, targets, run, permission))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import Heard, SymbolKind
+from abdf1_ros.conform.codec import HeardSymbol, SymbolKind
 from abdf1_ros.conform.ends import PATIENCE, ServerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
@@ -90,7 +90,7 @@ def enquiry_repeats_response(end: ServerEnd) -> None:
     end.finish(end.next_command())
     end.wire.send(codec.ENQ)
 
-    def is_response(symbol: Heard) -> bool:
+    def is_response(symbol: HeardSymbol) -> bool:
         return symbol.kind in (SymbolKind.ACK, SymbolKind.NAK)
 
     symbol = end.wire.until(is_response, 'the last response', end.wire.answer_time)
@@ -105,7 +105,7 @@ def duplicate_acknowledged(end: ServerEnd) -> None:
     end.finish(command)
     end.reply_to(command)
 
-    def is_response(symbol: Heard) -> bool:
+    def is_response(symbol: HeardSymbol) -> bool:
         return symbol.kind in (SymbolKind.ACK, SymbolKind.NAK)
 
     symbol = end.wire.until(is_response, 'a response', end.wire.answer_time)

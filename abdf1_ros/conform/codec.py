@@ -32,7 +32,7 @@ _SOH, _STX, _ETX = 0x01, 0x02, 0x03
 HEADER_SIZE = 6  # DST SRC CMD STS TNS TNS (M 6-3)
 
 
-class Check(Enum):
+class BlockCheck(Enum):
     """The check of messages; a poll has a BCC on every line (M 5-3)."""
 
     BCC = 'BCC'
@@ -53,7 +53,7 @@ class SymbolKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardSymbol:
     """
     One symbol: ``raw`` as it came, ``data`` its link data without doubled DLE.
 
@@ -89,14 +89,14 @@ def crc(data: Iterable[int]) -> int:
     return remainder
 
 
-def check_bytes(data: bytes, check: Check, station: int | None = None) -> bytes:
+def check_bytes(data: bytes, check: BlockCheck, station: int | None = None) -> bytes:
     """
     Return the check of a message, as it stands after DLE ETX.
 
     ``station`` is that of a master's message. The BCC covers it and the data (M 5-4); the CRC
     covers station and STX, the data and ETX (M 5-6, 5-7).
     """
-    if check is Check.BCC:
+    if check is BlockCheck.BCC:
         return bytes((bcc(data if station is None else bytes((station,)) + data),))
     before = b'' if station is None else bytes((station, _STX))
     return crc(before + data + bytes((_ETX,))).to_bytes(2, 'little')
@@ -106,12 +106,12 @@ def _stuffed(data: bytes) -> bytes:
     return b''.join(bytes((byte, byte)) if byte == DLE else bytes((byte,)) for byte in data)
 
 
-def message(data: bytes, check: Check) -> bytes:
+def message(data: bytes, check: BlockCheck) -> bytes:
     """Return the frame for ``data`` from a slave or in full duplex (M 5-2)."""
     return b'\x10\x02' + _stuffed(data) + b'\x10\x03' + check_bytes(data, check)
 
 
-def master_message(station: int, data: bytes, check: Check) -> bytes:
+def master_message(station: int, data: bytes, check: BlockCheck) -> bytes:
     """Return the frame of a half-duplex master's message (M 5-2)."""
     return (b'\x10\x01' + _stuffed(bytes((station,))) + b'\x10\x02' + _stuffed(data)
             + b'\x10\x03' + check_bytes(data, check, station))
@@ -133,25 +133,25 @@ def damaged(frame: bytes) -> bytes:
     return frame[:-1] + bytes((frame[-1] ^ 0x01,))
 
 
-def next_symbol(buffer: bytes, check: Check, is_half_duplex: bool) -> Heard | None:
+def next_symbol(buffer: bytes, check: BlockCheck, is_half_duplex: bool) -> HeardSymbol | None:
     """Return the symbol at the beginning of ``buffer``; None where more bytes are needed."""
     if not buffer:
         return None
     if buffer[0] != DLE:
         end = buffer.find(DLE)
-        return Heard(SymbolKind.NOISE, buffer if end < 0 else buffer[:end])
+        return HeardSymbol(SymbolKind.NOISE, buffer if end < 0 else buffer[:end])
     if len(buffer) < 2:
         return None
     for kind, pair in ((SymbolKind.ACK, ACK), (SymbolKind.NAK, NAK), (SymbolKind.EOT, EOT)):
         if buffer[:2] == pair:
-            return Heard(kind, pair)
+            return HeardSymbol(kind, pair)
     if buffer[:2] == ENQ:
-        return _poll(buffer) if is_half_duplex else Heard(SymbolKind.ENQ, ENQ)
+        return _poll(buffer) if is_half_duplex else HeardSymbol(SymbolKind.ENQ, ENQ)
     if buffer[1] == _STX:
         return _message(buffer, 2, check, None)
     if buffer[1] == _SOH and is_half_duplex:
         return _master_message(buffer, check)
-    return Heard(SymbolKind.NOISE, buffer[:2])
+    return HeardSymbol(SymbolKind.NOISE, buffer[:2])
 
 
 def _station(buffer: bytes) -> tuple[int, int] | None:
@@ -161,26 +161,27 @@ def _station(buffer: bytes) -> tuple[int, int] | None:
     return (buffer[2], 4 if buffer[2:4] == b'\x10\x10' else 3)
 
 
-def _poll(buffer: bytes) -> Heard | None:
+def _poll(buffer: bytes) -> HeardSymbol | None:
     found = _station(buffer)
     if found is None or len(buffer) <= found[1]:
         return None
     station, end = found
-    return Heard(SymbolKind.POLL, buffer[:end + 1], station=station,
+    return HeardSymbol(SymbolKind.POLL, buffer[:end + 1], station=station,
                  is_good=buffer[end] == bcc((station,)))
 
 
-def _master_message(buffer: bytes, check: Check) -> Heard | None:
+def _master_message(buffer: bytes, check: BlockCheck) -> HeardSymbol | None:
     found = _station(buffer)
     if found is None or len(buffer) < found[1] + 2:
         return None
     station, end = found
     if buffer[end:end + 2] != b'\x10\x02':
-        return Heard(SymbolKind.NOISE, buffer[:end])
+        return HeardSymbol(SymbolKind.NOISE, buffer[:end])
     return _message(buffer, end + 2, check, station)
 
 
-def _message(buffer: bytes, start: int, check: Check, station: int | None) -> Heard | None:
+def _message(buffer: bytes, start: int, check: BlockCheck,
+             station: int | None) -> HeardSymbol | None:
     """Read a message whose data begin at ``start``."""
     data, embedded, at = bytearray(), [], start
     while at < len(buffer):
@@ -198,16 +199,16 @@ def _message(buffer: bytes, start: int, check: Check, station: int | None) -> He
         elif pair[1] == _ETX:
             return _ended(buffer, at + 2, bytes(data), check, station, tuple(embedded))
         else:
-            return Heard(SymbolKind.NOISE, buffer[:at])
+            return HeardSymbol(SymbolKind.NOISE, buffer[:at])
         at += 2
     return None
 
 
-def _ended(buffer: bytes, at: int, data: bytes, check: Check, station: int | None,
-           embedded: tuple[SymbolKind, ...]) -> Heard | None:
+def _ended(buffer: bytes, at: int, data: bytes, check: BlockCheck, station: int | None,
+           embedded: tuple[SymbolKind, ...]) -> HeardSymbol | None:
     wanted = check_bytes(data, check, station)
     end = at + len(wanted)
     if len(buffer) < end:
         return None
     kind = SymbolKind.MESSAGE if station is None else SymbolKind.MASTER_MESSAGE
-    return Heard(kind, buffer[:end], data, station, buffer[at:end] == wanted, embedded)
+    return HeardSymbol(kind, buffer[:end], data, station, buffer[at:end] == wanted, embedded)

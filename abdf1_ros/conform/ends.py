@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.codec import Heard, SymbolKind
+from abdf1_ros.conform.codec import HeardSymbol, SymbolKind
 from abdf1_ros.conform.wire import Failed, Wire
 
 REPLY_BIT = 0x40
@@ -155,7 +155,7 @@ class MasterEnd(_AskingEnd):
         if symbol is None or symbol.kind is not SymbolKind.ACK:
             raise Failed('DLE ACK for a good message', str(symbol or 'silence'))
 
-    def poll(self) -> Heard | None:
+    def poll(self) -> HeardSymbol | None:
         """Poll once and return what comes."""
         self.wire.send(codec.poll(self.station))
         return self.wire.hear()
@@ -211,10 +211,10 @@ class Answering(Protocol):
 
     wire: Wire
 
-    def next_command(self) -> Heard:
+    def next_command(self) -> HeardSymbol:
         """Wait for a good command."""
 
-    def finish(self, command: Heard) -> None:
+    def finish(self, command: HeardSymbol) -> None:
         """Answer a command to its end."""
 
 
@@ -239,9 +239,9 @@ class SlaveEnd:
         """See one command through, so that no case begins with a master that believes us dead."""
         _settle(self)
 
-    def next_command(self, what: str = 'a command for our station') -> Heard:
+    def next_command(self, what: str = 'a command for our station') -> HeardSymbol:
         """Wait for a good message to us; polls before it are answered DLE EOT."""
-        def is_command(symbol: Heard) -> bool:
+        def is_command(symbol: HeardSymbol) -> bool:
             if symbol.kind is SymbolKind.POLL and symbol.station == self.station:
                 self.wire.send(codec.EOT)
             return symbol.kind is SymbolKind.MASTER_MESSAGE and symbol.station == self.station
@@ -251,9 +251,10 @@ class SlaveEnd:
             raise Failed('a message with the right check', symbol.raw.hex(' '))
         return symbol
 
-    def next_poll(self, what: str = 'a poll of our station', within: float = PATIENCE) -> Heard:
+    def next_poll(self, what: str = 'a poll of our station',
+                  within: float = PATIENCE) -> HeardSymbol:
         """Wait for a poll of us; a message before it is a failure."""
-        def is_ours(symbol: Heard) -> bool:
+        def is_ours(symbol: HeardSymbol) -> bool:
             return symbol.station == self.station
 
         symbol = self.wire.until(is_ours, what, within)
@@ -261,11 +262,11 @@ class SlaveEnd:
             raise Failed(what, str(symbol))
         return symbol
 
-    def reply_to(self, command: Heard) -> None:
+    def reply_to(self, command: HeardSymbol) -> None:
         """Send the reply to a command, as answer to a poll."""
         self.wire.send(codec.message(self.serve(command.data), self.wire.check))
 
-    def finish(self, command: Heard) -> None:
+    def finish(self, command: HeardSymbol) -> None:
         """Answer a command to its end: acknowledge, wait for the poll, reply, hear the ACK."""
         self.wire.send(codec.ACK)
         self.next_poll()
@@ -284,9 +285,9 @@ class ServerEnd:
         """See one command through, so that no case begins with a node that believes us dead."""
         _settle(self)
 
-    def next_command(self, what: str = 'a command') -> Heard:
+    def next_command(self, what: str = 'a command') -> HeardSymbol:
         """Wait for a good message; an enquiry before it is answered DLE NAK."""
-        def is_command(symbol: Heard) -> bool:
+        def is_command(symbol: HeardSymbol) -> bool:
             if symbol.kind is SymbolKind.ENQ:
                 self.wire.send(codec.NAK)
             return symbol.kind is SymbolKind.MESSAGE
@@ -296,11 +297,11 @@ class ServerEnd:
             raise Failed('a message with the right check', symbol.raw.hex(' '))
         return symbol
 
-    def reply_to(self, command: Heard) -> None:
+    def reply_to(self, command: HeardSymbol) -> None:
         """Send the reply to a command."""
         self.wire.send(codec.message(self.serve(command.data), self.wire.check))
 
-    def finish(self, command: Heard) -> None:
+    def finish(self, command: HeardSymbol) -> None:
         """Answer a command to its end."""
         self.wire.send(codec.ACK)
         self.reply_to(command)

@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 
 from abdf1_ros.conform.case import CaseResult, Verdict
 
-Facts = Mapping[str, str]
+RunFacts = Mapping[str, str]
 """What was tried, and how: target, port, check, station, version."""
 
 
@@ -54,12 +54,12 @@ def _entry(result: CaseResult) -> dict[str, Any]:
             'transcript': list(result.transcript)}
 
 
-def as_json(facts: Facts, results: Sequence[CaseResult]) -> str:
+def as_json(facts: RunFacts, results: Sequence[CaseResult]) -> str:
     """Return the run as JSON: facts, and an entry for each case."""
     return json.dumps({**facts, 'cases': [_entry(result) for result in results]}, indent=1)
 
 
-def as_junit(facts: Facts, results: Sequence[CaseResult]) -> str:
+def as_junit(facts: RunFacts, results: Sequence[CaseResult]) -> str:
     """Return the run as JUnit XML: a test case for each case."""
     counts = Counter(result.verdict for result in results)
     suite = ElementTree.Element(
@@ -80,7 +80,7 @@ def as_junit(facts: Facts, results: Sequence[CaseResult]) -> str:
     return ElementTree.tostring(suite, encoding='unicode', xml_declaration=True)
 
 
-def as_issue(facts: Facts, results: Sequence[CaseResult]) -> str:
+def as_issue(facts: RunFacts, results: Sequence[CaseResult]) -> str:
     """Return the run as Markdown, to paste into an issue."""
     head = [f'- {name}: {value}' for name, value in facts.items()]
     rows = [f'| {result.verdict.value} | {result.case.name} | {result.case.source} | '

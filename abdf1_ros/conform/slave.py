@@ -80,7 +80,7 @@ def bad_check_ignored(end: MasterEnd) -> None:
 @case('crc-covers-station', "The CRC of a master's message covers its station and STX.",
       'M 5-6, 5-7', _SLAVE)
 def crc_covers_station(end: MasterEnd) -> None:
-    if end.wire.check is not codec.Check.CRC:
+    if end.wire.check is not codec.BlockCheck.CRC:
         raise Skipped('only with CRC')
     command = end.command()
     frame = codec.master_message(end.station, command, end.wire.check)

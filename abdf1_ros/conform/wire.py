@@ -22,7 +22,7 @@ import math
 from typing import Protocol
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.codec import Check, Heard, SymbolKind
+from abdf1_ros.conform.codec import BlockCheck, HeardSymbol, SymbolKind
 
 # A symbol that has begun may take as long as a slow line needs for the longest frame, and is not
 # waited for without end.
@@ -71,12 +71,12 @@ class Wire:
     came.
     """
 
-    def __init__(self, line: RawLine, check: Check, clock: Callable[[], float], *,
+    def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
                  is_half_duplex: bool, answer_time: float = 1.0) -> None:
         self.check = check
         self.is_half_duplex = is_half_duplex
         self.answer_time = answer_time
-        self.transcript: list[Sent | Heard] = []
+        self.transcript: list[Sent | HeardSymbol] = []
         self.has_heard = False
         self._line = line
         self._clock = clock
@@ -92,7 +92,7 @@ class Wire:
         self.transcript.append(Sent(self._clock(), raw))
         self._line.write(raw)
 
-    def hear(self, within: float | None = None) -> Heard | None:
+    def hear(self, within: float | None = None) -> HeardSymbol | None:
         """Return the next symbol; None where none has begun after ``within`` s."""
         begun = self._clock()
         end = begun + (self.answer_time if within is None else within)
@@ -104,7 +104,8 @@ class Wire:
             limit = max(end, begun + _FRAME_TIME) if self._buffer else end
             left = limit - self._clock()
             if left <= 0:
-                return self._take(Heard(SymbolKind.NOISE, self._buffer)) if self._buffer else None
+                noise = HeardSymbol(SymbolKind.NOISE, self._buffer)
+                return self._take(noise) if self._buffer else None
             self._read(left)
 
     def _read(self, timeout: float) -> None:
@@ -112,13 +113,13 @@ class Wire:
         self.has_heard = self.has_heard or bool(data)
         self._buffer = (self._buffer + data)[-_MOST_UNREAD:]
 
-    def _take(self, symbol: Heard) -> Heard:
+    def _take(self, symbol: HeardSymbol) -> HeardSymbol:
         symbol = replace(symbol, at=self._clock())
         self._buffer = self._buffer[len(symbol.raw):]
         self.transcript.append(symbol)
         return symbol
 
-    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Heard:
+    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> HeardSymbol:
         """Return the next symbol if it is of ``kind`` and good; raises Failed."""
         expected = what or kind.value
         symbol = self.hear(within)
@@ -134,7 +135,8 @@ class Wire:
         if symbol is not None:
             raise Failed(f'silence: {what}', str(symbol))
 
-    def until(self, is_wanted: Callable[[Heard], bool], what: str, within: float) -> Heard:
+    def until(self, is_wanted: Callable[[HeardSymbol], bool], what: str,
+              within: float) -> HeardSymbol:
         """Return the first symbol that ``is_wanted``, whatever comes before it."""
         end = self._clock() + within
         while (left := end - self._clock()) > 0:

@@ -20,20 +20,20 @@ from collections.abc import Callable
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Fault, Frame, MAX_LINK_DATA
+from abdf1_ros.df1.frames import Frame, FrameFault, MAX_LINK_DATA
 from abdf1_ros.df1.packet import HEADER_SIZE, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandTimeout, WrongCommandCode
 from abdf1_ros.messages import Event, Message
 
-Report = Callable[[Event], None]
+ReportEvent = Callable[[Event], None]
 
 
 def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
                 station: int | None = None) -> Event:
     """Count the fault of ``frame``, heard from ``station``; return the event that names it."""
-    if frame.fault is Fault.BAD_CHECK:
+    if frame.fault is FrameFault.BAD_CHECK:
         values = (*divmod(frame.received, 256), *divmod(frame.expected, 256))
         if checksum is Checksum.BCC:
             counters.bcc_errors += 1
@@ -41,9 +41,9 @@ def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
         counters.crc_errors += 1
         return Event(Message.ERR_BAD_CRC, values, station)
     counters.invalid_messages += 1
-    if frame.fault is Fault.NO_ETX:
+    if frame.fault is FrameFault.NO_ETX:
         return Event(Message.NTC_NO_ETX_RCVD, (), station)
-    if frame.fault is Fault.TOO_SHORT:
+    if frame.fault is FrameFault.TOO_SHORT:
         return Event(Message.NTC_RCVD_MSG_TOO_SHORT, (HEADER_SIZE,), station)
     return Event(Message.NTC_RCVD_MSG_TOO_LONG, (MAX_LINK_DATA,), station)
 
@@ -56,7 +56,8 @@ def wrong_message(packet: Packet, station: int) -> Event:
 class Accounting:
     """The accounts of one link: its counters, the records of stations, what it reports."""
 
-    def __init__(self, counters: Counters, stations: ActiveStationList, report: Report) -> None:
+    def __init__(self, counters: Counters, stations: ActiveStationList,
+                 report: ReportEvent) -> None:
         self.counters = counters
         self.report = report
         self._stations = stations

@@ -89,7 +89,7 @@ def poll_frame(station: int) -> bytes:
     return ENQ + stuff(bytes((station,))) + bytes((bcc(b'', station),))
 
 
-class Fault(Enum):
+class FrameFault(Enum):
     """Why a received frame is not to be used."""
 
     BAD_CHECK = 'wrong check'
@@ -140,7 +140,7 @@ class Frame:
 
     data: bytes
     station: int | None = None
-    fault: Fault | None = None
+    fault: FrameFault | None = None
     received: int = 0
     expected: int = 0
 
@@ -163,7 +163,7 @@ class Need(Enum):
 
 MORE: Final = Need.MORE
 
-Result = Symbol | Need | None
+Decoded = Symbol | Need | None
 """What a step comes to: a symbol, the need of more bytes, or nothing but the next step."""
 
 
@@ -190,7 +190,7 @@ class FrameDecoder:
         self._is_half_duplex = duplex is Duplex.HALF
         self._buffer = bytearray()
         self._data = bytearray()
-        self._step: Callable[[], Result] = self._idle
+        self._step: Callable[[], Decoded] = self._idle
         self._station: int | None = None
         self.last_byte = 0
         self.noise = 0
@@ -245,7 +245,7 @@ class FrameDecoder:
                 return result
         return None
 
-    def _idle(self) -> Result:
+    def _idle(self) -> Decoded:
         start = self._buffer.find(DLE)
         if start:
             skipped = len(self._buffer) if start < 0 else start
@@ -257,7 +257,7 @@ class FrameDecoder:
         del self._buffer[:2]
         return self._begin(pair)
 
-    def _begin(self, pair: bytes) -> Result:
+    def _begin(self, pair: bytes) -> Decoded:
         if pair == STX:
             self._begin_data(None)
         elif pair == SOH and self._is_half_duplex:
@@ -277,7 +277,7 @@ class FrameDecoder:
         self._station = station
         self._data.clear()
 
-    def _take_station(self, following: Callable[[], Result]) -> Result:
+    def _take_station(self, following: Callable[[], Decoded]) -> Decoded:
         """Read STN, which is stuffed like data (M 3-4), and go on to ``following``."""
         if self._buffer[0] != Code.DLE:
             self._station = self._buffer[0]
@@ -293,10 +293,10 @@ class FrameDecoder:
         self._step = following
         return None
 
-    def _soh_station(self) -> Result:
+    def _soh_station(self) -> Decoded:
         return self._take_station(self._soh_stx)
 
-    def _poll_station(self) -> Result:
+    def _poll_station(self) -> Decoded:
         # A master that does not double STN 10: DLE ENQ 10 F0 (F0 being its BCC).
         if self._buffer[:2] == bytes((Code.DLE, bcc(DLE))):
             del self._buffer[:1]
@@ -311,7 +311,7 @@ class FrameDecoder:
         assert self._station is not None
         return Poll(self._station, check == bcc(b'', self._station))
 
-    def _soh_stx(self) -> Result:
+    def _soh_stx(self) -> Decoded:
         if self._buffer[0] != Code.DLE:
             self._step = self._idle
         elif len(self._buffer) < 2:
@@ -323,7 +323,7 @@ class FrameDecoder:
             self._step = self._idle
         return None
 
-    def _link_data(self) -> Result:
+    def _link_data(self) -> Decoded:
         end = self._buffer.find(DLE)
         if end:
             self._take_data(len(self._buffer) if end < 0 else end)
@@ -341,28 +341,28 @@ class FrameDecoder:
         if pair in (ACK, NAK) and not self._is_half_duplex:
             del self._buffer[:2]
             return _CONTROLS[pair]  # an embedded response (M 4-3)
-        return self._frame(Fault.NO_ETX)  # the pair that broke in is read again as a symbol
+        return self._frame(FrameFault.NO_ETX)  # the pair that broke in is read again as a symbol
 
     def _take_data(self, count: int) -> None:
         """Take bytes of a message; those that are too many are dropped, up to its end (M 4-8)."""
         self._data += self._buffer[:min(count, MAX_LINK_DATA + 1 - len(self._data))]
         del self._buffer[:count]
 
-    def _check(self) -> Result:
+    def _check(self) -> Decoded:
         size = self._checksum.size
         if len(self._buffer) < size:
             return MORE
         received = int.from_bytes(self._buffer[:size], 'little')
         del self._buffer[:size]
         if len(self._data) > MAX_LINK_DATA:
-            return self._frame(Fault.TOO_LONG)
+            return self._frame(FrameFault.TOO_LONG)
         expected = self._checksum.of_message(self._data, self._station)
         if received != expected or self._is_damaged:
-            return self._frame(Fault.BAD_CHECK, received, expected)
-        fault = Fault.TOO_SHORT if len(self._data) < HEADER_SIZE else None
+            return self._frame(FrameFault.BAD_CHECK, received, expected)
+        fault = FrameFault.TOO_SHORT if len(self._data) < HEADER_SIZE else None
         return self._frame(fault, received, expected)
 
-    def _frame(self, fault: Fault | None, received: int = 0, expected: int = 0) -> Frame:
+    def _frame(self, fault: FrameFault | None, received: int = 0, expected: int = 0) -> Frame:
         """End the message."""
         self._step = self._idle
         self.in_message = False

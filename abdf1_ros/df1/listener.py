@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
     Control,
+    Decoded,
     Duplex,
     ENQ,
     EOT,
@@ -28,7 +29,6 @@ from abdf1_ros.df1.frames import (
     FrameDecoder,
     MORE,
     Poll,
-    Result,
     SOH,
     STX,
     Symbol,
@@ -131,7 +131,7 @@ class ListeningDecoder(FrameDecoder):
         self._keep(result)
         return result
 
-    def _begin(self, pair: bytes) -> Result:
+    def _begin(self, pair: bytes) -> Decoded:
         kind = self._kind
         if not self._duplex_given:
             if pair in (SOH, EOT):
@@ -147,7 +147,7 @@ class ListeningDecoder(FrameDecoder):
             self._kind.duplex = Duplex.HALF
         return poll
 
-    def _check(self) -> Result:
+    def _check(self) -> Decoded:
         if self._kind.checksum is not None:
             self._checksum = self._kind.checksum
             if not self._kind.is_certain and len(self._buffer) >= self._checksum.size:

@@ -34,7 +34,7 @@ from typing import NoReturn, TypeGuard
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Poll, Unknown
+from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Poll, Unknown
 from abdf1_ros.df1.machine import Heard, LISTEN_ON, Machine, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
@@ -254,14 +254,14 @@ class MasterLine:
                     self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
             elif isinstance(symbol, Frame) and symbol.station is None:
                 self._last_code = Code.STX
-                if symbol.fault is Fault.NO_ETX:
+                if symbol.fault is FrameFault.NO_ETX:
                     return (yield from self._hear_rest(symbol, number))
                 if symbol.fault is not None or not self._take_late(number, symbol):
                     return symbol
             elif self._is_echo(symbol, question.frame):
                 step = _LISTEN_ON_ECHOED
         if symbol.is_broken_off:
-            return Frame(b'', fault=Fault.NO_ETX)
+            return Frame(b'', fault=FrameFault.NO_ETX)
         self._last_code = self._last_code or symbol.last_byte
         return symbol
 

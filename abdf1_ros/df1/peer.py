@@ -52,7 +52,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Fault, Frame, Symbol, Unknown
+from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
 from abdf1_ros.df1.link import LinkStatus, NO_STATUS
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
@@ -348,7 +348,7 @@ class FullDuplexPeer:
         """Judge a message and return the response to it."""
         if frame.fault is not None:
             self._report(count_fault(frame, self._settings.checksum, self._counters))
-            if frame.fault is not Fault.NO_ETX:
+            if frame.fault is not FrameFault.NO_ETX:
                 return self._respond(frames.NAK)
             # Its sender asks with ENQ, begins anew with DLE STX, or has sent what is no
             # symbol; only the last of these needs a NAK now (M 4-8).

@@ -248,7 +248,7 @@ class HalfDuplexSlave:
         return frames.message_frame(held.packet.encode(), self._settings.checksum)
 
 
-class Station(Protocol):
+class Responder(Protocol):
     """Anything that answers symbols on a line: a slave, or one that misbehaves on purpose."""
 
     def handle(self, symbol: Symbol) -> bytes:
@@ -291,7 +291,7 @@ def _next_within(machine: Machine, seconds: float,
     return symbol
 
 
-def multidrop(stations: Sequence[Station]) -> Callable[[Machine], Procedure]:
+def multidrop(stations: Sequence[Responder]) -> Callable[[Machine], Procedure]:
     """Return the procedure of a machine that is all of ``stations`` on one line."""
     def handle(symbol: Symbol) -> bytes:
         return b''.join(station.handle(symbol) for station in stations)

@@ -82,11 +82,11 @@ def command_name(packet: Packet) -> str:
     return f'{cmd:02X}/{function:02X}'
 
 
-_Code = tuple[int, int | None]  # CMD and FNC
+_CommandCode = tuple[int, int | None]  # CMD and FNC
 
 
 @dataclass(frozen=True, slots=True)
-class _Command:
+class _KnownCommand:
     """A command: how it is read, what it says, and what its reply's data are."""
 
     name: str
@@ -108,7 +108,7 @@ def _describe_command(packet: Packet) -> str:
         return f'{entry.name}, malformed ({error}): {hexadecimal(packet.data)}'
 
 
-def _code(packet: Packet) -> _Code:
+def _code(packet: Packet) -> _CommandCode:
     cmd = packet.cmd & ~REPLY_BIT & ~PRIORITY_BIT
     return cmd, packet.data[0] if cmd in _WITH_FUNCTION and packet.data else None
 
@@ -159,7 +159,7 @@ def _masked_write(request: slc.MaskedWrite) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Symbol:
+class _SymbolicName:
     """A name that a PLC-3 has for a place (M 13-8); only it knows which."""
 
     name: str
@@ -169,7 +169,7 @@ class _Symbol:
         return b'\0' + self.name.encode('latin-1', 'replace') + b'\0'
 
 
-_Range = SystemAddress | ExtendedAddress | _Symbol
+_Range = SystemAddress | ExtendedAddress | _SymbolicName
 
 
 def _range_address(reader: Reader) -> _Range:
@@ -182,7 +182,7 @@ def _range_address(reader: Reader) -> _Range:
     return ExtendedAddress.read(reader)
 
 
-def _named(reader: Reader) -> SystemAddress | _Symbol:
+def _named(reader: Reader) -> SystemAddress | _SymbolicName:
     """Take what is written in ASCII: an address of a PLC-5 after "$", or a symbol, "$" or not."""
     ahead = copy(reader)
     try:
@@ -191,7 +191,7 @@ def _named(reader: Reader) -> SystemAddress | _Symbol:
         name = _text(ahead).removeprefix('$')
         if error.ext_sts not in (EXT_NO_SUCH_SYMBOL, EXT_BAD_SYMBOL) or not name:
             raise
-        return _Symbol(name)
+        return _SymbolicName(name)
 
 
 def _text(reader: Reader) -> str:
@@ -204,7 +204,7 @@ def _text(reader: Reader) -> str:
 
 
 def _range_text(address: _Range) -> str:
-    if isinstance(address, _Symbol):
+    if isinstance(address, _SymbolicName):
         return f'symbol {address.name}'
     if isinstance(address, SystemAddress):
         return notation.system_address(address)
@@ -261,50 +261,51 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callab
     return lambda reader: read(reader, _range_address)
 
 
-_COMMANDS: dict[_Code, _Command] = {
-    (plc2.READ, None): _Command(
+_COMMANDS: dict[_CommandCode, _KnownCommand] = {
+    (plc2.READ, None): _KnownCommand(
         'unprotected read', plc2.BasicRead.read, _basic_read, _words_reply),
-    (plc2.UNPROTECTED_WRITE, None): _Command(
+    (plc2.UNPROTECTED_WRITE, None): _KnownCommand(
         'unprotected write', plc2.BasicWrite.read, _basic_write),
-    (plc2.PROTECTED_WRITE, None): _Command(
+    (plc2.PROTECTED_WRITE, None): _KnownCommand(
         'protected write', plc2.BasicWrite.read, _basic_write),
-    (plc2.UNPROTECTED_BIT_WRITE, None): _Command(
+    (plc2.UNPROTECTED_BIT_WRITE, None): _KnownCommand(
         'unprotected bit write', plc2.BasicBitWrite.read, _basic_bit_write),
-    (plc2.PROTECTED_BIT_WRITE, None): _Command(
+    (plc2.PROTECTED_BIT_WRITE, None): _KnownCommand(
         'protected bit write', plc2.BasicBitWrite.read, _basic_bit_write),
-    (diagnostics.CMD, diagnostics.STATUS): _Command(
+    (diagnostics.CMD, diagnostics.STATUS): _KnownCommand(
         'diagnostic status', _no_parameters, lambda request: '', _identity_reply),
-    (diagnostics.CMD, diagnostics.READ_COUNTERS): _Command(
+    (diagnostics.CMD, diagnostics.READ_COUNTERS): _KnownCommand(
         'read diagnostic counters', diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {count_of(request.size, "byte")}', _words_reply),
-    (word_range.CMD, word_range.WRITE): _Command(
+    (word_range.CMD, word_range.WRITE): _KnownCommand(
         'word range write', _ranged(word_range.WordRangeWrite.read), _range_write),
-    (word_range.CMD, word_range.READ): _Command(
+    (word_range.CMD, word_range.READ): _KnownCommand(
         'word range read', _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
-    (word_range.CMD, word_range.BIT_WRITE): _Command(
+    (word_range.CMD, word_range.BIT_WRITE): _KnownCommand(
         'bit write', _ranged(word_range.WordBitWrite.read), _bit_write),
-    (word_range.CMD, word_range.FILE_READ): _Command(
+    (word_range.CMD, word_range.FILE_READ): _KnownCommand(
         'file read', _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
-    (plc5.CMD, plc5.READ_MODIFY_WRITE): _Command(
+    (plc5.CMD, plc5.READ_MODIFY_WRITE): _KnownCommand(
         'read-modify-write', plc5.ReadModifyWrite.read, _read_modify_write),
-    (plc5.CMD, plc5.TYPED_WRITE): _Command('typed write', plc5.TypedWrite.read, _typed_write),
-    (plc5.CMD, plc5.TYPED_READ): _Command(
+    (plc5.CMD, plc5.TYPED_WRITE): _KnownCommand('typed write', plc5.TypedWrite.read, _typed_write),
+    (plc5.CMD, plc5.TYPED_READ): _KnownCommand(
         'typed read', plc5.TypedRead.read, _typed_read, _typed_reply),
-    (slc.CMD, slc.SHORT_READ): _Command(
+    (slc.CMD, slc.SHORT_READ): _KnownCommand(
         'protected typed logical read', partial(LogicalRead.read, is_short=True), _logical_read,
         _logical_reply),
-    (slc.CMD, slc.LOGICAL_READ): _Command(
+    (slc.CMD, slc.LOGICAL_READ): _KnownCommand(
         'protected typed logical read', LogicalRead.read, _logical_read, _logical_reply),
-    (slc.CMD, slc.SHORT_WRITE): _Command(
+    (slc.CMD, slc.SHORT_WRITE): _KnownCommand(
         'protected typed logical write', partial(LogicalWrite.read, is_short=True),
         _logical_write),
-    (slc.CMD, slc.LOGICAL_WRITE): _Command(
+    (slc.CMD, slc.LOGICAL_WRITE): _KnownCommand(
         'protected typed logical write', LogicalWrite.read, _logical_write),
-    (slc.CMD, slc.MASKED_WRITE): _Command('masked write', slc.MaskedWrite.read, _masked_write),
+    (slc.CMD, slc.MASKED_WRITE): _KnownCommand(
+        'masked write', slc.MaskedWrite.read, _masked_write),
 }
 
 # What else there is (M 7-2, 7-3; 0F/94 is from practice); the parameters are given as bytes.
-_NAMES: dict[_Code, str] = {
+_NAMES: dict[_CommandCode, str] = {
     (0x03, None): 'physical write', (0x04, None): 'physical read',
     (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables',
     (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs', (0x06, 0x06): 'set ENQs',

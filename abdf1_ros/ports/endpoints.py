@@ -32,7 +32,7 @@ WAITING = 'waiting for a client'
 _PTYS = '/dev/pts/'
 
 
-class Line(Protocol):
+class Endpoint(Protocol):
     """
     What a link opens as its port, and opens again when it was lost.
 
@@ -48,7 +48,7 @@ class Line(Protocol):
         """Take the line away; what ``open`` has returned is the caller's to close."""
 
 
-class PtyLine:
+class PtyEndpoint:
     """
     A pseudo-terminal; ``link`` is a name for its other end.
 
@@ -130,7 +130,7 @@ def _is_in_use(target: str) -> bool:
     return False
 
 
-class TcpLine:
+class TcpEndpoint:
     """A listening TCP port, any that is free for 0; one client at a time is the line."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -152,7 +152,7 @@ class TcpLine:
         self._listener.close()
 
 
-class SerialLine:
+class SerialEndpoint:
     """A serial port, or one of a device server."""
 
     def __init__(self, settings: PortSettings) -> None:

@@ -25,13 +25,13 @@ import threading
 import time
 
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Line, PtyLine, SerialLine
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
 _PTY = 'pty'
 
-_Heard = SimpleQueue[Chunk | OSError | None]
+_TapQueue = SimpleQueue[Chunk | OSError | None]
 
 
 def is_pty(name: str) -> bool:
@@ -39,10 +39,10 @@ def is_pty(name: str) -> bool:
     return name.partition(':')[0] == _PTY
 
 
-class _Reader(threading.Thread):
+class _TapReader(threading.Thread):
     """Read a port, queue its bytes with their time, and pass them on at once."""
 
-    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _Heard,
+    def __init__(self, port: Port, direction: Direction, onward: Port | None, heard: _TapQueue,
                  wake: int) -> None:
         super().__init__(name=f'tap {direction.value}')
         self.stopping = False
@@ -79,7 +79,7 @@ class Tap:
     def __init__(self, names: Sequence[str], settings: PortSettings) -> None:
         self.names: list[str] = []
         self._settings = settings
-        self._heard: _Heard = SimpleQueue()
+        self._heard: _TapQueue = SimpleQueue()
         with ExitStack() as stack:
             ports = [self._open(name, stack) for name in names]
             self._open_ports = stack.pop_all()
@@ -141,13 +141,13 @@ class Tap:
         self.names.append(line.name)
         return port
 
-    def _line(self, name: str) -> Line:
+    def _line(self, name: str) -> Endpoint:
         if is_pty(name):
-            return PtyLine(name.partition(':')[2] or None)
+            return PtyEndpoint(name.partition(':')[2] or None)
         try:
-            return SerialLine(replace(self._settings, name=name))
+            return SerialEndpoint(replace(self._settings, name=name))
         except OSError as error:
             raise OSError(f'{name}: {error.strerror or error}') from error
 
-    def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _Reader:
-        return _Reader(port, direction, onward, self._heard, self._wake_reader)
+    def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _TapReader:
+        return _TapReader(port, direction, onward, self._heard, self._wake_reader)

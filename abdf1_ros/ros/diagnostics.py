@@ -57,7 +57,7 @@ _FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
     Freshness.STALE: ERROR, Freshness.FAILED: ERROR, Freshness.WITHHELD: ERROR}
 
-Verdict = tuple[bytes, str]
+Judgement = tuple[bytes, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Section:
 
     name: str
     hardware_id: str
-    judge: Callable[[float], Verdict]
+    judge: Callable[[float], Judgement]
     values: Callable[[float], dict[str, str]]
 
 
@@ -113,7 +113,7 @@ class Diagnostics:
         ]
         self._node_name = node_name
 
-    def _judge_writes(self, now: float) -> Verdict:
+    def _judge_writes(self, now: float) -> Judgement:
         """Return the level of writes; a heartbeat that does not count is a WARN."""
         level, text = self.writes.judge(now)
         interlocks = self._driver.interlocks
@@ -184,13 +184,13 @@ class Diagnostics:
             values=[KeyValue(key=printable(key), value=printable(value))
                     for key, value in section.values(now).items()])
 
-    def _judge_link(self, now: float) -> Verdict:
+    def _judge_link(self, now: float) -> Judgement:
         level, text = self._judge_line(now)
         if self.has_duplicate_name:
             return max(level, WARN), f'{text}; another node is called {self._node_name} too'
         return level, text
 
-    def _judge_line(self, now: float) -> Verdict:
+    def _judge_line(self, now: float) -> Judgement:
         state = self._link.state if self._link else None
         if self._link and self._link.is_released:
             return WARN, RELEASED
@@ -232,7 +232,7 @@ class Diagnostics:
         counts = self._driver.counters.by_mnemonic()
         return {name: str(count - self._baseline[name]) for name, count in counts.items()}
 
-    def _judge_counters(self, now: float) -> Verdict:
+    def _judge_counters(self, now: float) -> Judgement:
         counts = self._counters()
         return OK, (f'{counts["CNT_CMD_MSGS_SENT"]} commands sent, '
                     f'{counts["CNT_REPLY_MSGS_RCVD"]} replies received')
@@ -253,7 +253,7 @@ class Diagnostics:
         return wrong_type(station, identity, self._rows_by_type[station].values(),
                           self._map_name)
 
-    def _judge_station(self, station: Station, now: float) -> Verdict:
+    def _judge_station(self, station: Station, now: float) -> Judgement:
         if self._link is None or not self._link.state.is_open:
             return ERROR, f'station {station.number} unknown: the port is not open'
         if not station.active:
@@ -282,7 +282,7 @@ class Diagnostics:
             **health_values(self._driver.health.known(station.number), now),
         }
 
-    def _judge_mappings(self, now: float) -> Verdict:
+    def _judge_mappings(self, now: float) -> Judgement:
         level, text = self._judge_reads(now)
         if not self._left_out:
             return level, text
@@ -290,7 +290,7 @@ class Diagnostics:
         return max(level, WARN), (f'{text}; {rows} {"row" if rows == 1 else "rows"} left out of '
                                   f'the map, the first at {self._left_out[0].place}')
 
-    def _judge_reads(self, now: float) -> Verdict:
+    def _judge_reads(self, now: float) -> Judgement:
         found = self._freshness(now)
         if not found:
             return OK, 'no mapping reads'
@@ -402,7 +402,7 @@ class WriteLog:
         """Return how many results were those of messages; a fallback value answers none."""
         return self._counts.total() - self._counts[Outcome.FALLBACK]
 
-    def judge(self, now: float) -> Verdict:
+    def judge(self, now: float) -> Judgement:
         """Return WARN for a while after a write that was not confirmed, or never came."""
         total = self._messages()
         summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'

@@ -65,7 +65,7 @@ class _Subject:
 
 
 @dataclass(slots=True)
-class _Cause(_Subject):
+class _LoggedCause(_Subject):
     last: float = 0.0
     is_news: bool = True
 
@@ -81,7 +81,7 @@ class EventLog:
     def __init__(self, logger: RcutilsLogger, clock: Callable[[], float]) -> None:
         self._logger = logger
         self._clock = clock
-        self._causes: dict[tuple[Message, int | None], _Cause] = {}
+        self._causes: dict[tuple[Message, int | None], _LoggedCause] = {}
         self._debug = logger.is_enabled_for(LoggingSeverity.DEBUG)
 
     def add(self, event: Event) -> None:
@@ -96,7 +96,7 @@ class EventLog:
         if cause is None:
             if not self._has_room(now):
                 return
-            cause = self._causes[key] = _Cause()
+            cause = self._causes[key] = _LoggedCause()
         is_due = cause.is_due(now)
         cause.last = now
         if not is_due:

@@ -110,7 +110,7 @@ _RESULT_LEVELS = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Listener:
+class _NodeListener:
     """What a driver calls; values go to the topics that were made for its map."""
 
     read: Callable[[Mapping, Values], None]
@@ -196,7 +196,7 @@ class BridgeNode(Node):
     def _make_driver(self, before: ReadTopics | None) -> tuple[Driver, ReadTopics]:
         """Return a driver for the files, and the topics that it publishes to."""
         reads = ReadTopics(self)
-        listener = _Listener(
+        listener = _NodeListener(
             reads.read, self.unreadable, self.written, self.happened, self.station_changed)
         configuration = self._configuration
         driver = Driver(configuration.network, configuration.mappings,

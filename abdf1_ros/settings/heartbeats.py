@@ -86,13 +86,13 @@ class PublishWhile:
         return self.tag or RUN
 
 
-class Faults(Protocol):
+class ReportFault(Protocol):
     """Takes what is wrong with a cell."""
 
     def __call__(self, column: str, text: str, *, is_superfluous: bool = False) -> None: ...
 
 
-def number_in(row: Row, column: str, limits: tuple[int, int], fault: Faults) -> int | None:
+def number_in(row: Row, column: str, limits: tuple[int, int], fault: ReportFault) -> int | None:
     """Return a whole number of ms; a fault where it is none or outside of ``limits``."""
     text = row.get(column)
     value = whole_number(text)
@@ -103,7 +103,7 @@ def number_in(row: Row, column: str, limits: tuple[int, int], fault: Faults) -> 
     return None
 
 
-def read_heartbeat(row: Row, fault: Faults) -> Heartbeat:
+def read_heartbeat(row: Row, fault: ReportFault) -> Heartbeat:
     """Return what a row with Command Heartbeat asks for (rules 1, 3 and 4)."""
     for column in ('Topic', 'Publish', 'Min', 'Max', 'Scale', 'Offset'):
         if row.get(column):
@@ -129,7 +129,7 @@ def heartbeat_type_fault(kind: ValueType, has_bit: bool) -> str:
 
 
 def read_fallback(row: Row, command: str, kind: ValueType, length: int,
-                  limits: tuple[float, float], fault: Faults) -> Fallback | None:
+                  limits: tuple[float, float], fault: ReportFault) -> Fallback | None:
     """Return the fallback of a row, None where it has none (rule 12)."""
     columns = ('Fallback', 'Fallback_After')
     given = [column for column in columns if row.get(column)]
@@ -153,7 +153,7 @@ def _without_fallback(command: str, kind: ValueType) -> str:
 
 
 def _fallback_values(row: Row, kind: ValueType, length: int, limits: tuple[float, float],
-                     fault: Faults) -> Iterator[float]:
+                     fault: ReportFault) -> Iterator[float]:
     texts = row.get('Fallback').split()
     if len(texts) != length:
         fault('Fallback', f'Fallback has {len(texts)} values, Length is {length}; separate them '
@@ -172,7 +172,7 @@ def _fallback_values(row: Row, kind: ValueType, length: int, limits: tuple[float
 
 
 def read_publish_while(row: Row, command: str, publishes_always: bool,
-                       fault: Faults) -> PublishWhile | None:
+                       fault: ReportFault) -> PublishWhile | None:
     """Return what a row's values depend on, None for nothing (rules 13 and 14)."""
     condition, timeout = row.get('Publish_While'), row.get('Heartbeat_Timeout')
     if not condition:

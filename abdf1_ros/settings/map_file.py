@@ -25,7 +25,7 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.csv_table import read_good_rows, Row, shown
 from abdf1_ros.settings.heartbeats import counts
-from abdf1_ros.settings.map_row import Fault, RowReader
+from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 
 # Reads of a counter that its timeout has to allow for (docs/heartbeats.md, rule 14).
@@ -61,7 +61,7 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
     return mappings, problems
 
 
-def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]:
+def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFault]]:
     """
     Yield what depends on a row that is not there.
 
@@ -72,20 +72,22 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, Fault]]
     for mapping in mappings:
         for topic in mapping.heartbeat.requires if mapping.heartbeat else ():
             if topic not in topics:
-                yield mapping, Fault('Requires', f'no good Write, ReadWrite or Serve row has the '
-                                                 f'topic "{shown(topic)}"')
+                yield mapping, CellFault(
+                    'Requires', 'no good Write, ReadWrite or Serve row has the '
+                    f'topic "{shown(topic)}"')
         condition = mapping.publish_while
         if condition is None or condition.tag is None:
             continue
         counter = tags.get(condition.tag)
         if counter is None:
-            yield mapping, Fault('Publish_While', 'should be RUN or the tag of a good Read row; '
-                                                  f'"{shown(condition.tag)}" is neither')
+            yield mapping, CellFault(
+                'Publish_While', 'should be RUN or the tag of a good Read row; '
+                f'"{shown(condition.tag)}" is neither')
         elif text := _no_counter(mapping, counter, mappings):
-            yield mapping, Fault('Publish_While', f'"{shown(condition.tag)}" {text}')
+            yield mapping, CellFault('Publish_While', f'"{shown(condition.tag)}" {text}')
         elif counter.period and condition.timeout \
                 and condition.timeout < _LEAST_PERIODS * counter.period:
-            yield mapping, Fault(
+            yield mapping, CellFault(
                 'Heartbeat_Timeout', f'Heartbeat_Timeout {condition.timeout} is less than '
                 f'{_LEAST_PERIODS} x {counter.period} ms, the Period of {shown(counter.tag)}')
 
@@ -132,12 +134,12 @@ class _Clashes:
         self._routed: dict[int, Mapping] = {}
         self._gateways: dict[int, Mapping] = {}
 
-    def add(self, mapping: Mapping) -> list[Fault]:
+    def add(self, mapping: Mapping) -> list[CellFault]:
         """Return the clashes of ``mapping``; without any, it counts for the rows after it."""
-        faults: list[Fault] = []
+        faults: list[CellFault] = []
 
         def clash(column: str, other: Mapping, text: str) -> None:
-            faults.append(Fault(column, f'{text} of item {other.item} (line {other.line}, tag '
+            faults.append(CellFault(column, f'{text} of item {other.item} (line {other.line}, tag '
                                         f'"{shown(other.tag)}")'))
 
         if other := self._names.get(mapping.name):

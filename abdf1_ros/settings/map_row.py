@@ -57,7 +57,7 @@ _Choice = TypeVar('_Choice', bound=Enum)
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class CellFault:
     """
     What is wrong with a row, in parts, as a row may come from a file or a command line.
 
@@ -91,7 +91,7 @@ class RowReader:
 
     def __init__(self, row: Row) -> None:
         self._row = row
-        self.faults: list[Fault] = []
+        self.faults: list[CellFault] = []
 
     def read(self) -> Mapping | None:
         """Return the mapping, or None when the row has faults."""
@@ -172,11 +172,11 @@ class RowReader:
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:
-        self.faults.append(Fault(column, text, message, args, is_superfluous=is_superfluous))
+        self.faults.append(CellFault(column, text, message, args, is_superfluous=is_superfluous))
 
     def _bad_value(self, column: str, text: str, message: Message | None = None,
                    *args: object) -> None:
-        self.faults.append(Fault(column, text, message, args, value=self._row.get(column)))
+        self.faults.append(CellFault(column, text, message, args, value=self._row.get(column)))
 
     def _name(self, column: str, text: str) -> str:
         name = sanitise(text)

@@ -23,7 +23,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulator.simulated_plc import Faults, numbers, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import InjectedFaults, numbers, SimulatedPlc
 
 COMMANDS = """\
 commands, on standard input or with --at:
@@ -94,8 +94,8 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
     return f'station {plc.station}: {" ".join([verb, *arguments])}'
 
 
-def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) -> Faults:
-    faults = Faults()
+def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) -> InjectedFaults:
+    faults = InjectedFaults()
     try:
         if verb == 'silent' and not arguments:
             faults.silent = True

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings, Station
+from abdf1_ros.df1.slave import HalfDuplexSlave, Responder, SlaveSettings
 from abdf1_ros.pccc.diagnostics import CMD, ECHO, STATUS
 from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -68,7 +68,7 @@ def _answer_for_itself(command: Packet) -> Packet:
     return command.reply(sts=STS_ILLEGAL_COMMAND)
 
 
-def stations_of(plcs: Sequence[SimulatedPlc], checksum: Checksum) -> list[Station]:
+def stations_of(plcs: Sequence[SimulatedPlc], checksum: Checksum) -> list[Responder]:
     """Return the stations of a line: PLCs, and a gateway for those that are behind one."""
     gateways = dict.fromkeys(plc.via for plc in plcs if plc.via is not None)
     return [*(plc for plc in plcs if plc.via is None),

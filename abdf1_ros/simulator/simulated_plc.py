@@ -86,7 +86,7 @@ class _Mover:
 
 
 @dataclass(slots=True)
-class Faults:
+class InjectedFaults:
     """
     What is wrong with a station at the moment.
 
@@ -136,7 +136,7 @@ class SimulatedPlc:
         self.station = station
         self.via: int | None = None  # the gateway that it is behind
         self.table = table
-        self.faults = Faults()
+        self.faults = InjectedFaults()
         self.processor = EmulatedProcessor(table.plc_type)
         self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self.serve)
         self.outbox: deque[Sending] = deque()

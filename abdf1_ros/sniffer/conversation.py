@@ -49,7 +49,7 @@ class Transaction:
     answered: bool = False
 
 
-class Facts(NamedTuple):
+class MessageFacts(NamedTuple):
     """What there is to say about a message because of those before it."""
 
     command: Packet | None = None
@@ -72,25 +72,25 @@ class Conversation:
         self._given_up: list[Transaction] = []
 
     def take(self, packet: Packet, time: float | None, direction: Direction,
-             from_master: bool) -> Facts:
+             from_master: bool) -> MessageFacts:
         """Return what is known of a message; ``from_master`` tells frames with DLE SOH."""
         mark = self._repetition(packet, from_master)
         self._last[direction] = self._said[*_path(packet), from_master]
         marks = () if mark is None else (mark,)
         if not packet.is_reply:
             self._begin(packet, time, mark)
-            return Facts(marks=marks)
+            return MessageFacts(marks=marks)
         transaction = self._open.get((packet.dst, packet.src, packet.tns))
         if transaction is None:
-            return Facts(marks=(*marks, Mark.STRAY))
+            return MessageFacts(marks=(*marks, Mark.STRAY))
         command = transaction.command
         if packet.cmd != command.cmd | REPLY_BIT:
-            return Facts(marks=(*marks, Mark.WRONG_COMMAND))
+            return MessageFacts(marks=(*marks, Mark.WRONG_COMMAND))
         begun, latency = transaction.time, None
         if not transaction.answered and time is not None and begun is not None and begun <= time:
             latency = time - begun
         transaction.answered = True
-        return Facts(command, latency, marks)
+        return MessageFacts(command, latency, marks)
 
     def acknowledge(self, direction: Direction) -> None:
         """Take an ACK that went ``direction``: it is for what went the other way."""

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Duplex, Fault, Frame, Poll, Symbol, Unknown
+from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Poll, Symbol, Unknown
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.df1.packet import BROADCAST, HEADER_SIZE, Packet
 from abdf1_ros.pccc.describe import describe
@@ -42,7 +42,7 @@ _CONTROLS = {
 }
 
 
-class _Wire:
+class _OneDirection:
     """The bytes of one direction."""
 
     def __init__(self, kind: LineKind) -> None:
@@ -65,7 +65,7 @@ class _Wire:
         return count
 
 
-class Session:
+class TrafficDecoder:
     """
     Decode the traffic of one line, whatever the bytes are; nothing is raised.
 
@@ -78,7 +78,7 @@ class Session:
     def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None, *,
                  is_certain: bool = True) -> None:
         self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
-        self._wires: dict[Direction, _Wire] = {}
+        self._wires: dict[Direction, _OneDirection] = {}
         self._conversation = Conversation()
         self._station: int | None = None  # that the master has spoken to last
         self._awaited: tuple[Direction, str] | None = None  # asker, and what has no answer yet
@@ -88,7 +88,7 @@ class Session:
         """Yield what the line says with these bytes."""
         wire = self._wires.get(chunk.direction)
         if wire is None:
-            wire = self._wires[chunk.direction] = _Wire(self.kind)
+            wire = self._wires[chunk.direction] = _OneDirection(self.kind)
         for start in range(0, len(chunk.data) or 1, _PART):
             wire.feed(chunk._replace(data=chunk.data[start:start + _PART]))
             while (symbol := wire.decoder.next_symbol()) is not None:
@@ -110,7 +110,7 @@ class Session:
         for transaction in self._conversation.unanswered():
             yield self._unanswered(transaction, max(times, default=None))
 
-    def _noise(self, wire: _Wire, chunk: Chunk) -> Iterator[Entry]:
+    def _noise(self, wire: _OneDirection, chunk: Chunk) -> Iterator[Entry]:
         count = wire.new_noise()
         if count:
             text = 'a byte outside of any frame' if count == 1 else (
@@ -200,7 +200,7 @@ class Session:
         assert frame.fault is not None
         station = self._station if self._is_half else None
         text = frame.fault.value
-        if frame.fault is not Fault.BAD_CHECK:
+        if frame.fault is not FrameFault.BAD_CHECK:
             return Entry(time, direction, Kind.DAMAGED, text, station)
         text += f': {frame.received:04X}, right is {frame.expected:04X}'
         packet = None

@@ -26,7 +26,7 @@ from abdf1_ros.cli.conform import main
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 import pytest
 from support.driver_bench import simulated_plc
@@ -39,7 +39,7 @@ QUICK = ('--only', 'poll-idle', '--only', 'message-acknowledged', '--only', 'nak
 def port(tmp_path: Path) -> Iterator[str]:
     """Return a pseudo-terminal with a simulated SLC 1 at its other end."""
     plc = simulated_plc(1, 'SLC', time.monotonic, ('N7:0', 4))
-    line = PtyLine(str(tmp_path / 'plc'))
+    line = PtyEndpoint(str(tmp_path / 'plc'))
     link = LinkThread(Machine(multidrop([plc]), checksum=Checksum.CRC), line.open)
     link.start()
     yield line.name

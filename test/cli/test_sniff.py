@@ -32,7 +32,7 @@ from abdf1_ros.cli.sniff import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.endpoints import PtyEndpoint
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
 
@@ -340,7 +340,7 @@ def test_reader_that_has_seen_enough(capture: str) -> None:
 
 
 def test_colour_is_for_terminals_only(capture: str) -> None:
-    line = PtyLine(None)
+    line = PtyEndpoint(None)
     terminal = os.open(line.name, os.O_RDWR | os.O_NOCTTY)
     environment = {name: value for name, value in os.environ.items() if name != 'NO_COLOR'}
     try:

@@ -21,7 +21,7 @@ from typing import Any
 
 from abdf1_ros.conform import asking, client, codec, data, master, peer, slave
 from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
-from abdf1_ros.conform.codec import Check
+from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
@@ -81,7 +81,7 @@ def asking(check: str, mode: str) -> SpoiledLine:
 def results_of(line: ScriptedLine, target: Target, check: str, family: str = 'SLC',
                only: str = '') -> list[CaseResult]:
     """Return how the cases of ``target`` end."""
-    wire = Wire(line, Check(check), line.clock, is_half_duplex=target.is_half_duplex,
+    wire = Wire(line, BlockCheck(check), line.clock, is_half_duplex=target.is_half_duplex,
                 answer_time=1.0)
     words = Words(7, 2, 3, family)
     plc = simulated_plc(1, 'PLC5', line.clock, ('N7:0', 20), checksum=check)
@@ -166,7 +166,7 @@ def test_other_family_refuses(name: str) -> None:
 
 def test_case_that_needs_leave_is_skipped() -> None:
     line = answering('SLC', 'CRC', is_half_duplex=True)
-    wire = Wire(line, Check.CRC, line.clock, is_half_duplex=True)
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
     case = next(case for case in CASES if case.name == 'nak-resets')
     result, = run_cases([case], wire, lambda: MasterEnd(wire, 1, 5, Numbering(1)),
                         frozenset((Permission.NOTHING,)))

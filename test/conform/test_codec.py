@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.codec import Check, Heard, SymbolKind
+from abdf1_ros.conform.codec import BlockCheck, HeardSymbol, SymbolKind
 import pytest
 
 # M 5-4 and 5-5: DST 08 ... with a byte 10, which is doubled; to station 20 (hex) as a master.
@@ -29,12 +29,13 @@ def test_crc_has_the_check_value_of_its_polynomial() -> None:
 
 
 @pytest.mark.parametrize(('frame', 'printed'), [
-    (codec.message(LINK_DATA, Check.BCC), '10 02 08 09 06 00 10 10 04 03 10 03 D2'),
-    (codec.master_message(0x20, LINK_DATA, Check.BCC),
+    (codec.message(LINK_DATA, BlockCheck.BCC), '10 02 08 09 06 00 10 10 04 03 10 03 D2'),
+    (codec.master_message(0x20, LINK_DATA, BlockCheck.BCC),
      '10 01 20 10 02 08 09 06 00 10 10 04 03 10 03 B2'),
-    (codec.message(bytes.fromhex('07 11 41 00 53 B9' + '00' * 12), Check.CRC),  # M 5-7
+    (codec.message(bytes.fromhex('07 11 41 00 53 B9' + '00' * 12), BlockCheck.CRC),  # M 5-7
      '10 02 07 11 41 00 53 B9' + '00' * 12 + '10 03 6B 4C'),
-    (codec.master_message(0x11, bytes.fromhex('11 07 01 00 41 00 12 00 0C'), Check.CRC),  # 14-2
+    # M 14-2
+    (codec.master_message(0x11, bytes.fromhex('11 07 01 00 41 00 12 00 0C'), BlockCheck.CRC),
      '10 01 11 10 02 11 07 01 00 41 00 12 00 0C 10 03 CF 40'),
     (codec.poll(0x11), '10 05 11 EF'),  # M 14-2
     (codec.poll(0x10), '10 05 10 10 F0'),
@@ -44,23 +45,23 @@ def test_frames_are_those_of_the_manual(frame: bytes, printed: str) -> None:
 
 
 @pytest.mark.parametrize(('raw', 'is_half_duplex', 'symbol'), [
-    ('10 06 10', True, Heard(SymbolKind.ACK, codec.ACK)),
-    ('10 05', False, Heard(SymbolKind.ENQ, codec.ENQ)),
-    ('10 05 11 EF', True, Heard(SymbolKind.POLL, bytes.fromhex('100511EF'), station=0x11)),
-    ('10 05 11 EE', True, Heard(SymbolKind.POLL, bytes.fromhex('100511EE'), station=0x11,
+    ('10 06 10', True, HeardSymbol(SymbolKind.ACK, codec.ACK)),
+    ('10 05', False, HeardSymbol(SymbolKind.ENQ, codec.ENQ)),
+    ('10 05 11 EF', True, HeardSymbol(SymbolKind.POLL, bytes.fromhex('100511EF'), station=0x11)),
+    ('10 05 11 EE', True, HeardSymbol(SymbolKind.POLL, bytes.fromhex('100511EE'), station=0x11,
                                 is_good=False)),
-    ('55 00 10 06', True, Heard(SymbolKind.NOISE, b'\x55\x00')),
+    ('55 00 10 06', True, HeardSymbol(SymbolKind.NOISE, b'\x55\x00')),
     ('10 02 08 10 10 10 03 E8', True,
-     Heard(SymbolKind.MESSAGE, bytes.fromhex('1002081010 1003E8'), b'\x08\x10')),
+     HeardSymbol(SymbolKind.MESSAGE, bytes.fromhex('1002081010 1003E8'), b'\x08\x10')),
     ('10 02 08 10 06 09 10 03 EF', False,
-     Heard(SymbolKind.MESSAGE, bytes.fromhex('10020810060910 03EF'), b'\x08\x09',
+     HeardSymbol(SymbolKind.MESSAGE, bytes.fromhex('10020810060910 03EF'), b'\x08\x09',
            embedded=(SymbolKind.ACK,))),
     ('10 02 08 10 03 F9', True,
-     Heard(SymbolKind.MESSAGE, bytes.fromhex('100208 1003F9'), b'\x08', is_good=False)),
-    ('10 02 08 10 05', False, Heard(SymbolKind.NOISE, b'\x10\x02\x08')),
+     HeardSymbol(SymbolKind.MESSAGE, bytes.fromhex('100208 1003F9'), b'\x08', is_good=False)),
+    ('10 02 08 10 05', False, HeardSymbol(SymbolKind.NOISE, b'\x10\x02\x08')),
     ('10 02 08 10 03', True, None),
     ('10', True, None),
     ('', True, None),
 ])
-def test_bytes_become_symbols(raw: str, is_half_duplex: bool, symbol: Heard | None) -> None:
-    assert codec.next_symbol(bytes.fromhex(raw), Check.BCC, is_half_duplex) == symbol
+def test_bytes_become_symbols(raw: str, is_half_duplex: bool, symbol: HeardSymbol | None) -> None:
+    assert codec.next_symbol(bytes.fromhex(raw), BlockCheck.BCC, is_half_duplex) == symbol

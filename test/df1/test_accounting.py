@@ -21,7 +21,7 @@ from dataclasses import asdict
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.accounting import count_fault
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, Fault, Frame, FrameDecoder
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, FrameFault
 import pytest
 from support.vectors import vector
 
@@ -32,13 +32,13 @@ def counted(counters: Counters) -> dict[str, int]:
 
 
 @pytest.mark.parametrize(('fault', 'checksum', 'counter', 'event'), [
-    (Fault.BAD_CHECK, Checksum.CRC, 'crc_errors', (2506, 0x12, 0x34, 0xAB, 0xCD)),
-    (Fault.BAD_CHECK, Checksum.BCC, 'bcc_errors', (2507, 0x12, 0x34, 0xAB, 0xCD)),
-    (Fault.NO_ETX, Checksum.CRC, 'invalid_messages', (2518,)),
-    (Fault.TOO_SHORT, Checksum.BCC, 'invalid_messages', (2513, 6)),
-    (Fault.TOO_LONG, Checksum.CRC, 'invalid_messages', (2512, 261))])
+    (FrameFault.BAD_CHECK, Checksum.CRC, 'crc_errors', (2506, 0x12, 0x34, 0xAB, 0xCD)),
+    (FrameFault.BAD_CHECK, Checksum.BCC, 'bcc_errors', (2507, 0x12, 0x34, 0xAB, 0xCD)),
+    (FrameFault.NO_ETX, Checksum.CRC, 'invalid_messages', (2518,)),
+    (FrameFault.TOO_SHORT, Checksum.BCC, 'invalid_messages', (2513, 6)),
+    (FrameFault.TOO_LONG, Checksum.CRC, 'invalid_messages', (2512, 261))])
 @pytest.mark.parametrize('station', [None, 7])
-def test_fault(fault: Fault, checksum: Checksum, counter: str, event: tuple[int, ...],
+def test_fault(fault: FrameFault, checksum: Checksum, counter: str, event: tuple[int, ...],
                station: int | None) -> None:
     counters = Counters()
     said = count_fault(
@@ -51,7 +51,7 @@ def test_fault(fault: Fault, checksum: Checksum, counter: str, event: tuple[int,
 
 
 def test_every_fault_is_known() -> None:
-    for fault in Fault:
+    for fault in FrameFault:
         assert count_fault(Frame(b'', None, fault), Checksum.CRC, Counters())
 
 

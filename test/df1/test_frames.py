@@ -24,9 +24,9 @@ from abdf1_ros.df1.frames import (
     Duplex,
     ENQ,
     EOT,
-    Fault,
     Frame,
     FrameDecoder,
+    FrameFault,
     master_frame,
     MAX_LINK_DATA,
     MAX_WAITING,
@@ -86,9 +86,9 @@ def expected_symbols(entry: Vector) -> list[Symbol]:
     fault, expected = None, received
     if not entry.valid:
         assert entry.expected is not None
-        fault, expected = Fault.BAD_CHECK, entry.expected
+        fault, expected = FrameFault.BAD_CHECK, entry.expected
     elif len(entry.link_data) < 6:
-        fault = Fault.TOO_SHORT
+        fault = FrameFault.TOO_SHORT
     frame = Frame(entry.link_data, entry.station, fault, received, expected)
     inside = {'embedded_ack': [Control(Code.ACK)], 'embedded_nak': [Control(Code.NAK)]}
     return [*inside.get(entry.name, []), frame]
@@ -135,7 +135,7 @@ def test_captured_frame_decodes_and_encodes(entry: Captured) -> None:
     assert isinstance(symbol, Frame)
     assert symbol.received == symbol.expected
     assert symbol.station is None
-    assert symbol.fault is (Fault.TOO_SHORT if entry.checksum is BCC else None)
+    assert symbol.fault is (FrameFault.TOO_SHORT if entry.checksum is BCC else None)
     assert message_frame(symbol.data, entry.checksum) == entry.frame
 
 
@@ -151,7 +151,7 @@ def test_captured_conversation_is_command_ack_reply_ack() -> None:
 def test_captured_nak_answers_a_frame_shorter_than_a_header() -> None:
     sent, answer = CAPTURED[12], CAPTURED[13]
     assert decode(sent.frame, BCC, FULL) == [
-        Frame(b'\x0E\x0D\xAA\xAA', None, Fault.TOO_SHORT, 0x91, 0x91)]
+        Frame(b'\x0E\x0D\xAA\xAA', None, FrameFault.TOO_SHORT, 0x91, 0x91)]
     assert decode(answer.frame, BCC, FULL) == [Control(Code.NAK)]
     assert CAPTURED[14].frame == sent.frame
 
@@ -239,12 +239,12 @@ def test_etx_pair_among_the_check_bytes_is_check() -> None:
 def test_message_shorter_than_a_header(size: int, checksum: Checksum) -> None:
     (frame,) = decode(message_frame(bytes(size), checksum), checksum)
     assert isinstance(frame, Frame)
-    assert (frame.data, frame.fault) == (bytes(size), Fault.TOO_SHORT)
+    assert (frame.data, frame.fault) == (bytes(size), FrameFault.TOO_SHORT)
 
 
 def test_wrong_check_of_a_short_message_is_a_wrong_check() -> None:
     (frame,) = decode(message_frame(b'abc', BCC)[:-1] + b'\x00', BCC)
-    assert frame == Frame(b'abc', None, Fault.BAD_CHECK, 0, 0xDA)
+    assert frame == Frame(b'abc', None, FrameFault.BAD_CHECK, 0, 0xDA)
 
 
 @pytest.mark.parametrize('fill', [0x10, 0x55])
@@ -264,7 +264,7 @@ def test_message_longer_than_the_longest_is_one_up_to_its_end(
     good = message_frame(DATA, checksum)
     line = message_frame(bytes((fill,)) * size, checksum) + good
     assert decode(line, checksum, chunk=chunk) == [
-        Frame(bytes((fill,)) * 262, None, Fault.TOO_LONG), *decode(good, checksum)]
+        Frame(bytes((fill,)) * 262, None, FrameFault.TOO_LONG), *decode(good, checksum)]
 
 
 def test_largest_reply_of_any_command_fits() -> None:
@@ -275,14 +275,14 @@ def test_largest_reply_of_any_command_fits() -> None:
 def test_message_without_end_is_told_with_what_breaks_it_off(chunk: int | None) -> None:
     assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == []
     assert decode(b'\x10\x02' + bytes(1000) + EOT, chunk=chunk) == [
-        Frame(bytes(262), None, Fault.NO_ETX), Control(Code.EOT)]
+        Frame(bytes(262), None, FrameFault.NO_ETX), Control(Code.EOT)]
 
 
 @pytest.mark.parametrize('duplex', Duplex)
 def test_message_that_breaks_off_is_reported_and_the_next_one_read(duplex: Duplex) -> None:
     good = message_frame(DATA, CRC)
     assert decode(good[:9] + good, duplex=duplex, chunk=1) == [
-        Frame(DATA[:7], None, Fault.NO_ETX), *decode(good)]
+        Frame(DATA[:7], None, FrameFault.NO_ETX), *decode(good)]
 
 
 @pytest.mark.parametrize('response', [ACK, NAK])
@@ -291,7 +291,7 @@ def test_embedded_response_is_one_in_full_duplex_only(response: bytes) -> None:
     mixed = good[:5] + response + good[5:]
     assert decode(mixed, duplex=FULL) == [Control(Code(response[1])), *decode(good)]
     assert decode(mixed, duplex=HALF)[:2] == [
-        Frame(DATA[:3], None, Fault.NO_ETX), Control(Code(response[1]))]
+        Frame(DATA[:3], None, FrameFault.NO_ETX), Control(Code(response[1]))]
 
 
 def test_reset_forgets_a_message_that_has_begun() -> None:
@@ -320,7 +320,7 @@ def test_in_message_from_stx_to_the_last_check_byte() -> None:
 def test_stuffing_round_trip(data: bytes, checksum: Checksum, duplex: Duplex) -> None:
     check = checksum.of_message(data)
     assert decode(message_frame(data, checksum), checksum, duplex) == [
-        Frame(data, None, None if len(data) >= 6 else Fault.TOO_SHORT, check, check)]
+        Frame(data, None, None if len(data) >= 6 else FrameFault.TOO_SHORT, check, check)]
     assert stuff(data).count(b'\x10') == 2 * data.count(b'\x10')
 
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Duplex, Fault, Frame, Poll, Symbol
+from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Poll, Symbol
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.df1.packet import Packet
 from hypothesis import given, strategies
@@ -48,7 +48,7 @@ def test_every_vector_is_read_without_being_told_its_check(vector: Vector) -> No
     good = [symbol for symbol in found if isinstance(symbol, Frame)]
     assert [(symbol.data, symbol.station) for symbol in good] == [
         (vector.link_data, vector.station)]
-    assert good[0].fault in (None, Fault.TOO_SHORT)
+    assert good[0].fault in (None, FrameFault.TOO_SHORT)
     assert decoder.checksum is vector.checksum
 
 
@@ -61,7 +61,7 @@ def test_one_good_crc_settles_the_check() -> None:
     damaged[4] ^= 1
     (symbol,) = symbols(decoder, bytes(damaged))
     assert isinstance(symbol, Frame)
-    assert symbol.fault is Fault.BAD_CHECK
+    assert symbol.fault is FrameFault.BAD_CHECK
 
 
 def test_two_good_bccs_settle_the_check() -> None:
@@ -163,7 +163,7 @@ def test_a_guess_that_three_frames_contradict_is_changed(wrong: Checksum) -> Non
     said = b''.join(frames.ACK + frame(right, tns) for tns in range(4))
     found = [symbol for symbol in symbols(decoder, said) if isinstance(symbol, Frame)]
     assert kind.checksum is right
-    assert [symbol.fault for symbol in found] == [Fault.BAD_CHECK] * 3 + [None]
+    assert [symbol.fault for symbol in found] == [FrameFault.BAD_CHECK] * 3 + [None]
 
 
 def test_a_check_that_is_certain_stays() -> None:

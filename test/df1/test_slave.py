@@ -25,8 +25,8 @@ from abdf1_ros.df1.frames import (
     Code,
     Control,
     EOT,
-    Fault,
     Frame,
+    FrameFault,
     master_frame,
     message_frame,
     NAK,
@@ -67,7 +67,7 @@ class Bench:
         return {name: count for name, count in asdict(self.slave.counters).items() if count}
 
 
-def sent(packet: Packet, station: int | None = STATION, fault: Fault | None = None) -> Frame:
+def sent(packet: Packet, station: int | None = STATION, fault: FrameFault | None = None) -> Frame:
     """Return the symbol of a master's frame."""
     return Frame(packet.encode(), station, fault)
 
@@ -119,11 +119,13 @@ def test_frame_for_a_node_behind_the_station_is_accepted_by_its_stn() -> None:
 
 
 @pytest.mark.parametrize(('fault', 'checksum', 'counter'), [
-    (Fault.BAD_CHECK, Checksum.CRC, 'crc_errors'), (Fault.BAD_CHECK, Checksum.BCC, 'bcc_errors'),
-    (Fault.TOO_SHORT, Checksum.CRC, 'invalid_messages'),
-    (Fault.TOO_LONG, Checksum.CRC, 'invalid_messages'),
-    (Fault.NO_ETX, Checksum.BCC, 'invalid_messages')])
-def test_bad_frame_is_met_with_silence(fault: Fault, checksum: Checksum, counter: str) -> None:
+    (FrameFault.BAD_CHECK, Checksum.CRC, 'crc_errors'),
+    (FrameFault.BAD_CHECK, Checksum.BCC, 'bcc_errors'),
+    (FrameFault.TOO_SHORT, Checksum.CRC, 'invalid_messages'),
+    (FrameFault.TOO_LONG, Checksum.CRC, 'invalid_messages'),
+    (FrameFault.NO_ETX, Checksum.BCC, 'invalid_messages')])
+def test_bad_frame_is_met_with_silence(fault: FrameFault, checksum: Checksum,
+                                       counter: str) -> None:
     bench = Bench(settings=SlaveSettings(STATION, checksum))
     assert bench.hear(sent(COMMAND, fault=fault)) == [b'']
     assert (bench.served, bench.counts()) == ([], {counter: 1})
@@ -149,7 +151,7 @@ def test_command_with_a_status_is_met_with_silence() -> None:
 
 def test_damaged_command_is_accepted_when_it_comes_again() -> None:
     bench = Bench()
-    assert bench.hear(sent(COMMAND, fault=Fault.BAD_CHECK), sent(COMMAND)) == [b'', ACK]
+    assert bench.hear(sent(COMMAND, fault=FrameFault.BAD_CHECK), sent(COMMAND)) == [b'', ACK]
     assert bench.served == [COMMAND]
 
 
@@ -274,7 +276,7 @@ def test_broadcast_is_executed_but_neither_acknowledged_nor_answered() -> None:
 
 def test_slave_never_sends_nak() -> None:
     bench = Bench()
-    for fault in Fault:
+    for fault in FrameFault:
         bench.hear(sent(COMMAND, fault=fault))
     assert bench.slave.counters.naks_sent == 0
 
@@ -402,7 +404,7 @@ def test_broadcast_and_reply_need_no_room() -> None:
 
 def test_bad_broadcast_is_not_executed() -> None:
     bench = Bench()
-    assert bench.hear(sent(COMMAND, BROADCAST, Fault.BAD_CHECK)) == [b'']
+    assert bench.hear(sent(COMMAND, BROADCAST, FrameFault.BAD_CHECK)) == [b'']
     assert (bench.served, bench.counts()) == ([], {'crc_errors': 1})
 
 
@@ -414,7 +416,7 @@ def test_echo_of_our_message_leaves_us_waiting_for_the_ack() -> None:
 
 
 @pytest.mark.parametrize('heard', [
-    Frame(later(1).reply().encode()), Frame(COMMAND.reply().encode(), None, Fault.BAD_CHECK),
+    Frame(later(1).reply().encode()), Frame(COMMAND.reply().encode(), None, FrameFault.BAD_CHECK),
     Frame(COMMAND.reply().encode(), STATION)])
 def test_what_only_looks_like_an_echo_takes_the_ack_away(heard: Frame) -> None:
     bench = Bench()

@@ -28,7 +28,7 @@ from abdf1_ros.driver.points import Freshness, Outcome
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.simulator.simulated_plc import Faults, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import InjectedFaults, SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc
 from support.mappings import make_mapping
@@ -142,13 +142,13 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench, (plc, _), (ears, _) = make_bench(word(1), word(2), network=network, period=1000.0)
     bench.open()
     bench.run(1.0)
-    plc.faults = Faults(silent=True)
+    plc.faults = InjectedFaults(silent=True)
     bench.run_until(lambda: (1, False) in bench.listener.changes)
     assert bench.driver.health.known(1).processor == 'unknown (the station does not answer)'
     plc.processor.setting = Setting.RUN
     bench.run(10.0)
     assert len(ears.times(STATUS)) == 1
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     bench.run_until(lambda: (1, True) in bench.listener.changes)
     bench.run(0.2)
     assert len(ears.times(STATUS)) == 2
@@ -280,10 +280,10 @@ def test_write_only_station_is_watched_by_echoes(network: Network) -> None:
     bench.run(10.5)
     assert len(ears.times(ECHO)) == 6
     assert read_ears.times(ECHO) == []
-    plc.faults = Faults(silent=True)
+    plc.faults = InjectedFaults(silent=True)
     bench.run(ECHO_PERIOD + 1.5)
     assert bench.listener.changes == [(2, False)]
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     bench.run(ECHO_PERIOD + 1.5)
     assert bench.listener.changes == [(2, False), (2, True)]
 
@@ -320,7 +320,7 @@ def test_dead_stations_take_turns_and_no_more_than_an_eighth_of_the_line() -> No
     dead = [word(2), word(3, 'Write'), word(4, 'Write')]
     bench, plcs, _ = make_bench(alive, *dead, period=1.0)
     for plc in plcs[1:]:
-        plc.faults = Faults(silent=True)
+        plc.faults = InjectedFaults(silent=True)
     bench.open()
     bench.run_until(lambda: len(bench.listener.changes) == 3)
     reads = len(bench.listener.times(alive))
@@ -331,7 +331,7 @@ def test_dead_stations_take_turns_and_no_more_than_an_eighth_of_the_line() -> No
     other.run(20.0)
     assert cost < 1.18 * 20.0 / len(other.listener.times(alive))
     for plc in plcs[1:]:
-        plc.faults = Faults()
+        plc.faults = InjectedFaults()
     bench.run(15.0)
     assert sorted(bench.listener.changes[3:]) == [(2, True), (3, True), (4, True)]
 
@@ -341,10 +341,10 @@ def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:
     dead = [word(2), *(word(station, 'Write') for station in range(3, 9))]
     bench, plcs, _ = make_bench(alive, *dead, period=0)
     for plc in plcs[1:]:
-        plc.faults = Faults(silent=True)
+        plc.faults = InjectedFaults(silent=True)
     bench.open()
     bench.run_until(lambda: len(bench.listener.changes) == len(dead))
-    plcs[1].faults = Faults()
+    plcs[1].faults = InjectedFaults()
     bench.run(5.0)
     assert bench.listener.changes[len(dead):] == [(2, True)]
 
@@ -396,7 +396,7 @@ def test_refused_counters() -> None:
 
 def test_absent_station_is_not_asked_for_counters() -> None:
     bench, (plc,), _ = make_bench(word())
-    plc.faults = Faults(silent=True)
+    plc.faults = InjectedFaults(silent=True)
     bench.open()
     bench.run(5.0)
     bench.driver.request_counters(1)
@@ -409,7 +409,7 @@ def test_station_that_falls_silent_ends_the_request() -> None:
     bench, (plc,), _ = make_bench(word())
     bench.open()
     bench.run(1.0)
-    plc.faults = Faults(silent=True)
+    plc.faults = InjectedFaults(silent=True)
     bench.driver.request_counters(1)
     bench.run(5.0)
     assert bench.driver.health.known(1).no_counters

@@ -21,7 +21,7 @@ from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.settings.network import Network, POLLING_MODES
-from abdf1_ros.simulator.simulated_plc import Faults
+from abdf1_ros.simulator.simulated_plc import InjectedFaults
 import pytest
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import load_rows, make_mapping
@@ -110,12 +110,12 @@ def test_station_that_goes_and_comes_again_has_its_reads_released_at_once() -> N
     bench.plc(1, 'PLC5', *FILES)
     plc = bench.plc(2, 'PLC5', *FILES)
     bench.run(1.0)
-    plc.faults = Faults(silent=True)
+    plc.faults = InjectedFaults(silent=True)
     bench.run(5.0)
     assert bench.listener.changes == [(2, False)]
     assert [bench.driver.points[mapping].error is None for mapping in mappings] == [
         True, True, False, False]
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     bench.run_until(lambda: (2, True) in bench.listener.changes, 5.0)
     back = bench.clock()
     bench.run(0.1)
@@ -153,7 +153,7 @@ def test_lost_port_leaves_nothing_without_a_result(polling: str) -> None:
     bench.run(0.2)
     bench.lose_port()
     assert len(bench.listener.results) == 1
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     bench.open()
     bench.run(1.0)
     assert bench.driver.points[words].error is None

@@ -31,7 +31,7 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
-from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.session import TrafficDecoder
 from abdf1_ros.text import printable
 from fuzz.files import path_of
 
@@ -135,7 +135,7 @@ def _told(chunks: Sequence[Chunk], settings: dict[str, str], options: Any) -> li
 
 def _entries(parts: Sequence[bytes]) -> list[Entry]:
     """Return what is seen in bytes that come in parts, of which little is kept."""
-    session = Session()
+    session = TrafficDecoder()
     entries: list[Entry] = []
     for part in parts:
         entries += session.feed(Chunk(None, Direction.UNKNOWN, part))

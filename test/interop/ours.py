@@ -32,7 +32,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.endpoints import SerialLine
+from abdf1_ros.ports.endpoints import SerialEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.messages import MESSAGES, values_of, write_qos
@@ -101,7 +101,7 @@ class PlcEnd:
 
         machine = Machine(run, checksum=setup.check, duplex=Duplex.FULL,
                           counters=self._plc.counters)
-        self._link = LinkThread(machine, SerialLine(PortSettings(setup.port, 19200)).open)
+        self._link = LinkThread(machine, SerialEndpoint(PortSettings(setup.port, 19200)).open)
         self._link.start()
 
     def give(self, case: Case, values: Values) -> None:

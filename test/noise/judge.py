@@ -25,7 +25,7 @@ from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, Fault, Frame, FrameDecoder, Symbol
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, FrameFault, Symbol
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome
@@ -75,7 +75,7 @@ class Ear(FrameDecoder):
         """Return the next symbol and judge it."""
         symbol = super().next_symbol()
         if isinstance(symbol, Frame):
-            self.refused += symbol.fault is Fault.BAD_CHECK
+            self.refused += symbol.fault is FrameFault.BAD_CHECK
             self.is_deceived = symbol.fault is None and self._is_forged(symbol)
         return symbol
 

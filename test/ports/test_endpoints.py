@@ -24,7 +24,7 @@ import socket
 import subprocess
 import sys
 
-from abdf1_ros.ports.endpoints import PtyLine, SerialLine, TcpLine, WAITING
+from abdf1_ros.ports.endpoints import PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
 from abdf1_ros.ports.link_thread import Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -54,7 +54,7 @@ def exchange(port: Port, other: int, wake: int) -> None:
 
 def test_pseudo_terminal_one_client_after_the_other(tmp_path: Path, wake: int) -> None:
     name = str(tmp_path / 'plc')
-    with closing(PtyLine(name)) as line:
+    with closing(PtyEndpoint(name)) as line:
         assert line.name == name
         for _ in range(2):
             client = os.open(name, os.O_RDWR | os.O_NOCTTY)
@@ -65,14 +65,14 @@ def test_pseudo_terminal_one_client_after_the_other(tmp_path: Path, wake: int) -
 
 
 def test_pseudo_terminal_without_a_link() -> None:
-    with closing(PtyLine(None)) as line:
+    with closing(PtyEndpoint(None)) as line:
         assert Path(line.name).is_char_device()
 
 
 def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
     name = tmp_path / 'plc'
     name.symlink_to('/dev/pts/does-not-exist')
-    line = PtyLine(str(name))
+    line = PtyEndpoint(str(name))
     try:
         assert os.readlink(name).startswith('/dev/pts/')
         assert name.exists()
@@ -82,7 +82,7 @@ def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
 
 def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
     name = tmp_path / 'plc'
-    line = PtyLine(str(name))
+    line = PtyEndpoint(str(name))
     name.unlink()
     name.symlink_to('/dev/ttyUSB0')
     line.close()
@@ -96,15 +96,16 @@ def test_name_that_cannot_be_had_leaves_no_terminal_open(
     (tmp_path / 'taken').touch()
     before = os.listdir('/dev/fd')
     with pytest.raises(OSError, match=text):
-        PtyLine(str(tmp_path / link))
+        PtyEndpoint(str(tmp_path / link))
     assert os.listdir('/dev/fd') == before
     assert os.listdir(tmp_path) == ['taken']
 
 
 def test_name_that_another_process_has(tmp_path: Path) -> None:
     name = str(tmp_path / 'plc')
-    code = 'import sys; from abdf1_ros.ports.endpoints import PtyLine; PtyLine(sys.argv[1])'
-    with closing(PtyLine(name)):
+    code = ('import sys; from abdf1_ros.ports.endpoints import PtyEndpoint; '
+            'PtyEndpoint(sys.argv[1])')
+    with closing(PtyEndpoint(name)):
         before = os.readlink(name)
         other = subprocess.run([sys.executable, '-c', code, name], text=True,
                                stderr=subprocess.PIPE, timeout=PATIENCE, check=False)
@@ -113,7 +114,7 @@ def test_name_that_another_process_has(tmp_path: Path) -> None:
 
 
 def test_tcp_one_client_after_the_other(wake: int) -> None:
-    with closing(TcpLine('127.0.0.1', 0)) as line:
+    with closing(TcpEndpoint('127.0.0.1', 0)) as line:
         scheme, _, address = line.name.partition('://')
         host, _, number = address.partition(':')
         assert (scheme, host) == ('socket', '127.0.0.1')
@@ -130,13 +131,13 @@ def test_tcp_one_client_after_the_other(wake: int) -> None:
 def test_tcp_port_in_use() -> None:
     with socket.create_server(('127.0.0.1', 0)) as server, \
             pytest.raises(OSError, match='Address already in use'):
-        TcpLine('127.0.0.1', server.getsockname()[1])
+        TcpEndpoint('127.0.0.1', server.getsockname()[1])
 
 
 def test_serial_port_is_opened_at_once_and_again_when_it_was_lost(
         tmp_path: Path, wake: int) -> None:
     with closing(Pty(tmp_path / 'port')) as pty, \
-            closing(SerialLine(PortSettings(str(pty.name)))) as line:
+            closing(SerialEndpoint(PortSettings(str(pty.name)))) as line:
         assert line.name == str(pty.name)
         for _ in range(2):
             with closing(line.open()) as port:
@@ -152,10 +153,10 @@ def test_serial_port_that_nobody_has_taken_is_closed(tmp_path: Path) -> None:
     with closing(Pty(tmp_path / 'port')) as pty:
         lines = []  # kept, so that nobody but close() closes them
         for _ in range(2):
-            lines.append(SerialLine(PortSettings(str(pty.name))))
+            lines.append(SerialEndpoint(PortSettings(str(pty.name))))
             lines[-1].close()
 
 
 def test_serial_port_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(OSError, match='No such file'):
-        SerialLine(PortSettings(str(tmp_path / 'none')))
+        SerialEndpoint(PortSettings(str(tmp_path / 'none')))

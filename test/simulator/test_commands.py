@@ -24,7 +24,7 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.commands import CommandError, execute
 from abdf1_ros.simulator.ladder import Ladder
-from abdf1_ros.simulator.simulated_plc import Faults, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import InjectedFaults, SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
 
@@ -35,23 +35,23 @@ def plcs() -> list[SimulatedPlc]:
 
 
 @pytest.mark.parametrize('line, faults, text', [
-    ('silent 12', Faults(silent=True), 'station 12: silent'),
-    ('full 12', Faults(full=True), 'station 12: full'),
-    ('  slow   12  3 \n', Faults(slow=3), 'station 12: slow 3'),
-    ('delay 12 50', Faults(delay=0.05), 'station 12: delay 50'),
-    ('noise 12 0.01', Faults(noise=0.01), 'station 12: noise 0.01'),
-    ('error 12 50', Faults(status=(0x50,)), 'station 12: error 50'),
-    ('error 12 F0 0b', Faults(status=(0xF0, 0x0B)), 'station 12: error F0 0b'),
-    ('normal 12', Faults(), 'station 12: normal')])
-def test_command(plcs: list[SimulatedPlc], line: str, faults: Faults, text: str) -> None:
-    plcs[1].faults = Faults(silent=True, slow=9)
+    ('silent 12', InjectedFaults(silent=True), 'station 12: silent'),
+    ('full 12', InjectedFaults(full=True), 'station 12: full'),
+    ('  slow   12  3 \n', InjectedFaults(slow=3), 'station 12: slow 3'),
+    ('delay 12 50', InjectedFaults(delay=0.05), 'station 12: delay 50'),
+    ('noise 12 0.01', InjectedFaults(noise=0.01), 'station 12: noise 0.01'),
+    ('error 12 50', InjectedFaults(status=(0x50,)), 'station 12: error 50'),
+    ('error 12 F0 0b', InjectedFaults(status=(0xF0, 0x0B)), 'station 12: error F0 0b'),
+    ('normal 12', InjectedFaults(), 'station 12: normal')])
+def test_command(plcs: list[SimulatedPlc], line: str, faults: InjectedFaults, text: str) -> None:
+    plcs[1].faults = InjectedFaults(silent=True, slow=9)
     assert execute(line, plcs) == text
     assert plcs[1].faults == faults
-    assert plcs[0].faults == Faults()
+    assert plcs[0].faults == InjectedFaults()
 
 
 def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
-    plcs[1].faults = faults = Faults(slow=9)
+    plcs[1].faults = faults = InjectedFaults(slow=9)
     plcs[1].counters.messages_sent, plcs[1].counters.chars_received = 3, 70
     name, _, counts = execute('counters 12', plcs).partition(': ')
     assert name == 'station 12'
@@ -78,7 +78,7 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
       for text in ('zz', '5', '500000', '\u0661\u0661')),
     ('error 1', '"error 1" is no command'), ('normal 1 x', '"normal 1 x" is no command')])
 def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
-    plcs[0].faults = before = Faults(slow=2)
+    plcs[0].faults = before = InjectedFaults(slow=2)
     with pytest.raises(CommandError) as caught:
         execute(line, plcs)
     assert str(caught.value).startswith(text)
@@ -97,7 +97,7 @@ def test_bad_command_is_told_the_commands_and_no_more(
 
 @pytest.mark.parametrize('setting', Setting)
 def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
-    plcs[1].faults = before = Faults(slow=9)
+    plcs[1].faults = before = InjectedFaults(slow=9)
     assert execute(f'mode 12 {setting.value}', plcs) == f'station 12: mode {setting.value}'
     assert plcs[1].processor.setting is setting
     assert plcs[0].processor.setting is Setting.REMOTE

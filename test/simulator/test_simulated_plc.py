@@ -28,7 +28,7 @@ from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
 from abdf1_ros.simulator.ladder import Ladder
-from abdf1_ros.simulator.simulated_plc import COLUMNS, Faults, load_plcs, SimulatedPlc
+from abdf1_ros.simulator.simulated_plc import COLUMNS, InjectedFaults, load_plcs, SimulatedPlc
 import pytest
 from support.clock import Clock
 from support.driver_bench import simulated_plc, store, stored
@@ -264,25 +264,25 @@ def test_without_faults(plc: SimulatedPlc) -> None:
 
 
 def test_silent(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(silent=True)
+    plc.faults = InjectedFaults(silent=True)
     master = Master(plc)
     assert (master.deliver(READ), master.poll()) == (b'', b'')
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     assert master.poll() == frames.EOT  # it has not heard anything
     assert master.number('N7:0') == 0
 
 
 def test_full(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(full=True)
+    plc.faults = InjectedFaults(full=True)
     master = Master(plc)
     assert (master.deliver(READ), master.poll()) == (b'', frames.EOT)
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     assert master.poll() == frames.EOT  # it has not kept the command
     assert master.number('N7:0') == 0
 
 
 def test_slow(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(slow=3)
+    plc.faults = InjectedFaults(slow=3)
     master = Master(plc)
     for _ in range(2):
         assert master.deliver(READ) == frames.ACK
@@ -293,7 +293,7 @@ def test_slow(plc: SimulatedPlc) -> None:
 
 
 def test_slow_station_does_not_answer_polls_of_others(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(slow=1)
+    plc.faults = InjectedFaults(slow=1)
     master = Master(plc)
     master.deliver(READ)
     assert plc.handle(Poll(2, True)) == plc.handle(Poll(1, False)) == b''
@@ -304,27 +304,27 @@ def test_slow_station_does_not_answer_polls_of_others(plc: SimulatedPlc) -> None
 @pytest.mark.parametrize('status, link_data', [
     ((0x50,), '05 01 4f 50 01 00'), ((0xF0, 0x0B), '05 01 4f f0 01 00 0b')])
 def test_error(plc: SimulatedPlc, status: tuple[int, ...], link_data: str) -> None:
-    plc.faults = Faults(status=status)
+    plc.faults = InjectedFaults(status=status)
     master = Master(plc)
     master.deliver(READ)
     assert master.poll() == frames.message_frame(bytes.fromhex(link_data), Checksum.CRC)
 
 
 def test_error_executes_nothing(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(status=(0x50,))
+    plc.faults = InjectedFaults(status=(0x50,))
     Master(plc).deliver((0x0F, bytes.fromhex('aa 02 07 89 00 00 05 00')))
     assert stored(plc, 'N7:0') == b'\0\0'
 
 
 def test_noise_damages_its_share(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(noise=0.1)
+    plc.faults = InjectedFaults(noise=0.1)
     sent = bytes(10_000)
     received = plc.damaged(sent)
     assert len(received) == len(sent)
     damaged = [byte for byte in received if byte]
     assert 900 < len(damaged) < 1100
     assert set(damaged) == {1 << bit for bit in range(8)}
-    plc.faults = Faults(noise=1.0)
+    plc.faults = InjectedFaults(noise=1.0)
     assert all(plc.damaged(frames.ACK))
     assert plc.damaged(frames.ACK) != frames.ACK
 
@@ -333,13 +333,13 @@ def test_noise_is_the_same_in_every_run(clock: Clock) -> None:
     heard = []
     for _ in range(2):
         plc = simulated_plc(1, 'SLC', clock, ('N7:0', 10))
-        plc.faults = Faults(noise=0.5)
+        plc.faults = InjectedFaults(noise=0.5)
         heard.append(plc.damaged(bytes(100)))
     assert heard[0] == heard[1] != bytes(100)
 
 
 def test_delay(plc: SimulatedPlc, clock: Clock) -> None:
-    plc.faults = Faults(delay=0.05)
+    plc.faults = InjectedFaults(delay=0.05)
     master = Master(plc)
     for _ in range(2):
         assert master.deliver(READ) == frames.ACK
@@ -353,10 +353,10 @@ def test_delay(plc: SimulatedPlc, clock: Clock) -> None:
 
 
 def test_delay_ends_with_the_fault(plc: SimulatedPlc) -> None:
-    plc.faults = Faults(delay=0.05)
+    plc.faults = InjectedFaults(delay=0.05)
     master = Master(plc)
     master.deliver(READ)
-    plc.faults = Faults()
+    plc.faults = InjectedFaults()
     assert master.poll() == frames.EOT  # this reply was late already
     master.deliver(READ)
     assert master.poll().startswith(frames.STX)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Direction
-from abdf1_ros.sniffer.conversation import Conversation, Facts
+from abdf1_ros.sniffer.conversation import Conversation, MessageFacts
 from abdf1_ros.sniffer.entries import Mark
 import pytest
 
@@ -33,13 +33,13 @@ class Talk(Conversation):
         super().__init__()
         self.now = 0.0
 
-    def out(self, packet: Packet) -> Facts:
+    def out(self, packet: Packet) -> MessageFacts:
         return self._say(packet, Direction.OUT, True)
 
-    def back(self, packet: Packet) -> Facts:
+    def back(self, packet: Packet) -> MessageFacts:
         return self._say(packet, Direction.IN, False)
 
-    def _say(self, packet: Packet, direction: Direction, from_master: bool) -> Facts:
+    def _say(self, packet: Packet, direction: Direction, from_master: bool) -> MessageFacts:
         self.now += 0.5
         return self.take(packet, self.now, direction, from_master)
 
@@ -50,9 +50,9 @@ def talk() -> Talk:
 
 
 def test_reply_finds_its_command(talk: Talk) -> None:
-    assert talk.out(COMMAND) == Facts()
+    assert talk.out(COMMAND) == MessageFacts()
     talk.out(Packet(2, 5, 0x0F, 0, 7))
-    assert talk.back(REPLY) == Facts(COMMAND, 1.0)
+    assert talk.back(REPLY) == MessageFacts(COMMAND, 1.0)
     assert [open_one.command.dst for open_one in talk.unanswered()] == [2]
 
 
@@ -68,10 +68,10 @@ def test_again_without_ack_is_a_retransmission_with_ack_a_duplicate(talk: Talk) 
     assert talk.out(COMMAND).marks == (Mark.RETRANSMISSION,)
     talk.acknowledge(Direction.IN)
     assert talk.out(COMMAND).marks == (Mark.DUPLICATE,)
-    assert talk.back(REPLY) == Facts(COMMAND, 1.5)  # since it was said first
-    assert talk.back(REPLY) == Facts(COMMAND, None, (Mark.RETRANSMISSION,))
+    assert talk.back(REPLY) == MessageFacts(COMMAND, 1.5)  # since it was said first
+    assert talk.back(REPLY) == MessageFacts(COMMAND, None, (Mark.RETRANSMISSION,))
     talk.acknowledge(Direction.OUT)
-    assert talk.back(REPLY) == Facts(COMMAND, None, (Mark.DUPLICATE,))
+    assert talk.back(REPLY) == MessageFacts(COMMAND, None, (Mark.DUPLICATE,))
 
 
 def test_an_ack_is_for_what_went_the_other_way(talk: Talk) -> None:
@@ -92,9 +92,9 @@ def test_only_the_last_message_of_a_path_can_be_repeated(talk: Talk) -> None:
 def test_program_that_never_changes_its_tns(talk: Talk) -> None:
     for count in range(3):
         marks = (Mark.DUPLICATE,) if count else ()
-        assert talk.out(COMMAND) == Facts(marks=marks)
+        assert talk.out(COMMAND) == MessageFacts(marks=marks)
         talk.acknowledge(Direction.IN)
-        assert talk.back(REPLY) == Facts(COMMAND, 0.5, marks)
+        assert talk.back(REPLY) == MessageFacts(COMMAND, 0.5, marks)
         talk.acknowledge(Direction.OUT)
 
 
@@ -102,8 +102,8 @@ def test_message_from_slave_to_slave_is_relayed(talk: Talk) -> None:
     command = Packet(7, 2, 0x0F, 0, 9)
     assert talk.back(command).marks == ()
     assert talk.out(command).marks == (Mark.RELAYED,)
-    assert talk.back(command.reply()) == Facts(command, 1.0)
-    assert talk.out(command.reply()) == Facts(command, None, (Mark.RELAYED,))
+    assert talk.back(command.reply()) == MessageFacts(command, 1.0)
+    assert talk.out(command.reply()) == MessageFacts(command, None, (Mark.RELAYED,))
     assert talk.unanswered() == []
 
 
@@ -118,7 +118,7 @@ def test_another_recording_begins(talk: Talk) -> None:
     talk.out(Packet(2, 5, 0x0F, 0, 7))
     assert list(talk.expired(100.0)) == []  # the ports of a tap are not exactly together
     talk.now = 0.0
-    assert talk.back(REPLY) == Facts(COMMAND, None)
+    assert talk.back(REPLY) == MessageFacts(COMMAND, None)
     assert [entry.command.dst for entry in talk.expired(talk.now)] == [2]
     assert talk.unanswered() == []
 

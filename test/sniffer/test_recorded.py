@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.sniffer.entries import Kind
-from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.session import TrafficDecoder
 import pytest
 from support.captures import Capture, CAPTURES, FOLDER
 
@@ -26,7 +26,7 @@ _BAD = (Kind.DAMAGED, Kind.UNKNOWN, Kind.NOISE)
 
 @pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)
 def test_everything_is_understood_and_the_check_is_found(capture: Capture) -> None:
-    session = Session()
+    session = TrafficDecoder()
     entries = [entry for chunk in capture.chunks for entry in session.feed(chunk)]
     assert session.kind.checksum is capture.check
     assert [entry for entry in entries if entry.kind in _BAD or entry.valid is False] == []

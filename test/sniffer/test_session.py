@@ -26,7 +26,7 @@ from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
-from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.session import TrafficDecoder
 from hypothesis import given, strategies
 import pytest
 from support.multidrop import MasterBench
@@ -52,10 +52,10 @@ TRANSACTION = [(OUT, master(COMMAND)), (IN, frames.ACK), (OUT, frames.poll_frame
                (IN, frames.EOT)]
 
 
-def decode(said: Iterable[tuple[Direction, bytes]], session: Session | None = None,
+def decode(said: Iterable[tuple[Direction, bytes]], session: TrafficDecoder | None = None,
            pause: float = 0.01) -> list[Entry]:
     """Return the entries of a conversation in which something is said every ``pause`` s."""
-    session = session or Session()
+    session = session or TrafficDecoder()
     found: list[Entry] = []
     for count, (direction, data) in enumerate(said):
         found += session.feed(Chunk(count * pause, direction, data))
@@ -93,7 +93,7 @@ def test_transaction(directions: type[list[tuple[Direction, bytes]]]) -> None:
 def test_check_is_found_or_given(checksum: Checksum, given: bool) -> None:
     said = [(OUT, master(COMMAND, checksum)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
             (IN, message(REPLY, checksum)), (OUT, frames.ACK)]
-    session = Session(checksum if given else None, Duplex.HALF if given else None)
+    session = TrafficDecoder(checksum if given else None, Duplex.HALF if given else None)
     entries = decode(one_wire(said), session)
     assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.POLL, Kind.REPLY, Kind.ACK]
     assert {entry.checksum for entry in entries if entry.packet} == {checksum}
@@ -104,7 +104,7 @@ def test_wrong_check_is_marked_and_taken_no_further() -> None:
     damaged = bytearray(master(COMMAND))
     damaged[7] ^= 0x01
     bad, silence, good = decode([(OUT, bytes(damaged)), (OUT, master(COMMAND))],
-                                Session(Checksum.CRC))[:3]
+                                TrafficDecoder(Checksum.CRC))[:3]
     assert (bad.kind, bad.valid, bad.checksum) == (Kind.DAMAGED, False, Checksum.CRC)
     assert bad.text.startswith('wrong check: ')
     assert '; reads like ' in bad.text
@@ -160,7 +160,7 @@ def test_command_is_given_up_while_the_line_goes_on() -> None:
 def test_full_duplex() -> None:
     whole = message(REPLY)
     back = Packet(5, 1, 0x0F, 0, 0x0001, bytes.fromhex('AA 02 07 89 00 00 05 00'))
-    session = Session()
+    session = TrafficDecoder()
     entries = decode([(OUT, message(COMMAND)), (IN, frames.ACK), (IN, whole[:9]),
                       (IN, frames.ACK + whole[9:]), (OUT, frames.NAK), (OUT, frames.ENQ),
                       (IN, message(back))], session)
@@ -185,7 +185,7 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
 
 
 def test_frame_that_breaks_off_does_not_reach_into_another_recording() -> None:
-    session = Session()
+    session = TrafficDecoder()
     found = [*session.feed(Chunk(5.0, OUT, master(COMMAND)[:9])),
              *session.feed(Chunk(0.0, OUT, frames.poll_frame(1)))]
     assert kinds(found) == [Kind.NOISE, Kind.POLL]
@@ -212,7 +212,7 @@ def test_master_resets_the_line() -> None:
     pytest.param(vector, id=vector.name) for vector in VECTORS if vector.frame])
 def test_vectors(vector: Vector) -> None:
     entries = [entry for entry in decode([(UNKNOWN, vector.frame)],
-                                         Session(vector.checksum, vector.duplex))
+                                         TrafficDecoder(vector.checksum, vector.duplex))
                if entry.kind is not Kind.UNANSWERED]
     if not vector.is_message:
         assert kinds(entries) in ([Kind.POLL], [Kind.EOT], [Kind.ACK], [Kind.NAK], [Kind.ENQ])
@@ -230,7 +230,7 @@ def test_vectors(vector: Vector) -> None:
 def test_capture_of_a_real_line() -> None:
     """Three full-duplex transactions with CRC, as a radio modem has passed them on."""
     recorded = [entry for entry in CAPTURED if entry.checksum is Checksum.CRC]
-    session = Session()
+    session = TrafficDecoder()
     entries = decode([(OUT if entry.direction == 'tx' else IN, entry.frame)
                       for entry in recorded], session)
     assert session.kind.checksum is Checksum.CRC
@@ -240,7 +240,7 @@ def test_capture_of_a_real_line() -> None:
 
 
 def test_recording_without_times() -> None:
-    session = Session()
+    session = TrafficDecoder()
     entries: list[Entry] = []
     for _, data in TRANSACTION:
         entries += session.feed(Chunk(None, UNKNOWN, data))
@@ -277,7 +277,7 @@ def test_conversation_of_a_master_and_two_slaves(noise: Noise) -> None:
         for number in (1, 2):
             task = bench.ask(number)
             bench.line.run(lambda task=task: task.result is not None, 60.0)
-    session = Session()
+    session = TrafficDecoder()
     entries = [entry for chunk in heard for entry in session.feed(chunk)]
     entries += session.finish()
     assert (session.kind.checksum, session.kind.duplex) == (Checksum.CRC, Duplex.HALF)
@@ -305,7 +305,7 @@ PIECES = strategies.tuples(
 def test_any_bytes_in_any_chunks(
         said: list[tuple[float, Direction, bytes]], checksum: Checksum | None,
         duplex: Duplex | None) -> None:
-    session = Session(checksum, duplex)
+    session = TrafficDecoder(checksum, duplex)
     for chunk in said:
         for entry in session.feed(Chunk(*chunk)):
             assert entry.text.isprintable()

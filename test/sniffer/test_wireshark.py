@@ -33,7 +33,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line
-from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.session import TrafficDecoder
 import pytest
 from support.captures import CAPTURES
 from support.vectors import load_json, VECTORS
@@ -126,7 +126,7 @@ def test_every_capture(tmp_path: Path) -> None:
 def test_every_frame_of_the_vectors(tmp_path: Path) -> None:
     entries: list[Entry] = []
     for vector in VECTORS:
-        session = Session(vector.checksum, vector.duplex)
+        session = TrafficDecoder(vector.checksum, vector.duplex)
         entries += session.feed(Chunk(1.0, Direction.OUT, vector.frame))
         entries += (entry for entry in session.finish() if entry.wire)
     assert_all_same(tmp_path / 'line.pcapng', entries)
@@ -134,7 +134,7 @@ def test_every_frame_of_the_vectors(tmp_path: Path) -> None:
 
 def test_every_command_of_the_vectors(tmp_path: Path) -> None:
     entries: list[Entry] = []
-    session = Session(Checksum.BCC)
+    session = TrafficDecoder(Checksum.BCC)
     for exchange in load_json('exchanges.json')['exchanges']:
         for direction, name in ((Direction.OUT, 'command'), (Direction.IN, 'reply')):
             frame = message_frame(bytes.fromhex(exchange[name]), Checksum.BCC)

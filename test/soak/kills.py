@@ -48,7 +48,7 @@ from abdf1_ros.df1.checksum import Checksum  # noqa: E402
 from abdf1_ros.df1.machine import Machine  # noqa: E402
 from abdf1_ros.df1.slave import multidrop  # noqa: E402
 from abdf1_ros.pccc.emulated import Setting  # noqa: E402
-from abdf1_ros.ports.endpoints import PtyLine  # noqa: E402
+from abdf1_ros.ports.endpoints import PtyEndpoint  # noqa: E402
 from abdf1_ros.ports.link_thread import LinkThread  # noqa: E402
 from abdf1_ros.simulator.ladder import Ladder, Lamp  # noqa: E402
 from support.driver_bench import simulated_plc  # noqa: E402
@@ -108,7 +108,7 @@ class Cell:
 
     def plug_in(self) -> None:
         """Give the bridge a port, with the PLC at its other end."""
-        self.line = PtyLine(str(self._folder / 'plc'))
+        self.line = PtyEndpoint(str(self._folder / 'plc'))
         self.link = LinkThread(
             Machine(multidrop([self.plc]), checksum=Checksum.CRC), self.line.open)
         self.link.start()

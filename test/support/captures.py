@@ -28,7 +28,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.sniffer.capture import Chunk, read_capture
 from abdf1_ros.sniffer.entries import Entry, Kind
-from abdf1_ros.sniffer.session import Session
+from abdf1_ros.sniffer.session import TrafficDecoder
 from support.vectors import load_json, VECTOR_FOLDER
 
 FOLDER = VECTOR_FOLDER / 'captures'
@@ -71,7 +71,7 @@ class Capture:
     @cached_property
     def entries(self) -> tuple[Entry, ...]:
         """Return what the sniffer makes of it."""
-        session = Session(self.check)
+        session = TrafficDecoder(self.check)
         seen = [entry for chunk in self.chunks for entry in session.feed(chunk)]
         return (*seen, *session.finish())
 

@@ -21,8 +21,7 @@ import heapq
 import itertools
 
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.df1.slave import Station as LineStation
+from abdf1_ros.df1.slave import multidrop, Responder
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
@@ -121,7 +120,7 @@ def stored(plc: SimulatedPlc, text: str, words: int = 1) -> bytes:
 class _FarEnd(Machine):
     """All stations of the line; what they hear and say goes through two filters."""
 
-    def __init__(self, stations: Sequence[LineStation], network: Network) -> None:
+    def __init__(self, stations: Sequence[Responder], network: Network) -> None:
         super().__init__(multidrop(stations), checksum=network.checksum)
         self.hear: Callable[[bytes], bytes] = bytes
         self.say: Callable[[bytes], bytes] = bytes
@@ -151,7 +150,7 @@ class DriverBench:
         self.listener = Recorder(self.clock)
         self.driver = Driver(
             self.network, mappings, settings or DriverSettings(), listener or self.listener)
-        self._stations: list[LineStation] = []
+        self._stations: list[Responder] = []
         self.far = _FarEnd(self._stations, self.network)
         self.line = VirtualLine(
             self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
@@ -172,7 +171,7 @@ class DriverBench:
         self.connect(made)
         return made
 
-    def connect(self, station: LineStation) -> None:
+    def connect(self, station: Responder) -> None:
         """Put any station on the line."""
         self._stations.append(station)
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -32,7 +32,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 @contextmanager
 def plc_line(path: Path, *plcs: SimulatedPlc) -> Iterator[str]:
     """Put PLCs on a half-duplex line with CRC; yield the name of its port."""
-    line = PtyLine(str(path))
+    line = PtyEndpoint(str(path))
     stations = stations_of(plcs, Checksum.CRC)
     link = LinkThread(Machine(multidrop(stations), checksum=Checksum.CRC), line.open)
     link.start()

@@ -37,7 +37,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.paths import config_file
-from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.messages import latched_qos
 from abdf1_ros.simulator.commands import execute
@@ -335,7 +335,7 @@ class Plcs:
 
     def __init__(self, data: Path) -> None:
         self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
-        self._line = PtyLine(str(data.with_name('plcs')))
+        self._line = PtyEndpoint(str(data.with_name('plcs')))
         self.port = self._line.name
         self.faults: list[Exception] = []
         machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)

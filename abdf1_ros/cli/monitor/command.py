@@ -37,8 +37,8 @@ import sys
 import time
 from types import FrameType
 
-from abdf1_ros.cli.monitor.node import full_name, Watch
-from abdf1_ros.cli.monitor.view import Line, render, Style
+from abdf1_ros.cli.monitor.node import full_name, NodeWatch
+from abdf1_ros.cli.monitor.view import render, Style, TextLine
 from abdf1_ros.cli.terminal import command_parser, drop_output, prepare_output, seconds_option
 from abdf1_ros.errors import FormatError
 from abdf1_ros.text import printable
@@ -125,7 +125,7 @@ class _Screen:
     def width(self) -> int:
         return self._window.getmaxyx()[1] - 1  # writing into the last corner is an error
 
-    def show(self, lines: Sequence[Line]) -> None:
+    def show(self, lines: Sequence[TextLine]) -> None:
         """Show what fits, from the line that has been scrolled to, and the keys below it."""
         height = self._window.getmaxyx()[0] - 1
         self._sections = {line.section: row for row, line in enumerate(lines) if line.section}
@@ -208,7 +208,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace, words: list[str]) -> int:
     has_ended = _Ending()
-    with Watch(full_name(options.node), words, options.write) as watch:
+    with NodeWatch(full_name(options.node), words, options.write) as watch:
         if _find(watch, options.wait, has_ended):
             has_ended.limit(options.seconds)
             _show(watch, options, has_ended)
@@ -235,7 +235,7 @@ def _parse(args: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(args)
 
 
-def _find(watch: Watch, seconds: float, has_ended: _Ending) -> bool:
+def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:
     """Listen until the node is there."""
     end = time.monotonic() + seconds
     said = time.monotonic()
@@ -247,7 +247,7 @@ def _find(watch: Watch, seconds: float, has_ended: _Ending) -> bool:
     return watch.is_there
 
 
-def _not_found(watch: Watch, seconds: float) -> str:
+def _not_found(watch: NodeWatch, seconds: float) -> str:
     bridges = watch.bridges()
     if watch.name in bridges:
         return (f'{watch.name} is seen, but nothing is heard of it within {seconds:g} s: programs '
@@ -259,7 +259,7 @@ def _not_found(watch: Watch, seconds: float) -> str:
     return f'there is no node {watch.name} within {seconds:g} s: {hint}'
 
 
-def _show(watch: Watch, options: argparse.Namespace, has_ended: _Ending) -> None:
+def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> None:
     if options.once:
         _complete(watch, has_ended)
         _print(watch)
@@ -281,7 +281,7 @@ def _can_draw() -> bool:
     return True
 
 
-def _draw(window: curses.window, watch: Watch, has_ended: _Ending) -> None:
+def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
     screen = _Screen(window)
     if watch.may_write:
         screen.offer_toggle(lambda: _toggle(screen, watch))
@@ -290,7 +290,7 @@ def _draw(window: curses.window, watch: Watch, has_ended: _Ending) -> None:
         watch.spin(_RENEWAL)
 
 
-def _toggle(screen: _Screen, watch: Watch) -> None:
+def _toggle(screen: _Screen, watch: NodeWatch) -> None:
     """Ask for a bit and for a yes; then write its other value."""
     topic = screen.ask('toggle which topic (one bit)? ')
     if not topic:
@@ -305,18 +305,18 @@ def _toggle(screen: _Screen, watch: Watch) -> None:
         screen.ask('not written: the bridge does not listen; Return goes on ')
 
 
-def _complete(watch: Watch, has_ended: _Ending) -> None:
+def _complete(watch: NodeWatch, has_ended: _Ending) -> None:
     """Give the values that have been promised some time to come."""
     _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
 
 
-def _spin(watch: Watch, seconds: float, is_enough: Callable[[], bool]) -> None:
+def _spin(watch: NodeWatch, seconds: float, is_enough: Callable[[], bool]) -> None:
     end = time.monotonic() + seconds
     while not is_enough() and (left := end - time.monotonic()) > 0:
         watch.spin(min(left, 0.1))
 
 
-def _print(watch: Watch) -> None:
+def _print(watch: NodeWatch) -> None:
     is_terminal = sys.stdout.isatty()
     colours = is_terminal and 'NO_COLOR' not in os.environ
     width = shutil.get_terminal_size((100, 24)).columns if is_terminal else 200

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import time
 from typing import Any
 
-from abdf1_ros.cli.monitor.view import Reading, Result, Snapshot, Status, Style
+from abdf1_ros.cli.monitor.view import Reading, ShownResult, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.messages import latched_qos, MESSAGES
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -72,7 +72,7 @@ class _Subscription:
     reading: Reading
 
 
-class Watch:
+class NodeWatch:
     """
     Listen to the node with the full name ``name`` until it is closed.
 
@@ -95,7 +95,7 @@ class Watch:
         self._statuses: list[Status] = []
         self._told: float | None = None
         self._active: list[int] | None = None
-        self._results: deque[Result] = deque(maxlen=_RESULTS_KEPT)
+        self._results: deque[ShownResult] = deque(maxlen=_RESULTS_KEPT)
         self._next_discovery = 0.0
         self.is_there = False
         for message_type, topic, callback, qos in (
@@ -106,7 +106,7 @@ class Watch:
             self._node.create_subscription(
                 message_type, topic, callback, qos, event_callbacks=_QUIET)
 
-    def __enter__(self) -> Watch:
+    def __enter__(self) -> NodeWatch:
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -233,7 +233,7 @@ class Watch:
             self._statuses, self._told = statuses, time.monotonic()
 
     def _take_result(self, status: DiagnosticStatus) -> None:
-        self._results.appendleft(Result(
+        self._results.appendleft(ShownResult(
             status.name, _style(status.level), status.message,
             {pair.key: pair.value for pair in status.values}, time.monotonic()))
 

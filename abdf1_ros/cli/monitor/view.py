@@ -57,7 +57,7 @@ class Style(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class TextLine:
     """One line to be shown; ``section`` is the part of the picture that begins with it."""
 
     text: str
@@ -102,7 +102,7 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class ShownResult:
     """The result of one write; ``received`` is a clock value (s)."""
 
     tag: str
@@ -127,17 +127,17 @@ class Snapshot:
     statuses: Sequence[Status]
     readings: Sequence[Reading]
     active: Sequence[int] | None
-    results: Sequence[Result]
+    results: Sequence[ShownResult]
 
 
-def render(snapshot: Snapshot, now: float, width: int) -> list[Line]:
+def render(snapshot: Snapshot, now: float, width: int) -> list[TextLine]:
     """Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``."""
     parts = {
         'link': [*_head(snapshot, now), *_link(snapshot, width)],
         'stations': _stations(snapshot, width), 'values': _values(snapshot, now, width),
         'reasons': _mappings(snapshot, width), 'writes': _writes(snapshot, now, width),
         'counters': _counters(snapshot, width)}
-    return [Line(_cut(line.text, width), line.style, '' if number else name)
+    return [TextLine(_cut(line.text, width), line.style, '' if number else name)
             for name, lines in parts.items() for number, line in enumerate(lines)]
 
 
@@ -155,17 +155,17 @@ def show(values: Sequence[float] | str, width: int) -> str:
     return _cut(' '.join(texts), width)
 
 
-def _head(snapshot: Snapshot, now: float) -> Iterator[Line]:
-    yield Line(printable(snapshot.node), Style.TITLE)
+def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
+    yield TextLine(printable(snapshot.node), Style.TITLE)
     if not snapshot.is_there:
-        yield Line('  the node is gone; these are its last words', Style.BAD)
+        yield TextLine('  the node is gone; these are its last words', Style.BAD)
     if snapshot.told is None:
-        yield Line('  no diagnostics yet', Style.WARNING)
+        yield TextLine('  no diagnostics yet', Style.WARNING)
     elif now - snapshot.told > _SILENCE:
-        yield Line(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
+        yield TextLine(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
 
 
-def _link(snapshot: Snapshot, width: int) -> Iterator[Line]:
+def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'link'):
         yield _summary('link', status)
         yield from _wrapped(_pairs(status.values, _LINK_KEYS), width)
@@ -174,17 +174,17 @@ def _link(snapshot: Snapshot, width: int) -> Iterator[Line]:
             yield from _wrapped(f'last error: {error}', width, Style.WARNING)
 
 
-def _stations(snapshot: Snapshot, width: int) -> Iterator[Line]:
+def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     if snapshot.active is not None:
         numbers = ', '.join(map(str, snapshot.active)) or 'none'
-        yield Line(f'  active stations: {numbers}')
+        yield TextLine(f'  active stations: {numbers}')
     for status in snapshot.statuses:
         if status.section.startswith('station '):
             yield _summary(status.section, status)
             yield from _wrapped(_pairs(status.values, _STATION_KEYS), width)
 
 
-def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
+def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
     longest = min(_NAME_WIDTH, width // 3)
     names = [_cut(printable(reading.topic), longest) for reading in snapshot.readings]
     name_width = max(map(len, ['topic', *names]))
@@ -200,7 +200,7 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
         place = f'  {address:<{_ADDRESS_WIDTH}}' if has_address else ''
         return f'  {topic:<{name_width}}{place}  {age:>{_AGE_WIDTH}}  {state}  {value}'
 
-    yield Line(row('topic', 'age', 'state', 'value', 'address').rstrip(), Style.TITLE)
+    yield TextLine(row('topic', 'age', 'state', 'value', 'address').rstrip(), Style.TITLE)
     for name, reading in zip(names, snapshot.readings, strict=True):
         state, style = reading.state(now)
         age, value = '', ''
@@ -208,12 +208,12 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
             age = f'{now - reading.received:.1f} s'
             value = show(reading.values, value_width)
         address = _cut(printable(reading.address), _ADDRESS_WIDTH)
-        yield Line(row(name, age, state, value, address).rstrip(), style)
+        yield TextLine(row(name, age, state, value, address).rstrip(), style)
     if not snapshot.readings:
-        yield Line('  no read topic found', Style.WARNING)
+        yield TextLine('  no read topic found', Style.WARNING)
 
 
-def _mappings(snapshot: Snapshot, width: int) -> Iterator[Line]:
+def _mappings(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'mappings'):
         yield _summary('mappings', status)
         for key, value in status.values.items():
@@ -221,7 +221,7 @@ def _mappings(snapshot: Snapshot, width: int) -> Iterator[Line]:
                 yield from _wrapped(f'{key}: {value}', width, status.style)
 
 
-def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
+def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'writes'):
         yield _summary('writes', status)
     for result in snapshot.results:
@@ -230,7 +230,7 @@ def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[Line]:
                             f'{result.message} ({latency} ms)', width, result.style)
 
 
-def _counters(snapshot: Snapshot, width: int) -> Iterator[Line]:
+def _counters(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     """Yield the counters that are not 0, as many columns as fit."""
     for status in _section(snapshot, 'counters'):
         yield _summary('counters', status)
@@ -238,20 +238,20 @@ def _counters(snapshot: Snapshot, width: int) -> Iterator[Line]:
                  for key, value in status.values.items() if value != '0']
         columns = max(1, (width - 2) // 38)
         for start in range(0, len(cells), columns):
-            yield Line('      ' + '    '.join(cells[start:start + columns]))
+            yield TextLine('      ' + '    '.join(cells[start:start + columns]))
 
 
 def _section(snapshot: Snapshot, name: str) -> Iterator[Status]:
     return (status for status in snapshot.statuses if status.section == name)
 
 
-def _summary(name: str, status: Status) -> Line:
-    return Line(f'  {printable(name):<12} {printable(status.message)}', status.style)
+def _summary(name: str, status: Status) -> TextLine:
+    return TextLine(f'  {printable(name):<12} {printable(status.message)}', status.style)
 
 
-def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[Line]:
+def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[TextLine]:
     for part in textwrap.wrap(printable(text), max(_LEAST_VALUE_WIDTH, width - 6)):
-        yield Line(f'      {part}', style)
+        yield TextLine(f'      {part}', style)
 
 
 def _pairs(values: Mapping[str, str], keys: Sequence[str]) -> str:

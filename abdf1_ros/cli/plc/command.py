@@ -288,7 +288,7 @@ def _detect(options: argparse.Namespace) -> int:
     if found is None:
         return EXIT_FAILED
     there = found.presence
-    print(f'{colour(str(found.candidate), GREEN, sys.stdout)}: station {there.station} {there}')
+    print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
     print(f'net.csv:\n{init.net_csv(network, found)}')
     return 0
 
@@ -322,9 +322,9 @@ def _init(options: argparse.Namespace) -> int:
     found = _found(options, network)
     if found is None:
         return EXIT_FAILED
-    print(f'{colour(str(found.candidate), GREEN, sys.stdout)}')
+    print(f'{colour(str(found.settings), GREEN, sys.stdout)}')
     there = [found.presence]
-    if found.candidate.mode == MODES['half']:
+    if found.settings.mode == MODES['half']:
         there = [seen for seen in presence.scan(found.network(network), options.stations)
                  if seen.is_there]
     for seen in there:

@@ -34,7 +34,7 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.csv_table import Row
-from abdf1_ros.settings.map_row import Fault, RowReader
+from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.text import value_text
@@ -63,7 +63,7 @@ def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Map
     return mapping
 
 
-def _in_arguments(fault: Fault, row: Row) -> Problem:
+def _in_arguments(fault: CellFault, row: Row) -> Problem:
     """Return a fault of a row in the words of the command line."""
     argument, text = _ARGUMENTS.get(fault.column, fault.column), fault.text
     if fault.value is not None:

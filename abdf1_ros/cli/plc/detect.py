@@ -31,7 +31,7 @@ CHECKS = tuple(check.value for check in (Checksum.CRC, Checksum.BCC))
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class LineSettings:
     """Settings that may be those of the line."""
 
     baud: int
@@ -50,13 +50,13 @@ _WORDS = {'Peer': 'full duplex', 'Master': 'half duplex'}
 class Found:
     """Settings with which a station takes commands."""
 
-    candidate: Candidate
+    settings: LineSettings
     presence: Presence
 
     def network(self, base: Network) -> Network:
         """Return ``base`` with these settings."""
-        return replace(base, baud=self.candidate.baud, mode=self.candidate.mode,
-                       error_code=self.candidate.check)
+        return replace(base, baud=self.settings.baud, mode=self.settings.mode,
+                       error_code=self.settings.check)
 
 
 class Search:
@@ -91,9 +91,9 @@ class Search:
         for check in checks:
             heard = []
             is_first = check == checks[0]
-            for presence in self._look(Candidate(baud, mode, check), stations, is_first):
+            for presence in self._look(LineSettings(baud, mode, check), stations, is_first):
                 if presence.takes_commands:
-                    return Found(Candidate(baud, mode, check), presence)
+                    return Found(LineSettings(baud, mode, check), presence)
                 if presence.is_there:
                     heard.append(presence.station)
             if mode == 'Master' and not heard:
@@ -101,21 +101,21 @@ class Search:
             stations = heard or stations
         return None
 
-    def _look(self, candidate: Candidate, stations: Sequence[int],
+    def _look(self, settings: LineSettings, stations: Sequence[int],
               is_first: bool) -> Iterator[Presence]:
         """Yield what each station is; one that only seems to take commands does not."""
-        network = replace(self._network, baud=candidate.baud, mode=candidate.mode,
-                          error_code=candidate.check)
+        network = replace(self._network, baud=settings.baud, mode=settings.mode,
+                          error_code=settings.check)
         # One that is not absent is asked with ENQ when it is silent, which any full-duplex port
         # answers, whatever its check and its own station are.
-        asks = is_first and candidate.mode == MODES['full']
+        asks = is_first and settings.mode == MODES['full']
         with Session(network, absent=stations[1:] if asks else stations) as session:
             for station in stations:
-                self._show(f'trying {candidate}, station {station}')
+                self._show(f'trying {settings}, station {station}')
                 presence = look_at(session, station)
                 if presence.takes_commands and not understands(session, station):
                     presence = replace(presence, takes_commands=False)
                 yield presence
             if session.counters.chars_received:
                 self.traces.append(
-                    f'{candidate}: {session.counters.chars_received} characters came')
+                    f'{settings}: {session.counters.chars_received} characters came')

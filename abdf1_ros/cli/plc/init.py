@@ -70,8 +70,8 @@ class Files:
 
 def net_csv(network: Network, found: Found) -> str:
     """Return a net CSV with the settings that have been found."""
-    candidate = found.candidate
-    row = (network.station, candidate.mode, candidate.check, network.port, candidate.baud,
+    settings = found.settings
+    row = (network.station, settings.mode, settings.check, network.port, settings.baud,
            network.parity, _TIMEOUT)
     return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
             + ','.join(map(str, row)))

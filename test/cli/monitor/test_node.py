@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import time
 
-from abdf1_ros.cli.monitor.node import full_name, Watch
+from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.view import Reading, Snapshot, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.messages import latched_qos, new_message, read_qos
@@ -75,12 +75,12 @@ def bridge(observer: Observer) -> Iterator[Bridge]:
 
 
 @pytest.fixture
-def watch() -> Iterator[Watch]:
-    with Watch(NAME, []) as watch:
+def watch() -> Iterator[NodeWatch]:
+    with NodeWatch(NAME, []) as watch:
         yield watch
 
 
-def until(watch: Watch, condition: Callable[[Snapshot], object]) -> Snapshot:
+def until(watch: NodeWatch, condition: Callable[[Snapshot], object]) -> Snapshot:
     """Listen until the picture fulfils ``condition``; return it."""
     end = time.monotonic() + PATIENCE
     while not condition(watch.snapshot()):
@@ -93,7 +93,7 @@ def heard(picture: Snapshot) -> dict[str, Reading]:
     return {reading.topic: reading for reading in picture.readings if reading.values is not None}
 
 
-def test_values_come_with_address_and_promise(bridge: Bridge, watch: Watch) -> None:
+def test_values_come_with_address_and_promise(bridge: Bridge, watch: NodeWatch) -> None:
     bridge.read(make_mapping('N7:0', length=2, tag='speeds'), [1200, -800])
     readings = heard(until(watch, lambda picture: len(heard(picture)) == 1))
     speeds = readings['speeds']
@@ -102,7 +102,7 @@ def test_values_come_with_address_and_promise(bridge: Bridge, watch: Watch) -> N
     assert speeds.state(time.monotonic()) == ('fresh', Style.GOOD)
 
 
-def test_strings_and_topics_under_other_names_are_heard(bridge: Bridge, watch: Watch) -> None:
+def test_strings_and_topics_under_other_names_are_heard(bridge: Bridge, watch: NodeWatch) -> None:
     bridge.read(make_mapping('ST9:0', tag='name', kind='string'), 'Tank 4')
     bridge.read(make_mapping('N7:0', tag='door'), [1], '/elsewhere/door')
     readings = heard(until(watch, lambda picture: len(heard(picture)) == 2))
@@ -115,14 +115,14 @@ def test_value_of_a_topic_that_promises_nothing_is_as_old_as_its_publishing(
     published = time.monotonic()
     bridge.read(make_mapping('N7:0', tag='ready', publish='Change'), [1])
     bridge.observer.until(lambda: time.monotonic() - published > 0.3, 'it to become older')
-    with Watch(NAME, []) as watch:
+    with NodeWatch(NAME, []) as watch:
         picture = until(watch, lambda picture: len(heard(picture)) == 1)
     assert heard(picture)['ready'].promised is None
     assert heard(picture)['ready'].received == pytest.approx(published, abs=0.2)
 
 
 def test_complete_are_diagnostics_all_topics_and_every_promised_value(
-        bridge: Bridge, watch: Watch) -> None:
+        bridge: Bridge, watch: NodeWatch) -> None:
     bridge.node.create_publisher(
         Int16MultiArray, '~/read/later', read_qos(make_mapping('N7:0', publish='Change'), 1))
     bridge.read(make_mapping('N7:1', tag='speeds'), [7])
@@ -142,7 +142,7 @@ def test_complete_are_diagnostics_all_topics_and_every_promised_value(
     assert not watch.is_complete
 
 
-def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: Watch) -> None:
+def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -> None:
     until(watch, lambda picture: picture.is_there and bridge.diagnostics.get_subscription_count())
     link = DiagnosticStatus(
         name='cell/line_a: link', message='WARN: slow', level=DiagnosticStatus.WARN,
@@ -161,13 +161,13 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: Watch) -> No
 
 
 def test_stations_are_taken_from_the_bits_of_the_active_node_table(
-        bridge: Bridge, watch: Watch) -> None:
+        bridge: Bridge, watch: NodeWatch) -> None:
     words = [0b110, 1, *[0] * 13, 1 << 15]
     bridge.active.publish(UInt16MultiArray(data=words))
     assert until(watch, lambda picture: picture.active).active == [1, 2, 16, 255]
 
 
-def test_results_of_writes_are_kept_newest_first(bridge: Bridge, watch: Watch) -> None:
+def test_results_of_writes_are_kept_newest_first(bridge: Bridge, watch: NodeWatch) -> None:
     until(watch, lambda picture: bridge.results.get_subscription_count())
     for number in range(12):
         bridge.results.publish(DiagnosticStatus(
@@ -179,7 +179,7 @@ def test_results_of_writes_are_kept_newest_first(bridge: Bridge, watch: Watch) -
 
 
 def test_node_that_ends_is_gone_and_may_come_back_with_another_map(
-        bridge: Bridge, watch: Watch) -> None:
+        bridge: Bridge, watch: NodeWatch) -> None:
     bridge.read(make_mapping('N7:0', tag='one'), [1])
     bridge.read(make_mapping('N7:1', tag='two'), [2])
     until(watch, lambda picture: len(heard(picture)) == 2)
@@ -196,13 +196,13 @@ def test_node_that_ends_is_gone_and_may_come_back_with_another_map(
 
 
 def test_node_of_the_same_name_in_another_namespace_is_another(
-        bridge: Bridge, watch: Watch) -> None:
+        bridge: Bridge, watch: NodeWatch) -> None:
     other = Bridge(bridge.observer, '/other')
     until(watch, lambda picture: watch.bridges() == [NAME, '/other/line_a'])
     other.node.destroy_node()
 
 
-def test_nothing_is_asked_of_the_publishers(bridge: Bridge, watch: Watch) -> None:
+def test_nothing_is_asked_of_the_publishers(bridge: Bridge, watch: NodeWatch) -> None:
     bridge.node.create_publisher(String, '~/read/label', 1)  # volatile: offers the least
     until(watch, lambda picture: picture.readings)
     names = bridge.observer.node.get_publisher_names_and_types_by_node('abdf1_monitor', '/')

@@ -17,14 +17,14 @@
 from __future__ import annotations
 
 from abdf1_ros.cli.monitor.view import (
-    Line,
     Reading,
     render,
-    Result,
     show,
+    ShownResult,
     Snapshot,
     Status,
     Style,
+    TextLine,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,7 +47,7 @@ def lines(picture: Snapshot, width: int = WIDTH) -> list[str]:
     return [line.text for line in render(picture, NOW, width)]
 
 
-def line_with(text: str, picture: Snapshot) -> Line:
+def line_with(text: str, picture: Snapshot) -> TextLine:
     (line,) = [line for line in render(picture, NOW, WIDTH) if text in line.text]
     return line
 
@@ -103,7 +103,7 @@ def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
                   Status('counters', Style.GOOD, '', {'A\n': '\x00'}),
                   Status('mappings', Style.GOOD, '', {'tag\n': 'x\u202e'}),
                   Status('station 1\n', Style.GOOD, '', {'mode': '\x7f'})],
-        results=[Result('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
+        results=[ShownResult('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
     assert all(line.isprintable() for line in lines(picture))
     assert r'"Tank\x1b[31m\n4"' in line_with('na\\nme', picture).text
 
@@ -137,7 +137,7 @@ def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> No
 
 
 def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
-    picture = snapshot(results=[Result(
+    picture = snapshot(results=[ShownResult(
         'recipe', Style.BAD, 'not written: refused', {'value': '[1, 2]', 'latency_ms': '0.3'},
         NOW - 2)])
     line = line_with('recipe', picture)

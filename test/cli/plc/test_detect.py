@@ -21,13 +21,13 @@ from contextlib import contextmanager
 from pathlib import Path
 import threading
 
-from abdf1_ros.cli.plc.detect import BAUD_RATES, Candidate, Search
+from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
 from abdf1_ros.df1.frames import Duplex, Frame
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.ports.endpoints import PtyLine
+from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings import network as network_module
 from abdf1_ros.settings.network import Network
@@ -50,7 +50,7 @@ def plc_on(path: Path, check: str, duplex: Duplex,
     """Put an SLC that is station 1 on a pseudo-terminal."""
     plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 10), checksum=check)
     checksum = Network(error_code=check).checksum
-    line = PtyLine(str(path))
+    line = PtyEndpoint(str(path))
     procedure = multidrop([plc]) if duplex is Duplex.HALF \
         else _full_duplex(plc, PeerSettings(checksum), kind)
     link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
@@ -97,7 +97,7 @@ def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check
         stations = [1] if duplex is Duplex.FULL else [4, 1]
         found = Search(network, stations, trying).run(BAUD_RATES)
     assert found is not None
-    assert found.candidate == Candidate(19200, mode, check)
+    assert found.settings == LineSettings(19200, mode, check)
     assert found.presence.station == 1
     assert len(trying) == tried
 
@@ -114,7 +114,7 @@ def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> Non
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Particular) as network:
         found = Search(network, range(8), trying).run([9600])
     assert found is not None
-    assert (found.candidate.mode, found.presence.station) == ('Peer', 1)
+    assert (found.settings.mode, found.presence.station) == ('Peer', 1)
     assert trying == ['9600 baud, full duplex, CRC, station 0',
                       '9600 baud, full duplex, CRC, station 1']
 
