@@ -152,8 +152,8 @@ class Background(Protocol):
     def expire(self, now: float) -> None:
         """Do what needs no line, such as ending what has waited too long for it."""
 
-    def next_expiry(self) -> float | None:
-        """Return when there is something to do next (clock value in s), None for never."""
+    def next_expiry(self) -> float:
+        """Return when there is something to do next (clock value in s), infinite for never."""
 
 
 class Machine:
@@ -200,6 +200,7 @@ class Machine:
         self._pending: Step | None = None  # waits for its delay before it goes out
         self._kept_deadline: float | None = None
         self._resting = False
+        self._is_listening = False
         self._line_free = -math.inf
         self._reply_size = 0
         self._last_heard = -math.inf
@@ -211,9 +212,11 @@ class Machine:
     @property
     def next_call(self) -> float | None:
         """Return when to call ``handle_timeout`` (clock value in s), None for never."""
-        expiry = self.background.next_expiry() if self.background else None
-        moments = (expiry, self.deadline, self._outgoing.due)
-        return min((moment for moment in moments if moment is not None), default=None)
+        first = self.background.next_expiry() if self.background else math.inf
+        for moment in (self.deadline, self._outgoing.due):
+            if moment is not None and moment < first:
+                first = moment
+        return None if first == math.inf else first
 
     @property
     def char_time(self) -> float:
@@ -275,6 +278,7 @@ class Machine:
         self._outgoing.clear()
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
+        self._is_listening = False
         self._echoes, self._echo_due = False, 0
         if procedure is None:
             return
@@ -291,11 +295,10 @@ class Machine:
         self.counters.chars_received += len(data)
         if self._echoes:
             data = self._without_echo(data)
-        is_listening = self._listening
-        if self._forget_on_send and (self._out or not is_listening):
+        if self._forget_on_send and (self._out or not self._is_listening):
             return  # it was said before what it would have to answer
         is_idle = self._resting or self.deadline is None
-        if is_idle and is_listening and now - self._last_heard > self._pause_limit:
+        if is_idle and self._is_listening and now - self._last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
         self._last_heard = now
         self.decoder.feed(data)
@@ -309,7 +312,7 @@ class Machine:
         if self._message.number != self.decoder.begun:
             self._message = _Incoming(self.decoder.begun, now, heard, now <= self._due)
         if self.deadline is None or self._resting or not self._message.is_in_time \
-                or not self._listening:
+                or not self._is_listening:
             return
         characters = min(_SLOWEST * (heard - self._message.heard), _LONGEST)
         limit = self._message.begun + 2 * self._pause_limit + characters * self._timing.char_time
@@ -318,8 +321,7 @@ class Machine:
     def handle_timeout(self, now: float) -> None:
         """Take note that the clock reads ``now``; does nothing before ``next_call``."""
         self.now = now
-        if self.background is not None and (expiry := self.background.next_expiry()) is not None \
-                and expiry <= now:
+        if self.background is not None and now >= self.background.next_expiry():
             self.background.expire(now)
         if self._outgoing.due is not None and now >= self._outgoing.due:
             self._out += self._outgoing.next(now)
@@ -349,21 +351,13 @@ class Machine:
         self._out.clear()
         return data
 
-    @property
-    def _listening(self) -> bool:
-        deaf = self._resting and self._forget_on_send
-        return self._procedure is not None and not deaf and self._pending is None
-
     def _without_echo(self, data: bytes) -> bytes:
         count = min(self._echo_due, len(data))
         self._echo_due -= count
         return data[count:]
 
     def _deliver_symbols(self) -> None:
-        while self._listening:
-            symbol = self.decoder.next_symbol()
-            if symbol is None:
-                return
+        while self._is_listening and (symbol := self.decoder.next_symbol()) is not None:
             if self._is_half_duplex or symbol in _RESPONSES:
                 self._take_as_answer()
             if isinstance(symbol, Frame) and self._message.number == self.decoder.begun:
@@ -388,7 +382,7 @@ class Machine:
                 step = procedure.throw(error) if error else procedure.send(
                     heard)  # type: ignore[arg-type]
             except StopIteration:
-                self._procedure, self.deadline = None, None
+                self._procedure, self.deadline, self._is_listening = None, None, False
                 return
             heard, error = _NOTHING, None
             if self.now > step.expires:
@@ -402,20 +396,23 @@ class Machine:
         if step.is_echoed and not self._echoes:
             self._echoes, self._echo_due = True, 0
         if self._resting:
+            self._is_listening = not self._forget_on_send
             self._set_deadline(step, self.now)
             return False
         delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
         if delay and step.delay != AT_ONCE:
-            self._pending, self._kept_deadline = step, self.deadline
+            self._pending, self._kept_deadline, self._is_listening = step, self.deadline, False
             self.deadline = max(self.now, self._line_free) + delay
             return False
         return self._put_on_line(step)
 
     def _put_on_line(self, step: Step) -> bool:
+        self._is_listening = True
         free = max(self.now, self._line_free)
         if step.frame:
             size = len(step.frame)
-            self._out += self._given_out(step.frame, free)
+            is_divided = self.embeds or self._outgoing.size
+            self._out += self._given_out(step.frame, free) if is_divided else step.frame
             self.counters.chars_sent += size
             self.position += size
             self._line_free = free = free + size * self._timing.char_time
@@ -435,9 +432,7 @@ class Machine:
         """Return what goes out at once of a frame; the line is busy until ``free``."""
         if self._outgoing.can_embed and frame in (ACK, NAK):
             return frame  # behind what is on the line of our message, before the rest of it
-        if self.embeds or self._outgoing.size:
-            return self._outgoing.put(frame, free)
-        return frame
+        return self._outgoing.put(frame, free)
 
     def _transmit(self, step: Step) -> None:
         self._pending, self.deadline = None, self._kept_deadline

@@ -305,12 +305,10 @@ class Driver:
         self._tasks.expire(now)
         self._read_backs.expire(now)
 
-    def next_expiry(self) -> float | None:
-        """Return when ``expire`` has something to do (clock value in s), None for never."""
-        due = self._read_backs.next_due()
-        first = min(self._writes.next_expiry(), self._tasks.next_expiry(),
-                    self.interlocks.next_expiry(), math.inf if due is None else due)
-        return None if math.isinf(first) else first
+    def next_expiry(self) -> float:
+        """Return when ``expire`` has something to do (clock value in s), infinite for never."""
+        return min(self._writes.next_expiry(), self._tasks.next_expiry(),
+                   self.interlocks.next_expiry(), self._read_backs.next_expiry())
 
     def _clock(self) -> float:
         return self.machine.now

@@ -81,6 +81,7 @@ class Interlocks:
         self.heartbeats = [HeartbeatRow(mapping) for mapping in mappings if mapping.heartbeat]
         self.fallbacks = [FallbackRow(mapping, cmd_timeout)
                           for mapping in mappings if mapping.fallback]
+        self._served = [row for row in self.fallbacks if row.mapping.serves]
         self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
         self._stations = stations
         self._writes = writes
@@ -267,7 +268,7 @@ class Interlocks:
         """Judge what has become due, and write what needs no line."""
         if not self._has_begun:
             return
-        youngest = self._writes.youngest()
+        youngest = self._writes.youngest() if self.fallbacks else {}
         for row in self.fallbacks:
             row.judge(now, youngest.get(id(row.mapping), -math.inf))
             if self._is_ending and row.cause is None and not row.stands:
@@ -281,10 +282,9 @@ class Interlocks:
 
     def next_expiry(self) -> float:
         """Return when a fallback of our own table is due (clock value in s)."""
-        if not self._has_begun:
+        if not self._served or not self._has_begun:
             return math.inf
-        return min((row.next_due(-math.inf) for row in self.fallbacks if row.mapping.serves),
-                   default=math.inf)
+        return min(row.next_due(-math.inf) for row in self._served)
 
     def next_due(self) -> float:
         """Return when there is something to write (clock value in s), infinite for never."""

@@ -88,7 +88,7 @@ class JobTasks:
 
     def next_expiry(self) -> float:
         """Return when a waiting command will have waited too long (clock value in s)."""
-        return min((task.expires for task in self._waiting), default=math.inf)
+        return min(task.expires for task in self._waiting) if self._waiting else math.inf
 
     def fail(self, error: LinkError) -> None:
         """End every job with ``error``."""

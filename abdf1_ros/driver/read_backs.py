@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+import math
 
 from abdf1_ros.driver.points import Write, WriteResult
 from abdf1_ros.plan.planner import Block
@@ -80,9 +81,9 @@ class ReadBacks:
             if now >= entry.since + self._patience:
                 self._end(entry, f'not read back within {self._patience:g} s', now)
 
-    def next_due(self) -> float | None:
-        """Return when the first will have waited too long (clock value in s), None for never."""
-        return self._waiting[0].since + self._patience if self._waiting else None
+    def next_expiry(self) -> float:
+        """Return when the first will have waited too long (clock value in s), infinite: never."""
+        return self._waiting[0].since + self._patience if self._waiting else math.inf
 
     def end(self, now: float) -> None:
         """End all: there is no line any more."""

@@ -16,14 +16,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 import time
 
-
-def line_time() -> float:
-    """
-    Return seconds that never go back, and that count also while the host sleeps.
-
-    A monotonic clock stands still during a suspend: what was said to a PLC before would look
-    young after it. Values of this clock are compared with each other only.
-    """
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
+# Seconds that never go back, and that count also while the host sleeps. A monotonic clock stands
+# still during a suspend: what was said to a PLC before would look young after it. Values of this
+# clock are compared with each other only.
+line_time = partial(time.clock_gettime, time.CLOCK_BOOTTIME)

@@ -87,11 +87,12 @@ class DescriptorPort:
 
     def write(self, data: bytes) -> None:
         """Hand all of ``data`` to the operating system."""
-        give_up = time.monotonic() + _WRITE_TIMEOUT
+        give_up = math.inf
         while data:
             try:
                 data = data[os.write(self._descriptor, data):]
             except BlockingIOError:
+                give_up = min(give_up, time.monotonic() + _WRITE_TIMEOUT)
                 poll = select.poll()
                 poll.register(self._descriptor, select.POLLOUT)
                 left = give_up - time.monotonic()

@@ -314,13 +314,15 @@ class LinkThread(threading.Thread):
             deadline = machine.next_call
             timeout = None if deadline is None else max(0.0, deadline - clock())
             data = self._read(port, timeout)
-            # First: after a pause of this process the answer that lies in the buffer came too
-            # late, or nobody can tell that it did not.
-            machine.handle_timeout(clock())
+            now = clock()
+            if deadline is not None and now >= deadline:
+                # First: after a pause of this process the answer that lies in the buffer came too
+                # late, or nobody can tell that it did not.
+                machine.handle_timeout(now)
             if data:
-                machine.receive_data(data, clock())
+                machine.receive_data(data, now)
             elif self._take_wake() and not self._stopping:
-                machine.wake(clock())
+                machine.wake(now)
 
     def _read(self, port: Port, timeout: float | None) -> bytes:
         try:
