@@ -51,6 +51,7 @@ from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, Network
+from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import printable
 
 EXIT_FAULTY = 2
@@ -213,7 +214,8 @@ def _text(found: Findings, report: Report | None) -> str:
     if parts:
         parts.append('the plan is that of the rows without errors')
     remarks = report.remarks()
-    parts += ['', _line_text(report), '', _plan_text(report), '', _times_text(report)]
+    parts += ['', _line_text(report), '', _rows_text(report), '', _plan_text(report), '',
+              _times_text(report)]
     parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
               for remark in remarks]
     if not found.problems and not remarks:
@@ -229,6 +231,35 @@ def _line_text(report: Report) -> str:
             f'{network.error_code}; our own Station is {network.station}\n'
             f'{mappings} {"mapping is" if mappings == 1 else "mappings are"} read with '
             f'{blocks} {"block" if blocks == 1 else "blocks"}')
+
+
+def _rows_text(report: Report) -> str:
+    """Return what becomes of each row as a table: what a ROS user gets."""
+    head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value'
+    rows = []
+    for mapping in report.mappings:
+        entry = _row(mapping)
+        rows.append([printable(mapping.tag), entry['address'], str(mapping.station),
+                     ' '.join(entry['topics']), entry['message'], str(mapping.length),
+                     entry['value']])
+    return table(head, rows, right=(2, 5))
+
+
+def _row(mapping: Mapping) -> dict[str, Any]:
+    """Return what there is to say of a row; a heartbeat has no topic."""
+    topics = [f'~/{what}/{mapping.topic}' for what, is_there in (
+        ('read', mapping.reads), ('write', mapping.writes)) if is_there]
+    return {
+        'tag': mapping.tag, 'command': mapping.command.value, 'address': str(mapping.address),
+        'station': mapping.station, 'topics': topics,
+        'message': mapping.message_type.message if topics else '', 'length': mapping.length,
+        'value': mapping.type.value + _formula(mapping.scaling)}
+
+
+def _formula(scaling: Scaling | None) -> str:
+    if scaling is None:
+        return ''
+    return f' * {scaling.scale:.10g}' + (f' {scaling.offset:+.10g}' if scaling.offset else '')
 
 
 def _plan_text(report: Report) -> str:
@@ -278,7 +309,8 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
     """Return what there is to say; every key is always there, times are in ms."""
     content: dict[str, Any] = {
         'errors': [_problem(problem) for problem in found.problems],
-        'warnings': [], 'network': None, 'mappings': len(found.mappings), 'blocks': [],
+        'warnings': [], 'network': None, 'mappings': len(found.mappings),
+        'rows': [_row(mapping) for mapping in found.mappings], 'blocks': [],
         'scan_time_ms': None, 'load': None, 'needed_baud': None, 'bounds': [],
         'response_time_ms': None}
     if report is not None:

@@ -27,28 +27,10 @@ from abdf1_ros.settings.values import Values, ValueType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from std_msgs.msg import (  # noqa: I101
-    Float32MultiArray,
-    Int16MultiArray,
-    Int32MultiArray,
-    MultiArrayDimension,
-    MultiArrayLayout,
-    String,
-    UInt8MultiArray,
-    UInt16MultiArray,
-    UInt32MultiArray,
-)
+from std_msgs import msg as std_msgs
+from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, String
 
-MESSAGES: dict[ValueType, Any] = {
-    ValueType.BOOL: UInt8MultiArray,
-    ValueType.INT16: Int16MultiArray,
-    ValueType.UINT16: UInt16MultiArray,
-    ValueType.BCD16: UInt16MultiArray,
-    ValueType.INT32: Int32MultiArray,
-    ValueType.UINT32: UInt32MultiArray,
-    ValueType.FLOAT32: Float32MultiArray,
-    ValueType.STRING: String,
-}
+MESSAGES: dict[ValueType, Any] = {kind: getattr(std_msgs, kind.message) for kind in ValueType}
 
 ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
     label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])

@@ -201,6 +201,7 @@ def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, 
     listing = f'; known: {", ".join(known)}'
     columns: dict[str, int] = {}
     problems: list[Problem] = []
+    strange: list[str] = []
     for number, (name, column) in enumerate(zip(names, meant, strict=True), 1):
         where = replace(place, cell=number)
         if not name:
@@ -209,12 +210,18 @@ def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, 
             close = difflib.get_close_matches(name.lower(), free, 1, _ALIKE)
             hint = f'; did you mean {spelling[close[0]]}?' if close else listing
             problems.append(Problem(where, f'unknown column "{shown(name)}"{hint}'))
-            listing = listing if close else ''  # once is enough
+            if not close:
+                strange.append(name)
+                listing = ''  # once is enough
         elif column in columns:
             problems.append(Problem(
                 where, f'column {column} stands twice, first in cell {columns[column]}'))
         else:
             columns[column] = number
+    if len(strange) > len(names) / 2:
+        problems = [Problem(place, (
+            f'{len(strange)} of {len(names)} columns are not known here, such as '
+            f'"{shown(strange[0])}": is this the right file? Known: {", ".join(known)}'))]
     if problems:
         raise ConfigurationError(problems)
     return columns

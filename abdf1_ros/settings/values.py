@@ -56,6 +56,11 @@ class ValueType(Enum):
         return _ARRAY_CODES[self]
 
     @property
+    def message(self) -> str:
+        """Return the name of the message in std_msgs that carries such values."""
+        return _MESSAGES[self]
+
+    @property
     def range(self) -> tuple[float, float]:  # noqa: A003
         """Return the least and the greatest value."""
         return _RANGES[self]
@@ -75,6 +80,11 @@ _WORDS = {
 _ARRAY_CODES = {
     ValueType.BOOL: 'B', ValueType.INT16: 'h', ValueType.UINT16: 'H', ValueType.BCD16: 'H',
     ValueType.INT32: 'i', ValueType.UINT32: 'I', ValueType.FLOAT32: 'f'}
+_MESSAGES = {
+    ValueType.BOOL: 'UInt8MultiArray', ValueType.INT16: 'Int16MultiArray',
+    ValueType.UINT16: 'UInt16MultiArray', ValueType.BCD16: 'UInt16MultiArray',
+    ValueType.INT32: 'Int32MultiArray', ValueType.UINT32: 'UInt32MultiArray',
+    ValueType.FLOAT32: 'Float32MultiArray', ValueType.STRING: 'String'}
 _RANGES: dict[ValueType, tuple[float, float]] = {
     ValueType.BOOL: (0, 1), ValueType.INT16: (-32768, 32767), ValueType.UINT16: (0, 65535),
     ValueType.BCD16: (0, 9999), ValueType.INT32: (-2**31, 2**31 - 1),

@@ -57,7 +57,10 @@ def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     out = capsys.readouterr().out
     assert 'error' not in out.replace('no errors', '')
     assert 'Mode Master, 9600 baud' in out
-    cells = next(line.split() for line in out.splitlines() if line.endswith('speed'))
+    cells = out.splitlines()[7].split()
+    assert '\n'.join(out.splitlines()[3:5]) == (
+        'tag    address  station  topic         message          Length  value\n'
+        'speed  N7:0           1  ~/read/speed  Int16MultiArray       2  int16')
     # 52 characters of 10 bits at 9600 baud, and two answers of 10 ms.
     assert cells == ['1', 'PLC5', 'N7:0', 'N7:1', '2', '4', '1', '54.2', '74.2', '1000.0', 'speed']
     assert 'expected poll cycle: 74.2 ms' in out
@@ -106,6 +109,15 @@ def test_plan_of_the_good_rows(files: tuple[Path, Path],
     assert '1 mapping is read with 1 block' in out
 
 
+def test_files_in_the_wrong_order_are_told_once_each(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    check(files, GOOD_NET, (GOOD_ROW,))
+    capsys.readouterr()
+    assert main([*map(str, reversed(files))]) == 2
+    told = [line for line in capsys.readouterr().out.splitlines() if 'error: ' in line]
+    assert ['is this the right file?' in line for line in told] == [True, True]
+
+
 def test_json_of_errors(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     assert check(files, '5,Mastr,9600,500', BAD_ROWS[:1], '--json') == 2
     content = parsed(capsys)
@@ -119,12 +131,26 @@ def test_json_of_errors(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
     assert content['blocks'] == content['warnings'] == []
 
 
+def test_rows_tell_what_a_ros_user_gets(files: tuple[Path, Path],
+                                        capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(files[0], NET_HEADER, [GOOD_NET])
+    write_csv(files[1], 'Tag,Command,Address,Station,PLC_Type,Topic,Scale,Offset', [
+        'level,ReadWrite,N7:1,1,PLC5,tank/level,0.1,-40', 'alive,Heartbeat,N10:0,1,PLC5,,,'])
+    assert main([*map(str, files), '--json']) == 0
+    level, alive = parsed(capsys)['rows']
+    assert level == {
+        'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
+        'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
+        'length': 1, 'value': 'int16 * 0.1 -40'}
+    assert (alive['topics'], alive['message']) == ([], '')
+
+
 def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     rows = (GOOD_ROW, 'fast,Read,F8:0,1,SLC,,50')
     assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0
     content = parsed(capsys)
     assert list(content) == [
-        'errors', 'warnings', 'network', 'mappings', 'blocks', 'scan_time_ms', 'load',
+        'errors', 'warnings', 'network', 'mappings', 'rows', 'blocks', 'scan_time_ms', 'load',
         'needed_baud', 'bounds', 'response_time_ms']
     assert content['blocks'][1]['last'] == 'F8:0'
     assert content['blocks'][0] == {

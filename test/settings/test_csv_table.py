@@ -135,6 +135,12 @@ def test_all_names_are_told_once(path: Path) -> None:
         'FILE:1:6: unknown column "Wx8"']
 
 
+def test_file_of_another_kind_is_one_problem(path: Path) -> None:
+    assert problems_of(path, 'Station,Mode,Address,Baud,Com_Port\n') == [
+        'FILE:1: 4 of 5 columns are not known here, such as "Station": is this the right file? '
+        'Known: Tag, Address, Length']
+
+
 @pytest.mark.parametrize('name', ['Lengths', 'Note'])
 def test_column_that_is_there_is_not_suggested(path: Path, name: str) -> None:
     assert problems_of(path, f'Tag,Length,{name}\n') == [
