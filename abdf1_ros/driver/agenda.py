@@ -15,12 +15,17 @@
 """
 Who has the line next: one place decides.
 
-What we write by ourselves (``interlocks``) goes before all else, but for every eighth turn. Then
-there are three queues. ``writes`` go first, but after four of their commands in a row a check or
-read that is due has its turn. A check, such as the question for a station's mode, goes before
-the reads, but after one every read that was due when it began goes before the next. ``reads`` go
-in the order that ``read_queue`` tells. All that asks a silent station whether it is there again is
-a probe, and keeps to an eighth of the line's time (``probes``).
+Heartbeats and fallbacks (``interlocks``) go first, but after seven of them in a row a read has
+its turn. Then there are three queues:
+
+- ``writes`` go first, but after four of their commands in a row a check or read that is due has
+  its turn.
+- ``checks``, such as the question for a station's mode, go before the reads. After a check, all
+  reads that were due when it began go before the next check.
+- ``reads`` go in the order of ``read_queue``.
+
+A command that asks a silent station whether it is there again is a probe. Probes get at most an
+eighth of the line's time (``probes``).
 """
 
 from __future__ import annotations
@@ -45,11 +50,11 @@ MAX_OWN_IN_A_ROW = 7
 
 class Agenda:
     """
-    Say who has the line next, of the ``writes``, the ``checks``, the ``reads``.
+    Decide which of the ``writes``, ``checks`` and ``reads`` has the line next.
 
     ``tasks`` are those under way: each packet of a write has a turn of its own. A probe usually
-    takes ``probe_time`` seconds. ``patience`` and ``report`` are those of the writes;
-    ``interlocks`` is set afterwards, where there are any.
+    takes ``probe_time`` seconds. ``patience`` and ``report`` are for the writes. ``interlocks`` is
+    set later, where the map has heartbeats or fallbacks.
     """
 
     def __init__(self, stations: ActiveStationList, checks: Checks, tasks: JobTasks, *,
@@ -70,14 +75,14 @@ class Agenda:
 
     def next(self, now: float, busy: Container[int] = (),  # noqa: A003
              ) -> OwnWrite | JobTask | Write | Check | ReadJob | None:
-        """Return who has the line next, nobody for a station in ``busy``; None for nobody."""
+        """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
         if self._own_in_a_row < MAX_OWN_IN_A_ROW:
             return self._own(now, busy) or self._usual(now, busy)
         self._own_in_a_row = 0
         return self._read(now, busy) or self._own(now, busy) or self._usual(now, busy)
 
     def _own(self, now: float, busy: Container[int]) -> OwnWrite | None:
-        """Return a heartbeat or fallback; they are not among the writes in a row (rule 11)."""
+        """Return a heartbeat or fallback; these do not count as writes in a row (rule 11)."""
         own = self.interlocks.next(now, busy) if self.interlocks else None
         if own is not None:
             self.writes.begin_own(own.write)
@@ -101,7 +106,7 @@ class Agenda:
         return write or under_way
 
     def _check(self, now: float, busy: Container[int]) -> Check | None:
-        """Return a check that is due; it does not use up the turn of the reads."""
+        """Return a check that is due; the turn of the reads comes after it."""
         if not self.checks.is_due(now) or self.reads.is_due(self._last_check):
             return None
         check = self.checks.next(now, busy, self._echo_from(now))
@@ -115,9 +120,9 @@ class Agenda:
 
     def _echo_from(self, now: float) -> float:
         """
-        Return from when on (clock value in s) an echo may be a probe.
+        Return the clock value (s) from which an echo may be a probe.
 
-        Where reads of other silent stations wait as well, they take turns.
+        Where reads of silent stations wait as well, echoes and reads take turns.
         """
         if now >= self._probes.next and self.reads.has_silent and self._last_probe_was_echo:
             return now + self._probes.interval

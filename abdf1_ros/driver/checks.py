@@ -13,14 +13,14 @@
 # limitations under the License.
 
 """
-The slow jobs of a driver: who is there, in which mode, and whether it is still there.
+Slow jobs of a driver: what each station is, in which mode, and whether it still answers.
 
 A station is asked for its diagnostic status at the start, when it comes back, and every
-``processor_period``; one that nothing is read from gets an echo when it has not been heard for a
-while, or nobody would notice its silence. Link counters are read on request only.
+``processor_period``. A station without reads gets an echo when it has not been heard for a while;
+without that nobody would notice its silence. Link counters are read on request only.
 
-They count neither as reads nor in scan times. What a station refuses is not a fault of it. When a
-check has the line is told in ``agenda``.
+Checks do not count as reads, nor in the poll cycle. A refusal is not a fault of the station.
+``agenda`` decides when a check has the line.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import counter_request, decode_counters, layout_of
 from abdf1_ros.pccc.status import check_status
 
-# So long (s) a station may be silent before it gets an echo, and between two of them.
+# A station gets an echo after so many seconds of silence, and the next one after as many.
 ECHO_PERIOD = 2.0
 
-# A station that answers everything but this is asked more rarely, by so many periods: each time
-# costs Cmd_Timeout, and in Mode Master mostly a DLE NAK.
+# After no reply to this question alone, the next one comes so many periods later: each such
+# question costs Cmd_Timeout, and in Mode Master mostly a DLE NAK.
 _UNANSWERED = 30
 
 _NOT_ASKED = 'unknown (not asked yet)'
@@ -78,11 +78,11 @@ class Check:
 @dataclass(frozen=True, slots=True)
 class StationHealth:
     """
-    What a station has said of itself.
+    What a station has told about itself.
 
-    ``processor`` is one line for people, also where there is no ``identity``. ``told`` is the
-    clock value (s) of the last diagnostic status. ``counters`` are the link counters as last
-    read; where there was no answer to that, the reason is in ``no_counters``.
+    ``processor`` is a text for people, also where there is no ``identity``. ``told`` is the clock
+    value (s) of the last diagnostic status. ``counters`` are the link counters as last read;
+    ``no_counters`` is the reason where that read failed.
     """
 
     processor: str = _NOT_ASKED
@@ -94,12 +94,12 @@ class StationHealth:
 
 class Checks:
     """
-    The checks of all ``stations``, of which only the ones in ``read`` have reads of their own.
+    The checks of all ``stations``; only those in ``read`` have reads as well.
 
     ``period`` is the seconds between two questions for the diagnostic status, 0 for never;
-    stations in ``wanted`` are asked at least as often as that says.
-    ``link_failed`` takes note of a transaction without a reply. Only ``request_counters`` may
-    be called from another thread; ``known`` gives values that never change.
+    ``wanted`` has the longest period (s) of stations that have to be asked more often.
+    ``link_failed`` is called for a transaction without a reply. Only ``request_counters`` may be
+    called from another thread; what ``known`` returns is never changed.
     """
 
     def __init__(self, stations: ActiveStationList, read: Container[int], period: float,
@@ -121,21 +121,21 @@ class Checks:
         self._next_due = 0.0
 
     def known(self, station: int) -> StationHealth:
-        """Return what a station has said."""
+        """Return what a station has told about itself."""
         return self._known.get(station, StationHealth())
 
     def request_counters(self, station: int) -> None:
         """
         Ask for the link counters of a station; may be called from any thread.
 
-        It is in ``counters_wanted`` until there is an answer, or none to be expected.
+        It is in ``counters_wanted`` until there is an answer, or none will come.
         """
         self.counters_wanted.add(station)
         if not self._requests.put(station):
             self.counters_wanted.discard(station)
 
     def begin(self, now: float) -> None:
-        """Ask everybody anew: the port has been opened."""
+        """Make all checks due: the port has been opened."""
         self._requests.open()
         for check in self._checks:
             check.due = now
@@ -153,7 +153,7 @@ class Checks:
         self._ask_status(station, now)
 
     def went_away(self, station: int) -> None:
-        """Forget what a station has said that does not answer any more."""
+        """Forget what a station has told that does not answer any more."""
         self._forget(station, 'the station does not answer')
         self._ask_status(station, math.inf)
 
@@ -170,13 +170,13 @@ class Checks:
     def next(self, now: float, busy: Container[int], echo_from: float  # noqa: A003
              ) -> Check | None:
         """
-        Return the next check that is due, not of a busy station.
+        Return the next check that is due, None for none or while its station is busy.
 
         An echo may be a probe from the clock value ``echo_from`` (s) on.
         """
         for check in sorted(self._checks, key=lambda check: check.due):
             if check.due <= now and check.station in busy:
-                return None  # it is next: others in between would make it the turn of reads
+                return None  # no other check instead: after each of them the reads have their turn
             if check.due <= now:
                 check.due = self._wanted_from(check, echo_from)
                 if check.due <= now:
@@ -231,7 +231,7 @@ class Checks:
         self.counters_wanted.discard(station)
 
     def _finish(self, check: Check, next_due: float) -> None:
-        """Have the check done again when due; that of an absent station when it is back."""
+        """Plan the next check of this kind; that of an absent station comes when it is back."""
         if check.kind is CheckKind.COUNTERS:
             self._checks.remove(check)
         elif self._stations[check.station].active:
@@ -259,7 +259,7 @@ class Checks:
             self._plan()
 
     def _forget(self, station: int, reason: str) -> None:
-        """Drop what a station has said, and end the requests that it will not answer."""
+        """Drop what a station has told, and end the requests that it will not answer."""
         known = self.known(station)
         self._known[station] = StationHealth(
             processor=f'unknown ({reason})', counters=known.counters,

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The driver of one line: carries out jobs one after the other and hands on what comes of them.
+The driver of one line: carries out reads, writes and checks, and reports their results.
 
-It is sans-IO like the link layer below it: ``Driver.machine`` takes bytes and a clock value,
-and a ``Listener`` gets values, results and events.
+It does no input or output itself, like the link layer below it: ``Driver.machine`` takes bytes
+and a clock value, and a ``Listener`` gets values, results and events.
 ``abdf1_ros.ports.link_thread.LinkThread`` gives it a port and a clock; the tests give it a
 virtual line.
 """
@@ -66,21 +66,21 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
 
-# A read of several packets lets others go between them. On a busy line so many times its own time
-# passes until it has had all its turns.
+# Other commands go between the packets of one read. On a busy line the read may take so many times
+# its own time.
 _TURNS_OF_A_READ = 10
 
 _NOT_OPEN = 'the port is not open'
 
 
 class Listener(Protocol):
-    """Who wants to know; called in the link thread, ``written`` also in that of ``write``."""
+    """Gets what happens; called in the link thread, ``written`` also in that of ``write``."""
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a good read that are to be published."""
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Take note that a station answers, but not with a value; once for each reason."""
+        """Take note that a station answers without a usable value; once for each reason."""
 
     def written(self, result: WriteResult) -> None:
         """Take the one result of a write."""
@@ -192,7 +192,7 @@ class Driver:
                 self.refuse([write.mapping], _NOT_OPEN, values, request)
 
     def _why_nothing_is_written(self, count: int) -> str:
-        """Return why no value at all can be taken for ``count`` mappings now, empty if it can."""
+        """Return why no write of ``count`` mappings is taken now, empty where it is."""
         if self._settings.read_only:
             return 'this node is read_only'
         if not self.is_online:
@@ -206,8 +206,8 @@ class Driver:
         """
         Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
 
-        May be called from any thread, then wake the link. ``interlocks`` tells when all has been
-        confirmed, and what has not.
+        May be called from any thread, then wake the link. ``interlocks.is_over`` tells when all
+        have been confirmed, ``interlocks.unconfirmed`` which have not.
         """
         self._is_ending = True
         self.interlocks.wind_down()
@@ -221,7 +221,7 @@ class Driver:
         """
         Ask for the link counters of a station; may be called from any thread, then wake the link.
 
-        They come to ``health``; without a port nobody is asked.
+        ``health`` keeps the answer; without a port nothing is asked.
         """
         self.health.request_counters(station)
 
@@ -243,14 +243,14 @@ class Driver:
                 for mapping in self.mappings if mapping.reads}
 
     def _polled_point(self, mapping: Mapping, interval: float, wait: float) -> ReadPoint:
-        """Return a point; its block comes every ``interval`` s, up to ``wait`` s later."""
+        """Return a point; its block is read every ``interval`` s, at most ``wait`` s late."""
         period = self._settings.default_period if mapping.period is None \
             else mapping.period / 1000
         return ReadPoint(
             mapping, period, self._settings.stale_after * max(period, interval) + wait)
 
     def _served_point(self, mapping: Mapping) -> ReadPoint:
-        # Without a Period nobody expects the other end to write.
+        # Without a Period the other end may write at any time, or never.
         expected = mapping.period / 1000 if mapping.period else math.inf
         point = ReadPoint(mapping, expected, self._settings.stale_after * expected)
         point.last_good = None if mapping.period else 0.0
@@ -286,11 +286,11 @@ class Driver:
             job.station, self._read_steps(job, now), now, reply_size=job.reply_size)
 
     def _time_limits(self, write: Write) -> tuple[float, float]:
-        """Return until when a message may leave, and how long after each packet the next may."""
-        # The waiting before a transmission is wanted: before a probe, and before the command.
+        """Return until when a message may be sent, and the patience between its packets (s)."""
+        # TX_Delay does not count as waiting: it comes before a probe, and before the command.
         wanted = 2 * self.network.timing.tx_delay
         patience = patience_of(write.mapping, self._settings.write_timeout) + wanted
-        # Where a fallback comes, a long write has no time beyond it.
+        # With a fallback all packets of a long write have to leave before it is due.
         return write.requested + patience, 0.0 if write.mapping.fallback else patience
 
     def next_due(self) -> float | None:
@@ -298,7 +298,7 @@ class Driver:
         return self._agenda.next_due()
 
     def expire(self, now: float) -> None:
-        """Do what needs no line: store what we serve, end what has waited too long for it."""
+        """Do what needs no line: store values that we serve, end what has waited too long."""
         self._sort_inbox(now)
         self.interlocks.expire(now)
         self._writes.expire(now)
@@ -323,7 +323,7 @@ class Driver:
         self._listener.station_changed(station)
 
     def _sort_inbox(self, now: float) -> None:
-        """Put what is served where the other end reads it; let all else wait for the line."""
+        """Store messages of Serve rows in our table; let all others wait for the line."""
         timeout = self._settings.write_timeout
         for write in self._inbox.take():
             if self.interlocks.is_overruled(write):
@@ -343,12 +343,12 @@ class Driver:
         self._listener.written(write.result(outcome, detail, self.machine.now))
 
     def _serve(self, command: Packet) -> Packet:
-        """Execute a command of the other end, on what has been asked for before it."""
+        """Execute a command of the other end, after all messages that came before it."""
         self._sort_inbox(self.machine.now)
         return self._served.serve(command)
 
     def _serve_written(self, mapping: Mapping, words: bytes) -> None:
-        """Hand on what the other end has written to words of ours."""
+        """Take words of ours that the other end has written."""
         self._update(self.points[mapping], words)
 
     def _run(self) -> Procedure:
@@ -368,7 +368,7 @@ class Driver:
             self._went_down(PortLost(reason))
 
     def _went_down(self, error: PortLost) -> None:
-        """Leave nothing without a result, and no old command to be sent later."""
+        """Give everything a result; no old command is to be sent later."""
         self.is_online = False
         self._tasks.fail(error)
         self.health.end(str(error))
@@ -414,7 +414,7 @@ class Driver:
             self._mode_told(check.station, begun)
 
     def _mode_told(self, station: int, asked: float) -> None:
-        """Hand on what a station that was asked has said of its mode."""
+        """Tell guards and interlocks which mode a station has answered with."""
         known = self.health.known(station)
         identity = known.identity if known.told is not None and known.told >= asked else None
         self._guards.mode_told(station, identity, asked)
@@ -432,7 +432,7 @@ class Driver:
         return periods
 
     def _read_done(self, job: ReadJob, data: bytes) -> None:
-        """Hand on what was read to the points that want it."""
+        """Update the points for which this read was made."""
         now = self.machine.now
         self._read_backs.read(job.block, data, job.started, now)
         self._guards.values_read(job.points, job.slices, data, now)
@@ -463,7 +463,7 @@ class Driver:
             self._listener.unreadable(point.mapping, reason)
 
     def _read_failed(self, job: ReadJob, reason: str, is_refusal: bool) -> None:
-        """Fail the points; what is read after a refusal is another block's matter."""
+        """Fail the points; after a refusal read smaller blocks."""
         job.interrupted()
         is_news = is_refusal and job in self._reads.jobs
         change = self._refusals.refused(job.block) if is_news else None
@@ -476,13 +476,13 @@ class Driver:
         self._change(change)
 
     def _change(self, change: Change | None) -> None:
-        """Read other blocks from now on."""
+        """Read the new blocks of a change from now on."""
         if change is not None:
             old = [job for job in self._reads.jobs if job.block in change.old]
             self._reads.replace(old, map(self._job, change.new), self.machine.now)
 
     def _link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
-        """Fail what the end of a transaction without a reply concerns."""
+        """Fail the points of a transaction without a reply; all of a station that is silent."""
         if station == BROADCAST:
             return
         self.stations[station].failures += 1
@@ -525,7 +525,7 @@ class Driver:
             self._reads.refresh(write, self.machine.now)
 
     def _write_failed(self, station: int, error: LinkError | RemoteError | None) -> None:
-        """Count what has ended a write early, if anything has."""
+        """Count the error that has ended a write early, if any."""
         if isinstance(error, RemoteError):
             self.stations[station].remote_errors += 1
         elif error is not None and not isinstance(error, CommandExpired):

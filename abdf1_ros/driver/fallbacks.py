@@ -26,7 +26,7 @@ import math
 from abdf1_ros.driver.points import Outcome, Write
 from abdf1_ros.settings.mapping import Mapping
 
-# A PLC that refuses a fallback value is asked again so often (s).
+# A fallback value that the PLC refuses is written again after so many seconds.
 _PAUSE_AFTER_REFUSAL = 1.0
 
 
@@ -42,13 +42,13 @@ class FallbackCause(Enum):
 
 class FallbackRow:
     """
-    One row with Fallback, and what the PLC has of it.
+    One row with Fallback, and what the PLC holds of it.
 
-    ``cause`` says why the fallback is due, None where it is not: from then on it stays due until
-    the PLC has confirmed it. ``refreshed`` is when the last message was published that has been
-    confirmed. After ``sent`` nothing goes out that was published before. All are clock values (s).
-    ``stands`` tells that the PLC holds the fallback and nothing has gone out since, ``is_held_up``
-    that it waits for a message that is under way.
+    ``cause`` says why the fallback is due, None where it is not. It stays due until the PLC has
+    confirmed it. ``refreshed`` is when the last confirmed message was published, ``sent`` when the
+    fallback was last sent: a message published before that is not sent any more. Both are clock
+    values (s). ``stands`` tells that the PLC holds the fallback and no message was sent since,
+    ``is_held_up`` that the fallback waits for a message that is under way.
     """
 
     def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
@@ -109,7 +109,7 @@ class FallbackRow:
 
     def ended(self, outcome: Outcome, now: float) -> float | None:
         """
-        Take note how it ended; return the seconds that it was due where that is to be told.
+        Take note how it ended; return the seconds that it was due, None where none is reported.
 
         It is written once more where a gateway may still hold a message of the row (rule 10).
         """
@@ -129,7 +129,7 @@ class FallbackRow:
         return now - self._due_since
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
-        """Take note how a message of the row ended that had been sent (rule 7)."""
+        """Take note how a message of the row ended that had the line (rule 7)."""
         if outcome is Outcome.WRITTEN:
             self.refreshed = max(self.refreshed, requested)
             self._is_unconfirmed, self._again_at = False, math.inf

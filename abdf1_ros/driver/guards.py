@@ -15,7 +15,7 @@
 """
 Guarded reads: values that are published only while the PLC's program runs (rules 13 to 15).
 
-The port of a PLC answers also when its program stands still. The numbers of rules are those of
+The port of a PLC answers also while its program is stopped. The numbers of rules are those of
 docs/heartbeats.md.
 """
 
@@ -31,7 +31,7 @@ from abdf1_ros.settings.mapping import Mapping
 
 
 class RunGuard:
-    """Holds while a station says, every ``limit`` s at least, that it is in RUN and sound."""
+    """Permits values while a station answers every ``limit`` s that it is in RUN without fault."""
 
     def __init__(self, limit: float) -> None:
         self.limit = limit
@@ -40,7 +40,7 @@ class RunGuard:
         self._state = 'its mode is not known'
 
     def told(self, identity: Identity | None, asked: float) -> None:
-        """Take an answer about the mode, or None for no usable one."""
+        """Take an answer about the mode, None for one that cannot be used."""
         is_running = identity is not None and bool(identity.is_running) and not identity.faults
         if not is_running:
             self._since = math.inf
@@ -64,7 +64,7 @@ class RunGuard:
 
 
 class CounterGuard:
-    """Holds after two changes of a word within ``limit`` s, until the next is overdue."""
+    """Permits values after two changes of a word in ``limit`` s each, until one is overdue."""
 
     def __init__(self, tag: str, limit: float) -> None:
         self.tag = tag
@@ -119,13 +119,13 @@ class Guards:
                 for station, guards in self._runs.items()}
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Take what a station has said of itself when it was ``asked`` (clock value in s)."""
+        """Take what a station has told about itself; it was ``asked`` at this clock value (s)."""
         for guard in self._runs.get(station, ()):
             guard.told(identity, asked)
 
     def values_read(self, points: Sequence[ReadPoint], places: Sequence[slice], data: bytes,
                     now: float) -> None:
-        """Look for counters among what was read."""
+        """Give the counters among the words that were read to their guards."""
         if not self._counters:
             return
         for point, place in zip(points, places, strict=True):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Heartbeats: a word that counts as long as all is well (rules 1 to 6).
+Heartbeats: a word that we count up while all conditions hold (rules 1 to 6).
 
 The numbers of rules are those of docs/heartbeats.md.
 """
@@ -33,11 +33,11 @@ _LEAST_LIFE_SIGN = 1.0  # s
 
 class HeartbeatRow:
     """
-    One Heartbeat row, and what the PLC has of it.
+    One Heartbeat row, and what the PLC holds of it.
 
-    ``value`` was sent last; ``confirmed`` is the clock value (s) of the last answer that took it.
-    ``reason`` says why it does not count, empty while it does; ``is_held`` tells that the PLC is
-    to be told so with 0.
+    ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
+    one. ``reason`` says why it does not count, empty while it does; ``is_held`` tells that the PLC
+    has to get 0.
     """
 
     def __init__(self, mapping: Mapping) -> None:
@@ -62,12 +62,12 @@ class HeartbeatRow:
         return self.value == 0 and self._is_confirmed
 
     def begin(self, now: float) -> None:
-        """Begin anew with 0: the PLC may be another one by now (rule 2)."""
+        """Start again with 0: the PLC may be another one by now (rule 2)."""
         self._must_begin, self._is_confirmed, self._next = True, False, now
 
     def missing(self, messages: MappingType[str, float], now: float) -> str:
         """
-        Return which topic has had no message in time, empty for none (rule 3 d).
+        Return the first topic without a message in time, empty for none (rule 3 d).
 
         ``messages`` tells when the last accepted message of each was published (clock value in s).
         """
@@ -75,7 +75,7 @@ class HeartbeatRow:
                      if now >= messages.get(topic, -math.inf) + self._requires_timeout), '')
 
     def topics_until(self, messages: MappingType[str, float]) -> float:
-        """Return until when it may count by rule 3 (d), if no further message comes."""
+        """Return until when it may count by rule 3 (d) without a further message."""
         return min((messages.get(topic, -math.inf) + self._requires_timeout
                     for topic in self._requires), default=math.inf)
 
@@ -94,11 +94,11 @@ class HeartbeatRow:
         return not self.is_under_way and not self._must_begin and now >= self._next
 
     def put_off(self, until: float) -> None:
-        """Look again at that clock value (s): nothing is to be written before."""
+        """Write nothing before that clock value (s)."""
         self._next = until
 
     def next_due(self, messages: MappingType[str, float]) -> float:
-        """Return when it wants the line (clock value in s), infinite for not by itself."""
+        """Return when it wants the line (clock value in s), infinite for never by itself."""
         if self.is_under_way or self.is_held and self.is_at_rest and not self._must_begin:
             return math.inf
         if self._must_begin or self.is_held or self.value == 0:
@@ -110,7 +110,7 @@ class HeartbeatRow:
         self.is_under_way = True
         if is_zero:
             self.value, self._is_confirmed = 0, False
-        elif self._is_confirmed:  # otherwise the same once more (rule 3 a)
+        elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
             self.value, self._is_confirmed = self.value % LARGEST + 1, False
         self._next = now + self._period
         return Write(self.mapping, [self.value], now)

@@ -27,9 +27,9 @@ class Inbox(Generic[_Item]):
     """
     Hand items from any number of threads to the one that takes them, in order, each once.
 
-    A closed inbox takes nothing. It holds no lock: every step is one operation of a deque, which
-    no other thread can divide. Nothing is ever copied and then cleared, because what another
-    thread had added in between would be lost.
+    A closed inbox takes nothing. There is no lock: every step is one atomic operation of a deque.
+    The items are never copied and then cleared: an item that another thread adds in between would
+    be lost.
     """
 
     def __init__(self, is_open: bool = True) -> None:
@@ -54,7 +54,7 @@ class Inbox(Generic[_Item]):
         self._items.append(item)
         if self._is_open:
             return True
-        # It was closed before, or just now. In that case the other thread may have taken it.
+        # It was closed before, or just now: then the other thread may have taken the item.
         try:
             self._items.remove(item)
         except ValueError:

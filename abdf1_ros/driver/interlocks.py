@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-What we write by ourselves: heartbeats and fallback values, and which of them goes first.
+What the driver writes without a message: heartbeats and fallback values, and in which order.
 
-A PLC is told 0 at first contact; then come the fallback values that are due there, and only then
-do its heartbeats count. The rules are numbered in docs/heartbeats.md. Pure as all of the driver: a
-clock that counts while the host sleeps has to be given as ``now`` (rule 6). None of this is a
-safety function.
+At first contact the heartbeats of a PLC are written as 0. Then its fallback values follow that are
+due, and only then do its heartbeats count. The numbers of rules are those of docs/heartbeats.md.
+As everywhere in the driver ``now`` is an argument; it has to come from a clock that also counts
+while the host sleeps (rule 6). None of this is a safety function.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes import WriteQueue
 from abdf1_ros.settings.mapping import Mapping
 
-# While the executor stands still nobody wakes the link; so often (s) it looks by itself.
+# A stopped executor does not wake the link, so the link looks by itself every so many seconds.
 _GLANCE = 0.1
 
 
@@ -50,9 +50,9 @@ class Urgency(Enum):
 @dataclass(eq=False, slots=True)
 class OwnWrite:
     """
-    A write that nobody has asked for by a message.
+    A write that no message has asked for.
 
-    After ``expires`` (clock value in s) it must not leave: what it says may be wrong by then.
+    It must not be sent after ``expires`` (clock value in s): its value may be wrong by then.
     """
 
     urgency: Urgency
@@ -101,11 +101,11 @@ class Interlocks:
     # What happens
 
     def executor_ran(self, now: float) -> None:
-        """Take note that the executor runs: no thread vouches for a hung process (rule 3 c)."""
+        """Take note that the executor runs: a hung process must not look alive (rule 3 c)."""
         self._executor = now
 
     def wind_down(self) -> None:
-        """Write 0, then every fallback, then nothing any more (rule 5)."""
+        """Write 0, then every fallback, and nothing after that (rule 5)."""
         self._is_ending = True
 
     def resume(self) -> None:
@@ -114,12 +114,12 @@ class Interlocks:
 
     @property
     def is_over(self) -> bool:
-        """Tell whether, after ``wind_down``, all stations that answer have confirmed all."""
+        """Tell whether all stations that answer have confirmed all writes of ``wind_down``."""
         return not self or self._are_all_due and not any(
             self._stations[row.mapping.station].active for row in self._unconfirmed())
 
     def unconfirmed(self) -> list[str]:
-        """Return the tags of what has still to be confirmed at the end."""
+        """Return the tags of the rows that are not confirmed yet at the end."""
         return [row.mapping.tag for row in self._unconfirmed()]
 
     def _unconfirmed(self) -> list[HeartbeatRow | FallbackRow]:
@@ -199,7 +199,7 @@ class Interlocks:
         return None
 
     def _judge(self, row: HeartbeatRow, now: float) -> None:
-        """Find out why a heartbeat must not count, if so (rule 3)."""
+        """Find out whether a heartbeat must not count, and why (rule 3)."""
         row.reason = self._why_held(row, now)
         row.is_held = bool(row.reason)
         if not row.is_held and now >= row.executor_until(self._executor):
@@ -222,7 +222,7 @@ class Interlocks:
                     or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
                 continue
             write = row.take(now)
-            if self._writes.is_held_up(write):  # by one that is under way (rule 9)
+            if self._writes.is_held_up(write):  # by a message that is under way (rule 9)
                 row.is_under_way, row.is_held_up = False, True
                 continue
             self._writes.drop('fallback', now, mapping)
@@ -242,7 +242,7 @@ class Interlocks:
         return None
 
     def _good_until(self, row: HeartbeatRow) -> float:
-        """Return until when a heartbeat may leave (clock value in s): later it may be wrong."""
+        """Return until when a heartbeat may be sent (clock value in s): later it may be wrong."""
         youngest = self._writes.youngest()
         ends = [fallback.deadline(youngest.get(id(fallback.mapping), -math.inf))
                 for fallback in self._fallbacks_of(row.mapping.station)]
@@ -265,7 +265,7 @@ class Interlocks:
                 row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
 
     def expire(self, now: float) -> None:
-        """Judge what has become due, and write what needs no line."""
+        """Make overdue fallbacks due; those of Serve rows are stored at once."""
         if not self._has_begun:
             return
         youngest = self._writes.youngest() if self.fallbacks else {}

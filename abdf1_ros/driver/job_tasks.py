@@ -59,10 +59,10 @@ class JobTasks:
     def start(self, station: int, steps: Steps[None], now: float, *, reply_size: int = 0,
               expires: float = math.inf, patience: float = 0.0) -> JobTask:
         """
-        Return the task of a new job, with its first command, whose reply has that size.
+        Return the task of a new job with its first command, whose reply has ``reply_size``.
 
-        A command does not leave after ``expires``, a later one not more than ``patience`` s after
-        the command before it, whose own time on the line does not count.
+        The first command must not be sent after ``expires`` (clock value in s). Each later one has
+        ``patience`` s after the command before it, without that command's own time on the line.
         """
         task = JobTask(self, station, steps, reply_size, expires)
         task.patience = patience
@@ -138,7 +138,7 @@ class JobTask:
 
     def fail(self, error: LinkError) -> None:
         """Raise ``error`` in the job, unless it has ended."""
-        if getgeneratorstate(self._steps) == GEN_CLOSED:  # by the garbage collector, with the line
+        if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
             return
         error.sent = self.sent
         self._advance(self._steps.throw, error)

@@ -37,14 +37,14 @@ from abdf1_ros.settings.network import Network
 @dataclass(frozen=True, slots=True)
 class DriverSettings:
     """
-    What is not in the net CSV; times in seconds.
+    Settings that are not in the net CSV; times in seconds.
 
-    ``stale_after`` counts periods. ``processor_period`` passes between two questions for the
-    diagnostic status of a station, 0 for never. ``max_outstanding`` commands may wait for their
-    reply at a time in full duplex. ``polling`` is for standard polling, None for one list of all
-    mapped stations. ``first_tns`` is the transaction number to begin with, which should be
-    random, or a restarted driver repeats itself and is taken for a duplicate. All else is
-    explained with the settings of masters and slaves in ``df1``.
+    ``stale_after`` counts periods. ``processor_period`` is the time between two questions for the
+    diagnostic status of a station, 0 for never. In full duplex at most ``max_outstanding``
+    commands wait for their replies. ``polling`` is for standard polling, None for one list of all
+    mapped stations. ``first_tns`` is the first transaction number. It should be random: a station
+    could take the first command of a restarted driver for a duplicate. The others are explained
+    with the settings of masters and slaves in ``df1``.
     """
 
     default_period: float = 0.1
@@ -97,7 +97,7 @@ def make_link(network: Network, settings: DriverSettings, machine: Machine,
 
 
 def _polling(settings: DriverSettings, stations: ActiveStationList) -> PollingSettings:
-    """Return the poll lists, with every mapped station in one: no other reply would come."""
+    """Return the poll lists with every mapped station: one without a poll could not reply."""
     polling = settings.polling or PollingSettings(())
     listed = {*polling.priority, *polling.normal}
     mapped = dict.fromkeys(stations.via(station.number) for station in stations)

@@ -46,13 +46,14 @@ class Freshness(Enum):
 
 class ReadPoint:
     """
-    What is known of one mapping that reads.
+    What is known about one mapping that reads.
 
-    ``period`` and ``stale_time`` are in seconds: a value is late when it is older than one and
-    a half periods and than half of ``stale_time``, stale when older than all of it. ``interval``
-    is the seconds between its last two good reads, if nothing was between them. ``error`` says
-    why the last read gave no value, ``withheld`` why its value was not published, the latter for
-    the ``withholdings``-th time since ``withheld_since`` (clock value in s).
+    ``period`` and ``stale_time`` are in seconds. A value is late when it is older than one and a
+    half periods and older than half of ``stale_time``; it is stale when older than ``stale_time``.
+    ``interval`` is the seconds between the last two good reads, None if a failed one was between
+    them. ``error`` says why the last read gave no value, ``withheld`` why its value was not
+    published. Values are withheld since ``withheld_since`` (clock value in s), and this is the
+    ``withholdings``-th time.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
@@ -81,7 +82,8 @@ class ReadPoint:
         Raises FormatError when the words are no value of the mapping's type.
         """
         values = self._codec.decode(words)
-        # Neither words nor floats: neighbours' bits are no change, and a NaN is like itself.
+        # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
+        # itself.
         content = values if isinstance(values, str) else values.tobytes()
         changed = content != self._published or self.error is not None
         if self.last_good is not None:
@@ -194,9 +196,9 @@ class Write:
     Values on their way to one mapping.
 
     Raises FormatError, saying what is wrong, when they cannot or must not be written.
-    ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that
-    it takes. ``is_probe`` tells that its station was inactive when it got the line, ``is_own``
-    that no message has asked for it; ``request`` is handed on to the result.
+    ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that write
+    it. ``is_probe`` tells that the station was inactive when the write got the line, ``is_own``
+    that no message has asked for it. ``request`` goes into the result.
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
@@ -211,7 +213,7 @@ class Write:
 
     @property
     def may_rewrite(self) -> bool:
-        """Tell whether bits may be changed by writing back their word, where all else fails."""
+        """Tell whether bits may be changed by writing back their word after a refusal."""
         processor = self.mapping.processor
         return self.is_pulse and processor is not None and processor.may_lack_masked_write
 
@@ -233,7 +235,7 @@ class Write:
             and first < second + two.codec.words and second < first + one.codec.words
 
     def is_held(self, words: bytes) -> bool:
-        """Tell whether these words, all of the mapping's, hold what was to be written."""
+        """Tell whether the mapping's ``words`` hold the values of this write."""
         codec = self.mapping.codec
         if isinstance(self.raw, str) or self.is_pulse:
             try:

@@ -24,8 +24,8 @@ class Probes:
     """
     Keep probes to an eighth of the line's time.
 
-    ``usual`` is the seconds that one takes, to reckon with before there has been any; ``next`` the
-    clock value (s) from which there may be another.
+    ``usual`` is the seconds that a probe takes at least; ``next`` is the clock value (s) from
+    which there may be another.
     """
 
     def __init__(self, usual: float) -> None:
@@ -34,13 +34,13 @@ class Probes:
 
     @property
     def interval(self) -> float:
-        """Return the seconds that are left to the other stations after a usual probe."""
+        """Return the seconds left to the other stations after a usual probe."""
         return _OTHERS_SHARE * self._usual
 
     def spend(self, seconds: float, now: float) -> None:
-        """Take note that one has had the line for so long until now."""
+        """Take note that a probe had the line for so many seconds until now."""
         self.wait(_OTHERS_SHARE * max(seconds, self._usual), now)
 
     def wait(self, seconds: float, now: float) -> None:
-        """Let the next one come not before ``seconds`` have passed."""
+        """Allow no probe before ``seconds`` have passed."""
         self.next = now + seconds

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What a PLC holds after a write that it has not confirmed: the next read of the words tells.
+Unconfirmed writes: the next read of the words shows what the PLC holds.
 
-The one result of such a write waits for that read, but no longer than a write may wait for the
+The one result of such a write waits for that read, but not longer than a write may wait for the
 line.
 """
 
@@ -61,7 +61,7 @@ class ReadBacks:
             self._tell(entry, 'not read back: no row reads all of these words', now)
 
     def read(self, block: Block, data: bytes, started: float, now: float) -> None:
-        """Compare what a block holds that was read from ``started`` (clock value in s) on."""
+        """Compare the data of a block whose read ``started`` at that clock value (s)."""
         for entry in self._waiting[:]:
             mapping = entry.write.mapping
             if started >= entry.since and _shows(block, mapping):
@@ -70,7 +70,7 @@ class ReadBacks:
                 self._end(entry, f'read back: the PLC holds {which}', now)
 
     def overtaken(self, newer: Write, now: float) -> None:
-        """End those whose words ``newer``, which goes out now, will change."""
+        """End those whose words the write ``newer`` changes, which is sent now."""
         for entry in self._waiting[:]:
             if entry.write.overlaps(newer):
                 self._end(entry, 'not read back: a newer write of these words has gone out', now)
@@ -86,7 +86,7 @@ class ReadBacks:
         return self._waiting[0].since + self._patience if self._waiting else math.inf
 
     def end(self, now: float) -> None:
-        """End all: there is no line any more."""
+        """End all: the port is lost."""
         for entry in self._waiting[:]:
             self._end(entry, 'not read back before the line went down', now)
 

@@ -15,16 +15,16 @@
 """
 Which reads are due, and which of them goes first.
 
-The one with the earliest deadline, which is its due time and a period: so each is read within
-its period as long as the line is fast enough. When it is not, and one is late by more than its
-period, three of four turns are for the one that is the most periods late. So all periods become
-longer by about the same factor: slow reads, many as they may be, do not make fast ones as slow
-as themselves. The fourth turn is still for the earliest deadline: a period that no line can do
-does not shut out the others.
+The read with the earliest deadline goes first; the deadline is the due time plus one period. So
+each block is read within its period as long as the line is fast enough. When the line is too slow,
+and a read is late by more than its period, three of four turns go to the read that is the most
+periods late. So all periods become longer by about the same factor: many slow reads do not make
+the fast ones as slow as themselves. The fourth turn still goes to the earliest deadline: a period
+that no line can keep does not block the others.
 
-A block of several packets is in the queue for each of them, so it keeps nobody waiting for
-longer than one. A read without a period is due again as soon as it has begun. It takes what the
-others leave: its period counts as four times what it takes to read everything once.
+A block of several packets is in the queue once for each packet, so other reads wait for one packet
+at most. A read without a period is due again as soon as it has begun. It gets the time that the
+others leave: its period counts as four times the time of reading everything once.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from abdf1_ros.plan.planner import Block
 _TURNS = 4
 _MOST_ENTRIES = 4  # for each read
 
-# A reply that was waited for so much longer (s) than there is any reason to tells of the past:
-# this process was paused, or its host, and nobody knows how long the reply has lain there.
+# A reply that comes so many seconds later than any reply can come may have old values: this
+# process or its host was paused, and nobody knows how long the reply has lain in a buffer.
 MOST_LATE = 0.2
 
 
@@ -52,14 +52,13 @@ class ReadJob:
     """
     A block to be read again and again, and the points it serves.
 
-    ``due`` is the clock value (s) from which it wants the line, ``interval`` the seconds
+    ``due`` is the clock value (s) from which it wants the line. ``interval`` is the seconds
     between its last two good reads and ``longest`` the greatest of these; an outage of the
-    station does not count. ``is_refresh`` tells that a write has changed what it shows, the
+    station does not count. ``is_refresh`` tells that a write has changed words of the block, the
     last time at ``refreshed``. ``started`` is when the read under way or the last one began, and
-    ``late`` what ``Machine.late`` was then. Packets that come within ``longest_read`` seconds are
-    of one read. ``is_to_repeat`` tells that the last read was dropped, ``is_probe`` that it asks a
-    silent station.
-    ``ticket`` is the queue's: the entry that counts.
+    ``late`` was ``Machine.late`` then. All packets of a read have to come within ``longest_read``
+    seconds. ``is_to_repeat`` tells that the last read was dropped, ``is_probe`` that it asks a
+    silent station. ``ticket`` is the number of its valid entry in the queue.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint],
@@ -91,7 +90,7 @@ class ReadJob:
 
     @property
     def reply_size(self) -> int:
-        """Return the bytes behind the header of a good reply to the next command."""
+        """Return the bytes after the header of a good reply to the next command."""
         return self._reply_sizes[len(self._packets)]
 
     @property
@@ -117,10 +116,10 @@ class ReadJob:
 
     def why_too_old(self, now: float, late: float) -> str:
         """
-        Return why what has been read is not worth having, empty where it is.
+        Return why the data of this read must be dropped, empty where they are good.
 
-        Between its first command and now all of this process has stood still, or so much else
-        has had the line that the words of one value would be of different ages.
+        Since its first command this process has stood still, or other commands had the line for so
+        long that words of one value differ too much in age.
         """
         if late - self.late > MOST_LATE:
             return f'this process, or its host, stood still for {late - self.late:.1f} s'
@@ -130,7 +129,7 @@ class ReadJob:
         return ''
 
     def begin_anew(self) -> None:
-        """Drop what has been read; all of it is due again."""
+        """Drop the packets that were read; the whole block is due again."""
         self._packets = []
         self.is_to_repeat = True
 
@@ -143,12 +142,12 @@ class ReadJob:
         self._last_done = now
 
     def interrupted(self) -> None:
-        """Take note that there are no good reads for the time being."""
+        """Take note that a read has failed: no interval spans an outage."""
         self.interval = self._last_done = None
         self._packets = []
 
     def covers(self, write: Write) -> bool:
-        """Tell whether the block shows what ``write`` has changed."""
+        """Tell whether the block has words that ``write`` has changed."""
         mapping, start = write.mapping, self.block.start
         if (self.station, start.area) != (mapping.station, mapping.address.area):
             return False
@@ -165,7 +164,7 @@ class ReadQueue:
     """
     All read jobs, those of one period in the order in which they are due.
 
-    ``jobs`` are all of them, also those that nobody has put here and those that were taken.
+    ``jobs`` are all of them, also those that are set aside or under way.
     """
 
     def __init__(self) -> None:
@@ -189,23 +188,23 @@ class ReadQueue:
             self.put(job, now)
 
     def put(self, job: ReadJob, due: float) -> None:
-        """Let a job wait, from now on due at ``due``."""
+        """Let a job wait until it is due at ``due`` (clock value in s)."""
         job.due, job.ticket = due, next(self._tickets)
         heap = self._heaps.setdefault(job.block.period, [])
         heapq.heappush(heap, (due, job.ticket, job))
         if len(heap) > _MOST_ENTRIES * len(self.jobs):
-            # Writes refresh slow reads, whose old entries would stay until they had been due.
+            # A refresh of a slow read leaves an old entry, which would stay until it had been due.
             heap[:] = filter(self._counts, heap)
             heapq.heapify(heap)
 
     def take(self, now: float) -> ReadJob | None:
-        """Return the job that goes next and let it wait no more; None: none is due."""
+        """Remove and return the job that goes next, None where none is due."""
         heap = self._next_heap(now)
         self._turn = (self._turn + 1) % _TURNS
         return None if heap is None else heapq.heappop(heap)[2]
 
     def first(self, now: float) -> ReadJob | None:
-        """Return the job that goes next; None: none is due."""
+        """Return the job that goes next, None where none is due."""
         heap = self._next_heap(now)
         return None if heap is None else heap[0][2]
 
@@ -214,7 +213,7 @@ class ReadQueue:
         return min((heap[0][0] for heap in self._clean_heaps()), default=None)
 
     def _next_heap(self, now: float) -> list[_QueueEntry] | None:
-        """Return the heap that begins with the job to go next."""
+        """Return the heap that begins with the job that goes next."""
         due = [heap for heap in self._clean_heaps() if heap[0][0] <= now]
         if len(due) < 2:
             return due[0] if due else None
@@ -231,13 +230,13 @@ class ReadQueue:
         return (now - due) / self._period(job)
 
     def _clean_heaps(self) -> list[list[_QueueEntry]]:
-        """Return the heaps that are not empty, each beginning with an entry that counts."""
+        """Return the heaps that are not empty, each beginning with a valid entry."""
         for heap in self._heaps.values():
             while heap and not self._counts(heap[0]):
                 heapq.heappop(heap)
         return [heap for heap in self._heaps.values() if heap]
 
     def _counts(self, entry: _QueueEntry) -> bool:
-        """Tell whether no later entry has replaced this one, nor other jobs its job."""
+        """Tell whether this entry is its job's last one, and the job has not been replaced."""
         _, ticket, job = entry
         return ticket == job.ticket and job in self.jobs

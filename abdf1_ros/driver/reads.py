@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-All reads of a line: those that are due, in the order of ``read_queue``, and those set aside.
+All reads of a line: those that wait in the order of ``read_queue``, and those set aside.
 
-The reads of a station that is inactive, or that acknowledges commands and does not reply to them
-in time, are set aside. Every now and then one of them goes out as a probe.
+The reads of a station are set aside while it is inactive, or while it acknowledges commands
+without replying in time. Now and then one of them is sent as a probe.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
 
 
 class Reads:
-    """Keep all read jobs; ``probes`` says when one of a silent station may go out."""
+    """Keep all read jobs; ``probes`` says when one of a silent station may be sent."""
 
     def __init__(self, stations: ActiveStationList, probes: Probes) -> None:
         self._stations = stations
@@ -51,7 +51,7 @@ class Reads:
 
     @property
     def others_wait(self) -> bool:
-        """Tell whether there is anybody who is kept waiting by a probe."""
+        """Tell whether a probe would keep other reads waiting."""
         return bool(self._due)
 
     @property
@@ -70,13 +70,13 @@ class Reads:
         self._due.replace(old, new, now)
 
     def begin(self, now: float) -> None:
-        """Make all reads due at once: there has been no line for a while."""
+        """Make all reads due at once: the port has been opened."""
         waiting = self._due.jobs.difference(*self._aside.values())
         for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
             self._due.put(job, now)
 
     def next_probe(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
-        """Return the next read of a silent station, when it may go out."""
+        """Return the next read of a silent station, None while no probe may be sent."""
         for number in list(self._aside):
             if self._stations[number].replies_in_time:  # to a write, or to somebody else
                 self.release(number, now)
@@ -87,7 +87,7 @@ class Reads:
         job = jobs.popleft()
         job.due, job.is_probe = now, True
         if jobs:
-            self._aside[station] = jobs  # to the end: the next probe is another station's
+            self._aside[station] = jobs  # to the end: the next probe goes to another station
         return job
 
     def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
@@ -122,7 +122,7 @@ class Reads:
         return self._probes.next if due is None else min(due, self._probes.next)
 
     def ended(self, job: ReadJob, now: float) -> None:
-        """Take a job back, whether it went well or not, unless it has been replaced."""
+        """Take a job back after a good or failed read, unless it has been replaced."""
         if job not in self._due.jobs:
             return
         station = self._stations[job.station]
@@ -143,7 +143,7 @@ class Reads:
             self._due.put(job, max(job.due + job.block.period, job.started))
 
     def refresh(self, write: Write, now: float) -> None:
-        """Make the reads that show what ``write`` changed due at once."""
+        """Make the reads of all words that ``write`` changed due at once."""
         self.release(write.mapping.station, now)
         for job in self._due.jobs:
             if job.covers(write):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What we serve: the words of Serve rows, which the PLC reads and writes with commands."""
+"""The words of Serve rows, which the PLC reads and writes with its own commands."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class _MappedTable(DataTable):
     """
     A data table that has only the mapped words, and remembers what was written.
 
-    ``changed`` has each place with what was there before. With ``is_guarded`` the words that are
-    ``read_only`` cannot be written.
+    ``changed`` has the address and the old data of each write. With ``is_guarded`` the words that
+    are ``read_only`` cannot be written.
     """
 
     def __init__(self, plc_type: PlcType) -> None:
@@ -71,8 +71,8 @@ class _MappedTable(DataTable):
         """
         Tell whether these words are mapped.
 
-        Who moves whole elements of a structure has no say in which of their words are: there
-        one of each will do, and the others are what the other end has written, or 0.
+        A command that moves whole elements of a structure cannot leave out single words. There one
+        mapped word of each element is enough; the others hold what the other end wrote, or 0.
         """
         mapped = (place in self._mapped for place in _words(address, words))
         size = address.layout.words
@@ -143,7 +143,7 @@ class Served:
         return self._table.read(_first_word(mapping), mapping.codec.words)
 
     def store(self, mapping: Mapping, values: Sequence[float] | str) -> None:
-        """Put checked raw values where the other end reads them."""
+        """Store checked raw values where the other end reads them."""
         start = _first_word(mapping)
         if mapping.type is ValueType.BOOL:
             assert not isinstance(values, str)
@@ -151,12 +151,12 @@ class Served:
                 self._table.write_bits(*change)
         else:
             self._table.write(start, mapping.codec.encode(values))
-        self._table.changed.clear()  # nobody has to be told of what we write ourselves
+        self._table.changed.clear()  # our own writes are not reported
 
 
 def line_problems(mappings: Sequence[Mapping], network: Network,
                   path: str) -> list[tuple[Mapping, Problem]]:
-    """Return the rows that do not fit ``network``, or Serve rows before them, with their fault."""
+    """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
     found: list[tuple[Mapping, Problem]] = []
     table = _MappedTable(PlcType(network.plc_type))
     for mapping in mappings:
@@ -182,7 +182,7 @@ def row_problems(mappings: Sequence[Mapping], network: Network, default_period: 
     Return the rows that cannot be used on this line, and those that depend on such a row.
 
     ``default_period`` (s) is for rows without Period. A row whose counter is not read often enough
-    for its Heartbeat_Timeout is among them (docs/heartbeats.md, rules 14 and 15).
+    for its Heartbeat_Timeout cannot be used (docs/heartbeats.md, rules 14 and 15).
     """
     found = line_problems(mappings, network, path)
     left = [mapping for mapping in mappings if mapping not in dict(found)]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is said to a PLC to read, to write and to ask who it is, and how that ends."""
+"""The commands that read, write and identify a PLC, and how they end."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ REWRITTEN = ('by reading the word and writing it back; a change that the PLC mad
 def read_packet(block: Block, number: int,
                 command: Request) -> Steps[bytes]:
     """
-    Read the words of one request of a block with its ``command``, made before.
+    Read the words of one request of a block; ``command`` is that request encoded.
 
     Raises LinkError, RemoteError, or FormatError for a reply that cannot be used.
     """
@@ -84,7 +84,7 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
 
 
 def _send(write: Write, packet: int) -> Steps[str]:
-    """Send one packet; return what has to be said of the way it was done, if anything."""
+    """Send one packet; return a remark for the result, empty for none."""
     try:
         check_status((yield write.commands[packet]),
                      family_of(write.mapping.plc_type).meanings)
@@ -98,7 +98,7 @@ def _send(write: Write, packet: int) -> Steps[str]:
 
 def _rewrite(write: Write, packet: int,
              refusal: RemoteError) -> Steps[None]:
-    """Do what a refused masked write should have done: read the word, write it back changed."""
+    """Replace a refused masked write: read the word and write it back changed."""
     dialect = write.mapping.dialect
     address, mask, bits = write.bit_change(packet)
     try:
@@ -129,7 +129,7 @@ def read_values(mapping: Mapping, block: Block) -> Steps[Values]:
 
 def identify() -> Steps[Identity]:
     """
-    Ask who is there, and a PLC-5 with a fault which one.
+    Ask a station for its identity, and a PLC-5 with a fault for the fault code.
 
     Raises LinkError, RemoteError, or FormatError for a reply too short to tell.
     """
@@ -141,11 +141,11 @@ def identify() -> Steps[Identity]:
     try:
         return plc5.with_fault(identity, check_status((yield request)))
     except (RemoteError, FormatError):
-        return identity  # one without typed commands: who it is counts more
+        return identity  # an old PLC-5 without typed commands
 
 
 def echo(data: bytes) -> Steps[None]:
-    """Have ``data`` sent back; FormatError when something else comes."""
+    """Have a station send ``data`` back; FormatError when the reply differs."""
     reply = check_status((yield diagnostics.CMD, diagnostics.Echo(data).encode()))
     if reply != data:
         raise FormatError(f'the echo of {data.hex(" ")} came back as {reply.hex(" ")}')

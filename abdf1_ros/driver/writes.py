@@ -15,8 +15,8 @@
 """
 The writes that wait for the line.
 
-Of words the newest value waits, of bits all in their order. Those of a station keep their order,
-and two of the same words are never under way together.
+For words only the newest value waits; for bits all of them wait in their order. The writes of a
+station keep their order, and two writes of the same words are never under way together.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MAX_WAITING_WRITES = 1000
 
 
 def waited_too_long(seconds: float) -> str:
-    """Return why a write ends that has waited for more than so many seconds."""
+    """Return the reason of a write that has waited for more than ``seconds``."""
     return f'waited longer than {seconds:g} s for the line'
 
 
@@ -48,11 +48,11 @@ def patience_of(mapping: Mapping, patience: float) -> float:
 
 class WriteQueue:
     """
-    Keep writes until they have the line, but for ``patience`` seconds at most.
+    Keep writes until they have the line, for ``patience`` seconds at most.
 
     ``report`` gets the results of those that end here. A write to an inactive station is a
-    probe of it; those that follow sooner than ``probes`` allow end unsent. Another thread may
-    only ask for the length.
+    probe; a further write that comes sooner than ``probes`` allow ends unsent. Another thread
+    may only ask for the length.
     """
 
     def __init__(self, stations: ActiveStationList, probes: Probes, patience: float,
@@ -71,11 +71,12 @@ class WriteQueue:
 
     def add(self, write: Write, now: float) -> None:
         """
-        Let a write wait, in the place of an older value of its mapping.
+        Let a write wait; it takes the place of an older value of its mapping.
 
-        At the end, a topic that never rests would wait for ever. But nothing that was asked for
-        in between of the same words is overtaken: then the older value goes out as well, or two
-        such topics would put each other off for ever.
+        If it went to the end instead, a topic that is published again and again would never have
+        its turn. But it must not overtake a later write of another mapping to the same words. In
+        that case the older value is sent as well, or two such topics would delay each other for
+        ever.
         """
         self._next_expiry = min(self._next_expiry, self._expiry(write))
         older = [] if write.is_pulse else [
@@ -95,8 +96,8 @@ class WriteQueue:
         """
         Return the next write, which ends with ``ended``.
 
-        Writes to stations in ``busy`` keep waiting, and so does one of words that are being
-        written: the packets of two must not mix.
+        Writes to stations in ``busy`` keep waiting, and so do writes of words that are being
+        written: the packets of two writes must not mix.
         """
         self.expire(now)
         write = self._first_free(busy) if self._waiting else None
@@ -108,7 +109,7 @@ class WriteQueue:
         return write
 
     def _first_free(self, busy: Container[int]) -> Write | None:
-        """Return the first write that need not wait."""
+        """Return the first write that does not have to wait."""
         held_up: set[int] = set()
         for write in self._waiting:
             station = write.mapping.station
@@ -142,7 +143,7 @@ class WriteQueue:
         self._under_way.append(write)
 
     def ended(self, write: Write) -> None:
-        """Take note that a write is not under way any more; the next of its words may go out."""
+        """Take note that a write is not under way any more; the next of its words may be sent."""
         self._under_way.remove(write)
 
     def expire(self, now: float) -> None:
@@ -176,7 +177,7 @@ class WriteQueue:
         if now >= self._expiry(write):
             return waited_too_long(patience_of(write.mapping, self._patience))
         station = write.mapping.station
-        # A write has just found it inactive, and others want the line.
+        # A write has just found the station inactive, and other commands want the line.
         if now < self._probes.next and station != BROADCAST \
                 and not self._stations[station].active:
             return Message.ERR_INACTIVE_STATION.line(station)
