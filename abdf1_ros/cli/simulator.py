@@ -46,7 +46,7 @@ from abdf1_ros.cli.terminal import (
     whole_option,
 )
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameDecoder, NAK
+from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
@@ -105,7 +105,7 @@ class _FaultyPort:
         """Answer NAK to every message and every enquiry."""
         self._decoder.feed(data)
         while (symbol := self._decoder.next_symbol()) is not None:
-            if isinstance(symbol, Frame) or symbol == Control(Code.ENQ):
+            if isinstance(symbol, Frame) or symbol is Control.ENQ:
                 self.write(NAK)
 
     def write(self, data: bytes) -> None:

@@ -26,7 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
@@ -98,11 +98,16 @@ class FrameFault(Enum):
     NO_ETX = 'broken off before DLE ETX'
 
 
-@dataclass(frozen=True, slots=True)
-class Control:
+class Control(Enum):
     """DLE ACK, DLE NAK, DLE EOT, or (full duplex) DLE ENQ."""
 
-    code: Code
+    ACK = Code.ACK
+    NAK = Code.NAK
+    EOT = Code.EOT
+    ENQ = Code.ENQ
+
+    def __init__(self, code: Code) -> None:
+        self.code = code
 
 
 _CONTROLS = {pair: Control(Code(pair[1])) for pair in (ACK, NAK, EOT, ENQ)}
@@ -128,8 +133,7 @@ class Poll:
     valid: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(NamedTuple):
     """
     A message frame, good or bad.
 

@@ -41,7 +41,6 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
     ACK,
-    Code,
     Control,
     Duplex,
     Frame,
@@ -110,7 +109,7 @@ _LONGEST = 2 * MAX_LINK_DATA
 _LAST_CHARACTERS = 16
 
 # What nobody says in full duplex before he has heard a message or an ENQ to its end.
-_RESPONSES = (Control(Code.ACK), Control(Code.NAK))
+_RESPONSES = (Control.ACK, Control.NAK)
 
 KEEP = -1.0
 AT_ONCE = -1.0
@@ -196,7 +195,7 @@ class Machine:
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
         self._procedure: Procedure | None = None
-        self._out = bytearray()
+        self._out = b''
         self._pending: Step | None = None  # waits for its delay before it goes out
         self._kept_deadline: float | None = None
         self._resting = False
@@ -274,7 +273,7 @@ class Machine:
         is left without a result.
         """
         procedure, self._procedure = self._procedure, None
-        self._out.clear()
+        self._out = b''
         self._outgoing.clear()
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
@@ -347,8 +346,7 @@ class Machine:
 
     def data_to_send(self) -> bytes:
         """Return, once, the bytes to put on the line now."""
-        data = bytes(self._out)
-        self._out.clear()
+        data, self._out = self._out, b''
         return data
 
     def _without_echo(self, data: bytes) -> bytes:

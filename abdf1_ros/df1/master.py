@@ -38,7 +38,6 @@ Messages between slaves that are to be passed on take turns with transactions of
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-import math
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
@@ -62,7 +61,6 @@ class HalfDuplexMaster:
     def __init__(self, machine: Machine, settings: MasterSettings, stations: ActiveStationList,
                  report: Callable[[Event], None] = lambda event: None,
                  serve: Callable[[Packet], Packet] | None = None) -> None:
-        self.command_sent = False
         self._machine = machine
         self._settings = settings
         self._stations = stations
@@ -89,41 +87,33 @@ class HalfDuplexMaster:
 
     def _carry_out(self, task: Task) -> Talk:
         try:
-            reply = yield from self.exchange(task.command, reply_size=task.reply_size,
-                                             expires=task.expires)
+            reply = yield from self.exchange(task)
         except CommandExpired as error:
             task.sent = error.sent
             task.fail(error)
         except (StationInactive, CommandTimeout, WrongCommandCode) as error:
-            task.sent = self.command_sent
             task.fail(error)
-        except BaseException:  # the end of the line; whoever has the tasks ends them
-            task.sent = self.command_sent
-            raise
         else:
             task.reply(reply)
 
-    def exchange(self, command: Packet, reply_size: int = 0, expires: float = math.inf
-                 ) -> Generator[Step, Heard, Packet]:
+    def exchange(self, task: Task) -> Generator[Step, Heard, Packet]:
         """
-        Send ``command`` and return the reply to it.
+        Send the command of a task, which is told so, and return the reply to it.
 
-        ``reply_size`` and ``expires`` are those of a task. While this runs and after it,
-        ``command_sent`` tells whether the command has been on the line: without a reply its
-        outcome is then unknown. A broadcast has no reply; the one returned for it is our own.
+        A broadcast has no reply; the one returned for it is our own.
 
         Raises StationInactive, CommandTimeout, CommandExpired or WrongCommandCode.
         """
+        command = task.command
         number = self._stations.via(command.dst)  # on this line (M 3-7)
-        self.command_sent = False
         if number != BROADCAST and not self._stations[number].active:
             yield from self._line.probe(number)
-        self.command_sent = True
-        started = yield from self._line.deliver(number, command, expires)
+        task.sent = True
+        started = yield from self._line.deliver(number, command, task.expires)
         if number == BROADCAST:
             return command.reply()
         try:
-            reply = yield from self._collect(number, command, started, reply_size)
+            reply = yield from self._collect(number, command, started, task.reply_size)
         except CommandTimeout:
             yield from self._give_up(command.dst)
             raise

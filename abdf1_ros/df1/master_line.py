@@ -36,7 +36,7 @@ from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Poll, Unknown
 from abdf1_ros.df1.machine import Heard, LISTEN_ON, Machine, Silence, Step
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet, source
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
@@ -67,8 +67,8 @@ _OTHERS_SHARE = 7
 # What answers a message and a poll, but for the frames that answer a poll too.
 _LISTEN_ON_ECHOED = LISTEN_ON._replace(is_echoed=True)
 
-_MESSAGE_ANSWERS = (Code.ACK, Code.NAK)
-_POLL_ANSWERS = (Code.EOT, Code.NAK)
+_MESSAGE_ANSWERS = (Control.ACK, Control.NAK)
+_POLL_ANSWERS = (Control.EOT, Control.NAK)
 
 # Less time (s) than this is none: no wait ends so exactly.
 _MOMENT = 0.0001
@@ -76,8 +76,6 @@ _MOMENT = 0.0001
 # So many characters, and what the equipment may hold back, make a pause after a message that has
 # broken off.
 _QUIET_CHARACTERS = 10
-
-_ACK, _NAK, _EOT = Control(Code.ACK), Control(Code.NAK), Control(Code.EOT)
 
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
@@ -156,7 +154,7 @@ class MasterLine:
                 self.counters.messages_sent -= 1
                 error.sent = retry > 1
                 raise
-            if answer == _ACK:
+            if answer is Control.ACK:
                 self.stations.heard(number, self.machine.now)
                 return begun
             cause = self._note_cause(answer, number, Message.NTC_ACK_EXPECTED)
@@ -169,7 +167,7 @@ class MasterLine:
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
         """Note why something has to be sent again, at worst what was ``expected``; return it."""
-        if answer == _NAK:
+        if answer is Control.NAK:
             self.note(Message.NTC_RCVD_NAK_SYMBOL, station=number)
             self.note(Message.ERR_RCVD_NAK_SYMBOL, station=number)
             return Message.ERR_RCVD_NAK_SYMBOL
@@ -231,7 +229,7 @@ class MasterLine:
         return answer
 
     def _ask(self, question: Step, number: int,
-             wanted: tuple[Code, ...]) -> Generator[Step, Heard, Heard]:
+             wanted: tuple[Control, ...]) -> Generator[Step, Heard, Heard]:
         """
         Send a question; return a ``wanted`` control symbol, a frame of this station, or silence.
 
@@ -244,9 +242,9 @@ class MasterLine:
         while not isinstance(symbol := (yield step), Silence):
             step = LISTEN_ON
             if isinstance(symbol, Control):
-                self._count_control(symbol.code)
+                self._count_control(symbol)
                 self._last_code = symbol.code
-                if symbol.code in wanted:
+                if symbol in wanted:
                     return symbol
             elif isinstance(symbol, Unknown):
                 self._last_code = symbol.byte
@@ -294,9 +292,10 @@ class MasterLine:
         It answers an earlier poll, whose time was up. It gets no ACK, which would be taken by
         the station asked now for that of its own message; so it comes again, and then is known.
         """
-        packet = Packet.decode(frame.data)
-        if packet.src not in self.stations or self._speaks_for(number, packet.src):
+        src = source(frame.data)
+        if src not in self.stations or self._speaks_for(number, src):
             return False
+        packet = Packet.decode(frame.data)
         station = self.stations[self.stations.via(packet.src)]
         self.counters.messages_received += 1
         self.stations.heard(packet.src, self.machine.now)
@@ -455,10 +454,13 @@ class MasterLine:
         self.note(Message.ERR_INACTIVE_STATION, number, station=number)
         raise StationInactive(number)
 
-    def _count_control(self, code: Code) -> None:
-        self.counters.acks_received += code is Code.ACK
-        self.counters.naks_received += code is Code.NAK
-        self.counters.eots_received += code is Code.EOT
+    def _count_control(self, control: Control) -> None:
+        if control is Control.ACK:
+            self.counters.acks_received += 1
+        elif control is Control.EOT:
+            self.counters.eots_received += 1
+        else:
+            self.counters.naks_received += control is Control.NAK
 
     def _note_fault(self, frame: Frame, number: int) -> Message:
         """Count and report what is wrong with a frame; return the message that names it."""
@@ -469,4 +471,4 @@ class MasterLine:
 
 def is_good(answer: Heard) -> TypeGuard[Control | Frame]:
     """Tell whether a poll was answered properly: with EOT or a good message."""
-    return answer == _EOT or (isinstance(answer, Frame) and answer.fault is None)
+    return answer is Control.EOT or (isinstance(answer, Frame) and answer.fault is None)

@@ -29,6 +29,11 @@ PRIORITY_BIT = 0x20
 BROADCAST = 255
 
 
+def source(link_data: bytes) -> int:
+    """Return SRC of link data that hold a header."""
+    return link_data[1]
+
+
 def begins_good_reply(link_data: bytes | bytearray) -> bool:
     """Tell whether the header is there, and is that of a reply without an error."""
     return len(link_data) >= HEADER_SIZE and link_data[2] & REPLY_BIT != 0 and link_data[3] == 0

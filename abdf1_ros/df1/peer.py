@@ -282,7 +282,7 @@ class FullDuplexPeer:
         end, position = machine.free_at + self._timeout, machine.position
         while not isinstance(symbol, Silence) or self._left(end) > 0:
             answer = b''
-            if symbol in (Control(Code.ACK), Control(Code.NAK)) and machine.has_left(position):
+            if symbol in (Control.ACK, Control.NAK) and machine.has_left(position):
                 assert isinstance(symbol, Control)
                 self._count_response(symbol.code)
                 return symbol.code
@@ -330,13 +330,13 @@ class FullDuplexPeer:
         is_aborted, self._is_aborted = self._is_aborted, False
         if isinstance(symbol, Frame):
             return self._message(symbol)
-        if symbol == Control(Code.ENQ):
+        if symbol is Control.ENQ:
             self._expect_repetition()
             self._counters.enqs_received += 1
             # What was heard since the last response was no message, or it would have had one.
             is_clean = self._machine.decoder.noise == self._noise
             return self._respond(self._last_response if is_clean else frames.NAK)
-        if isinstance(symbol, Control) and symbol.code in (Code.ACK, Code.NAK):
+        if symbol is Control.ACK or symbol is Control.NAK:
             self._count_response(symbol.code)
             return b''
         self._last_response = frames.NAK

@@ -31,7 +31,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Frame, Poll, Symbol, Unknown
+from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import AT_ONCE, Heard, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
@@ -117,11 +117,11 @@ class HalfDuplexSlave:
         if isinstance(symbol, Frame):
             self._just_sent = just_sent and self._is_echo(symbol)
             return self._received(symbol)
-        if symbol == Control(Code.ACK) and just_sent:
+        if symbol is Control.ACK and just_sent:
             # An ACK names no station: it is ours only straight after our own message.
             self.counters.acks_received += 1
             self._release()
-        elif symbol == Control(Code.NAK):
+        elif symbol is Control.NAK:
             self.counters.naks_received += 1
             self._report(Event(Message.NTC_RCVD_NAK_SYMBOL))
             self._release(LineReset())

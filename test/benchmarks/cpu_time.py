@@ -171,7 +171,6 @@ def _time_in_memory(replies: list[bytes]) -> float:
     for number, reply in enumerate(replies[:-1]):
         now = 0.001 * number
         for heard in frames.ACK, reply:
-            machine.handle_timeout(now)
             machine.receive_data(heard, now)
             machine.data_to_send()
             assert machine.next_call is not None

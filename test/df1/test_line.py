@@ -35,6 +35,7 @@ from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
+from support.peers import CommandTask
 from support.virtual_line import char_time, Noise, QUIET, VirtualLine
 
 MASTER = 5
@@ -114,7 +115,8 @@ class Rig:
                 started, was_active = machine.now, self.stations[command.dst].active
                 result: Packet | LinkError
                 try:
-                    result = yield from self.master.exchange(command)
+                    result = yield from self.master.exchange(
+                        CommandTask(command, lambda: machine.now))
                 except LinkError as error:
                     result = error
                 self.outcomes.append(Outcome(command, result, machine.now - started, was_active))

@@ -90,7 +90,7 @@ def test_normal() -> None:
     assert script.counts() == {
         'messages_sent': 1, 'messages_received': 1, 'commands_sent': 1, 'replies_received': 1,
         'polls_sent': 1, 'acks_sent': 1, 'acks_received': 1}
-    assert script.master.command_sent
+    assert script.task.sent
     assert script.changes == []
     station = script.stations[SLAVE]
     assert (station.replies, station.last_tns, station.last_heard) == (1, 0x0102, 100.0)
@@ -234,14 +234,14 @@ def test_dead_slave_becomes_inactive_after_its_retries(retries: int) -> None:
     assert script.changes == [(SLAVE, False)]
     assert script.stations[SLAVE].silent_since == script.now
     assert script.now == pytest.approx(100.0 + 0.5 * (retries + 1))
-    assert script.master.command_sent
+    assert script.task.sent
 
 
 def test_inactive_station_gets_exactly_one_poll() -> None:
     script = inactive_script()
     error = script.run(COMMAND, POLLED, TIMEOUT)
     assert isinstance(error, StationInactive)
-    assert not script.master.command_sent
+    assert not script.task.sent
     assert script.numbers() == [(2509, SLAVE)]
     assert script.counts() == {'polls_sent': 1}
     assert script.changes == []
@@ -299,7 +299,7 @@ def test_bad_answer_leaves_an_inactive_station_inactive_and_is_told(
     assert isinstance(script.run(COMMAND, POLLED, Answer(answer, 0.1)), StationInactive)
     assert (script.changes, script.counts()) == ([], {'polls_sent': 1, counter: 1})
     assert [number for number, *_ in script.numbers()] == [*numbers, 2509]
-    assert not script.master.command_sent
+    assert not script.task.sent
 
 
 def test_noise_instead_of_an_answer_to_a_probe_is_told() -> None:
@@ -328,7 +328,7 @@ def test_enq_limit(retries: int) -> None:
         'polls_sent': retries + 1, 'enq_retries': retries, 'enq_limit_exceeded': 1}
     assert script.counts() == {name: count for name, count in counts.items() if count}
     assert script.changes == [(SLAVE, False)]
-    assert script.master.command_sent
+    assert script.task.sent
 
 
 def test_enq_retries_count_afresh_after_an_eot() -> None:
@@ -361,7 +361,7 @@ def test_command_timeout_by_eots(nak: bool) -> None:
         {'naks_sent': 1} if nak else {})
     assert script.changes == []
     assert script.stations[SLAVE].active
-    assert script.master.command_sent
+    assert script.task.sent
 
 
 def test_late_replies_in_a_row_are_counted_until_one_comes_in_time() -> None:
@@ -493,7 +493,7 @@ def test_wrong_command_code() -> None:
         'messages_received': 1, 'replies_received': 1, 'polls_sent': 1, 'acks_sent': 1,
         'invalid_messages': 1}
     assert script.stations[SLAVE].active
-    assert script.master.command_sent
+    assert script.task.sent
 
 
 def test_stale_reply_is_acknowledged_and_counted() -> None:
@@ -799,22 +799,13 @@ def test_stations_are_kept_apart() -> None:
     assert script.changes == [(SLAVE, False)]
 
 
-def test_command_sent_tells_what_has_been_on_the_line() -> None:
+def test_task_is_told_when_its_command_has_been_on_the_line() -> None:
     script = inactive_script()
-    assert not script.master.command_sent
     script.begin(COMMAND, POLLED)
-    assert not script.master.command_sent
+    assert not script.task.sent
     script = inactive_script()
     script.begin(COMMAND, POLLED, SAYS_EOT, SENT)
-    assert script.master.command_sent
-
-
-def test_command_sent_is_taken_back_at_the_next_transaction() -> None:
-    script = MasterScript(SETTINGS)
-    script.run(COMMAND, *(SENT, TIMEOUT) * 3)
-    assert script.master.command_sent
-    script.run(COMMAND, POLLED, TIMEOUT)
-    assert not script.master.command_sent
+    assert script.task.sent
 
 
 def test_every_event_names_its_station() -> None:

@@ -25,6 +25,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import LinkError
 from abdf1_ros.messages import Event
+from support.peers import CommandTask
 
 _JUST_BEFORE = 1e-6
 
@@ -58,7 +59,9 @@ class Silence:
 
 
 class MasterScript:
-    """A master whose line says what a script tells it."""
+    """A master whose line says what a script tells it; ``task`` is the last one."""
+
+    task: CommandTask
 
     def __init__(self, settings: MasterSettings, timing: LineTiming | None = None,
                  routes: dict[int, int] | None = None) -> None:
@@ -72,19 +75,17 @@ class MasterScript:
                                forget_on_send=True)
         self.master = HalfDuplexMaster(
             self.machine, settings, self.stations, self.events.append)
-        self._command: Packet | None = None
         self._result: Packet | LinkError | None = None
         self._sent = self._received = 0
         self._started = False
 
     def _procedure(self, machine: Machine) -> Procedure:
         while True:
-            if self._command is not None:
+            if self._result is None:
                 try:
-                    self._result = yield from self.master.exchange(self._command)
+                    self._result = yield from self.master.exchange(self.task)
                 except LinkError as error:
                     self._result = error
-                self._command = None
             yield Step(None, None)
 
     def run(self, command: Packet, *script: Expect | Answer | Silence) -> Packet | LinkError:
@@ -98,7 +99,7 @@ class MasterScript:
 
     def begin(self, command: Packet, *script: Expect | Answer | Silence) -> None:
         """Carry out the first part of a transaction."""
-        self._command, self._result = command, None
+        self.task, self._result = CommandTask(command, lambda: self.now), None
         self.stations.add((command.dst,))
         if not self._started:
             self._started = True
