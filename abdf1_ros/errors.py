@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The exceptions of the package: one tree, so that callers can catch by what went wrong."""
+"""The exceptions of the package, in one tree."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Abdf1Error(Exception):
 
 
 class FormatError(Abdf1Error, ValueError):
-    """Bytes, or values to become bytes, that break a format."""
+    """Bytes or values that do not fit their format."""
 
 
 class LinkError(Abdf1Error):
@@ -58,13 +58,13 @@ class StationInactive(LinkError):
 
 
 class WrongCommandCode(LinkError):
-    """A reply to our transaction carries another command's code (2505)."""
+    """The reply to our transaction has the code of another command (2505)."""
 
     message = Message.ERR_BAD_FUNCTION_CODE
 
 
 class LineReset(LinkError):
-    """The master has made its slaves drop what they had to send (2511)."""
+    """The master has made its slaves drop their messages (2511)."""
 
     message = Message.ERR_RCVD_NAK_SYMBOL
 
@@ -76,7 +76,7 @@ class NeverTaken(LinkError):
 
 
 class CommandExpired(LinkError):
-    """The command was too old to be sent, or to be sent once more."""
+    """The command was too old to be sent, or to be repeated."""
 
     def __str__(self) -> str:
         """Return that; the specification has no number for it."""
@@ -142,7 +142,7 @@ class Problem(Abdf1Error):
 
 
 class ConfigurationError(Abdf1Error):
-    """All the faults that keep the driver from starting."""
+    """All faults that prevent the start of the driver."""
 
     def __init__(self, problems: list[Problem]) -> None:
         super().__init__('\n'.join(str(problem) for problem in problems))

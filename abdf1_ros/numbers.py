@@ -35,13 +35,13 @@ def whole_number(text: str) -> int | None:
 
 
 def decimal_number(text: str) -> float | None:
-    """Return the number that ``text`` stands for, None for anything else and what is too large."""
+    """Return the number that ``text`` stands for, None for others and too large ones."""
     value = float(text) if _DECIMAL.fullmatch(text) else math.inf
     return value if math.isfinite(value) else None
 
 
 def two_readings(text: str) -> str:
-    """Return what to write instead of "1,000", which may be 1 or 1000; empty for anything else."""
+    """Return what to write instead of "1,000", which may be 1 or 1000; otherwise empty."""
     if not _COMMA_AND_THREE.fullmatch(text):
         return ''
     return f'{text.replace(",", "")} or {text.replace(",", ".")}'

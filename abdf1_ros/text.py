@@ -22,8 +22,8 @@ def printable(text: str) -> str:
     Return ``text`` on one line, with every character visible.
 
     Line ends, escape sequences of terminals, marks that turn the direction of writing and other
-    characters that show nothing become escapes as in a Python string. Letters of any language
-    stay. So a line of a log cannot pass for two, and a terminal shows what was there.
+    invisible characters become escapes as in a Python string. Letters of any language stay. So
+    one entry of a log cannot look like two, and a terminal shows every character.
     """
     if text.isprintable():
         return text
@@ -32,5 +32,5 @@ def printable(text: str) -> str:
 
 
 def value_text(value: float) -> str:
-    """Return a value as text, with as many digits as a float32 is good for."""
+    """Return a value as text, with as many digits as a float32 has."""
     return str(value) if isinstance(value, int) else f'{value:.7g}'

@@ -32,8 +32,8 @@ from typing import Any
 from abdf1_ros.cli.terminal import (
     colour,
     command_parser,
-    drop_output,
     GREEN,
+    has_reader_left,
     prepare_output,
     RED,
     table,
@@ -109,15 +109,16 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         text, is_good = _folder(options) if options.map is None else _pair(options)
         print(text, flush=True)
-    except BrokenPipeError:
-        drop_output()
-    except OSError as error:  # such as a full disk
-        drop_output()
-        print(f'check: cannot print: {error.strerror}', file=sys.stderr)
-        return EXIT_FAULTY
+    except OSError as error:
+        if not has_reader_left(error, _complain):
+            return EXIT_FAULTY
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
     return 0 if is_good else EXIT_FAULTY
+
+
+def _complain(text: str) -> None:
+    print(f'check: {text}', file=sys.stderr)
 
 
 def _pair(options: argparse.Namespace) -> tuple[str, bool]:

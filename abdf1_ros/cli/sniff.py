@@ -38,7 +38,7 @@ import time
 from abdf1_ros.cli.sniff_report import ReportBundle
 from abdf1_ros.cli.terminal import (
     command_parser,
-    drop_output,
+    has_reader_left,
     interruptible,
     prepare_output,
     reason_of,
@@ -207,13 +207,8 @@ def _decode(options: argparse.Namespace) -> int:
         if options.files:
             return _decode_files(options, output)
         return _listen(options, output)
-    except BrokenPipeError:  # whoever reads us has seen enough
-        drop_output()
-        return 0
-    except OSError as error:  # such as a full disk
-        drop_output()
-        print(f'sniff: cannot print: {error.strerror or error}', file=sys.stderr)
-        return EXIT_USAGE
+    except OSError as error:
+        return 0 if has_reader_left(error, _say) else EXIT_USAGE
     except KeyboardInterrupt:  # before there was anything to sum up
         return 0
 

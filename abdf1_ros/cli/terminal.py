@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import errno
 import io
@@ -99,6 +99,15 @@ def ignore_further() -> None:
 def drop_output() -> None:
     """Send what is still to be printed nowhere: whoever reads us has seen enough."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
+    """Tell whether printing has failed because of that; ``tell`` any other, as a full disk."""
+    drop_output()
+    if isinstance(error, BrokenPipeError):
+        return True
+    tell(f'cannot print: {error.strerror or error}')
+    return False
 
 
 def reason_of(name: str, error: OSError) -> str:

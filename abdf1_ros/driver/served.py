@@ -33,7 +33,6 @@ from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.map_file import broken_links
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import ValueType
 
 
 class _MappedTable(DataTable):
@@ -144,13 +143,7 @@ class Served:
 
     def store(self, mapping: Mapping, values: Sequence[float] | str) -> None:
         """Store checked raw values where the other end reads them."""
-        start = _first_word(mapping)
-        if mapping.type is ValueType.BOOL:
-            assert not isinstance(values, str)
-            for change in mapping.codec.bit_changes(start, values):
-                self._table.write_bits(*change)
-        else:
-            self._table.write(start, mapping.codec.encode(values))
+        mapping.codec.store(self._table, _first_word(mapping), values)
         self._table.changed.clear()  # our own writes are not reported
 
 

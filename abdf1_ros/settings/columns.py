@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The columns of the map CSV, and what stands in them."""
+"""The columns of the map CSV and their contents."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ CSV files as spreadsheets write them.
 Accepted: UTF-8 with or without byte order mark, any line ends, comma, semicolon or tab between
 cells, quoted cells, blank lines, empty cells and columns at the end, column names in any
 letter case, spaces around values, and lines starting with # as comments. A first line such as
-sep=; only tells a spreadsheet what stands between cells, and is left out.
+sep=; only tells a spreadsheet the separator, and is left out.
 
-A cell ends on the line it begins on. No column needs more, and a quote that somebody forgot to
-close would otherwise take in the rows up to the next quote, and nobody would miss them.
+A cell ends on the line it begins on. No column needs more. Otherwise a forgotten closing quote
+would hide all rows up to the next quote, without an error.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'
 _SEPARATOR_LINE = re.compile(r'"?sep=\W*', re.IGNORECASE)
 
-# Far more than a file with a row for every word of a PLC has.
+# Far more than a file with one row for each word of a PLC needs.
 _LARGEST = 10_000_000
-# csv.reader takes no more in one cell.
+# The limit of csv.reader for one cell.
 _LONGEST_LINE = 131_072
 # The beginning of a cell is enough to find it.
 _SHOWN = 100
-# How much a wrong name is like the column that may be meant, from 0 to 1.
+# From which similarity (0 to 1) on a wrong name is taken for a mistyped column.
 _ALIKE = 0.7
-# How files of other kinds begin that are given a name on .csv: packed, and old ones of Windows.
+# The first bytes of other files that were renamed to .csv: zip archives, old Excel files.
 _WORKBOOKS = (b'PK\x03\x04', bytes.fromhex('D0CF11E0A1B11AE1'))
 _LIKE_AN_ADDRESS = re.compile(r'[A-Z]{1,3}\d*:\d+\S*', re.ASCII)
 
@@ -96,7 +96,7 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
 
 def read_good_rows(path: str, known: Sequence[str]) -> tuple[list[Row], list[Problem]]:
     """
-    Read the data rows of a file that are cells under columns, and tell what the others are.
+    Read the data rows whose cells fit the columns, and return the faults of the others.
 
     Raises ConfigurationError with every fault of the file as a whole. So it does when fewer
     rows are good than not: then the good ones may be shifted too.
@@ -134,8 +134,8 @@ def read_good_rows(path: str, known: Sequence[str]) -> tuple[list[Row], list[Pro
 
 
 def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
-    """Return the lines that may be rows, the header at least, each with its number."""
-    # str.splitlines knows more ends than CSV.
+    """Return the header and the lines that may be rows, each with its number."""
+    # str.splitlines also divides at characters that are not line ends in CSV.
     lines = enumerate(io.StringIO(_read_text(path), newline=''), 1)
     found = [(number, line) for number, line in lines
              if line.strip(_BLANK) and not line.lstrip().startswith('#')
@@ -148,7 +148,7 @@ def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
 
 def _read_text(path: str) -> str:
     try:
-        # A pipe into which nobody writes would hold us up for ever.
+        # Opening a pipe without a writer would block for ever.
         if Path(path).is_fifo():
             raise Problem(path, 'is a pipe, not a file')
         with Path(path).open('rb') as file:
@@ -164,7 +164,7 @@ def _read_text(path: str) -> str:
 
 
 def _check_text(place: Place, line: str) -> None:
-    """Raise Problem where a line has bytes that are no text, or a zero as UTF-16 has."""
+    """Raise Problem where a line is not UTF-8 text, or has a zero byte as UTF-16 has."""
     raw = line.encode(errors='surrogateescape')
     try:
         raw.decode()
@@ -180,7 +180,7 @@ def _cells(place: Place, line: str, delimiter: str) -> list[str]:
     """Return the stripped cells of a line; raise Problem where it cannot be divided."""
     if len(line) > _LONGEST_LINE:
         raise Problem(place, f'this line has {len(line)} characters, at most {_LONGEST_LINE} go')
-    # Only an open quote makes it go on to a second line.
+    # Only an open quote makes a cell go on to a second line.
     reader = csv.reader([line, ''], delimiter=delimiter, skipinitialspace=True)
     cells = next(reader)
     if reader.line_num > 1:

@@ -15,9 +15,10 @@
 """
 Heartbeats, fallback values and reads that depend on a running PLC, as a map CSV asks for them.
 
-A heartbeat tells the PLC that the bridge, and those it vouches for, are alive. A fallback value is
-written when nobody writes any more. Publish_While withholds values of a PLC whose program stands
-still. None of them is a safety function. The rules are numbered in docs/heartbeats.md.
+A heartbeat tells the PLC that the bridge is alive, and that messages of the topics in Requires
+still come. A fallback value is written when no message comes any more. Publish_While withholds
+values of a PLC whose program does not run. None of them is a safety function. The numbers of rules
+are those of docs/heartbeats.md.
 """
 
 from __future__ import annotations
@@ -46,10 +47,10 @@ _COUNTING = (ValueType.INT16, ValueType.UINT16)
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
     """
-    A word that counts as long as all is well (rules 1 to 4).
+    A word that counts while its conditions hold (rules 1 to 4).
 
-    ``requires`` are write topics whose messages it vouches for, each with a message no older than
-    ``requires_timeout`` (ms, None where there are none).
+    Each write topic in ``requires`` must have a message not older than ``requires_timeout`` (ms,
+    None where there are no such topics).
     """
 
     requires: tuple[str, ...] = ()
@@ -71,10 +72,10 @@ class Fallback:
 @dataclass(frozen=True, slots=True)
 class PublishWhile:
     """
-    What has to hold for values to be published (rules 13 to 15).
+    The condition for values to be published (rules 13 to 15).
 
-    ``tag`` is that of a counter which the PLC's program runs, None for the mode RUN; ``timeout``
-    (ms) is how long the counter may stand still, None for RUN.
+    ``tag`` is that of a counter in the PLC's program, None for the mode RUN; ``timeout`` (ms) is
+    how long the counter may stay unchanged, None for RUN.
     """
 
     tag: str | None
@@ -87,13 +88,13 @@ class PublishWhile:
 
 
 class ReportFault(Protocol):
-    """Takes what is wrong with a cell."""
+    """Takes the fault of a cell."""
 
     def __call__(self, column: str, text: str, *, is_superfluous: bool = False) -> None: ...
 
 
 def number_in(row: Row, column: str, limits: tuple[int, int], fault: ReportFault) -> int | None:
-    """Return a whole number of ms; a fault where it is none or outside of ``limits``."""
+    """Return a whole number of ms; report a fault where it is not within ``limits``."""
     text = row.get(column)
     value = whole_number(text)
     if value is not None and limits[0] <= value <= limits[1]:
@@ -173,7 +174,7 @@ def _fallback_values(row: Row, kind: ValueType, length: int, limits: tuple[float
 
 def read_publish_while(row: Row, command: str, publishes_always: bool,
                        fault: ReportFault) -> PublishWhile | None:
-    """Return what a row's values depend on, None for nothing (rules 13 and 14)."""
+    """Return the condition for a row's values, None for none (rules 13 and 14)."""
     condition, timeout = row.get('Publish_While'), row.get('Heartbeat_Timeout')
     if not condition:
         if timeout:
@@ -194,7 +195,7 @@ def read_publish_while(row: Row, command: str, publishes_always: bool,
 
 
 def counts(kind: ValueType, length: int) -> bool:
-    """Tell whether a mapping may be the counter of Publish_While: one integer word (rule 13)."""
+    """Tell whether Publish_While may name this mapping: one integer word (rule 13)."""
     return kind in _COUNTING and length == 1
 
 

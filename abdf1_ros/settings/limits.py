@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From the values of a topic to what the PLC is to hold, if all of it can and may be written."""
+"""From the values of a topic to raw values for the PLC, within all limits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from abdf1_ros.text import value_text
 
 
 def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[float] | str:
-    """Return what the PLC is to hold; FormatError unless all of it can and may be written."""
+    """Return the raw values to write; FormatError where a limit or the type forbids one."""
     codec, scaling = mapping.codec, mapping.scaling
     if isinstance(values, str) or scaling is None:
         codec.check(values)
@@ -35,7 +35,7 @@ def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[floa
     raw = scaling.raw(values, mapping.type)
     codec.check(raw)
     _check_limits(mapping, values)
-    if mapping.type is not ValueType.FLOAT32:  # rounding must not lead past a limit either
+    if mapping.type is not ValueType.FLOAT32:  # rounding must not exceed a limit either
         _check_limits(mapping, scaling.publish(raw), ', the nearest that can be written,')
     return raw
 
@@ -44,7 +44,7 @@ def _check_limits(mapping: Mapping, values: Sequence[float] | str, what: str = '
     if isinstance(values, str):
         return
     minimum, maximum = mapping.minimum, mapping.maximum
-    if mapping.message_type is ValueType.FLOAT32:  # limits as near as values can come to them
+    if mapping.message_type is ValueType.FLOAT32:  # the nearest possible values
         minimum, maximum = array('f', (minimum, maximum))
     for index, value in enumerate(values):
         if not minimum <= value <= maximum:

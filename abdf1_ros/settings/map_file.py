@@ -63,9 +63,9 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
 
 def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFault]]:
     """
-    Yield what depends on a row that is not there.
+    Yield the rows that depend on a missing row, with the fault.
 
-    A row that was left out takes those that depend on it along (docs/heartbeats.md, rule 15).
+    A row that was left out takes the rows that depend on it along (docs/heartbeats.md, rule 15).
     """
     tags = {mapping.tag: mapping for mapping in mappings}
     topics = {mapping.topic for mapping in mappings if mapping.writes}
@@ -113,17 +113,17 @@ def _processor(mapping: Mapping) -> Processor | None:
 
 
 def _changes(mapping: Mapping) -> bool:
-    """Tell whether a mapping writes, by messages or by itself."""
+    """Tell whether a mapping writes, for messages or as a heartbeat."""
     return mapping.writes or mapping.heartbeat is not None
 
 
 def _owns(mapping: Mapping) -> bool:
-    """Tell whether nobody else may write the words of a mapping (rules 1 and 12)."""
+    """Tell whether no other row may write the words of a mapping (rules 1 and 12)."""
     return mapping.heartbeat is not None or mapping.fallback is not None
 
 
 class _Clashes:
-    """Find what cannot stand beside the rows before it; each fault names both rows."""
+    """Find rows that clash with rows before them; each fault names both rows."""
 
     def __init__(self) -> None:
         self._names: dict[str, Mapping] = {}
@@ -135,7 +135,7 @@ class _Clashes:
         self._gateways: dict[int, Mapping] = {}
 
     def add(self, mapping: Mapping) -> list[CellFault]:
-        """Return the clashes of ``mapping``; without any, it counts for the rows after it."""
+        """Return the clashes of ``mapping``; without any, remember it for the rows after it."""
         faults: list[CellFault] = []
 
         def clash(column: str, other: Mapping, text: str) -> None:
@@ -146,7 +146,7 @@ class _Clashes:
             same = 'is already the tag' if mapping.tag == other.tag \
                 else f'becomes "{mapping.name}", the name'
             clash('Tag', other, f'tag "{shown(mapping.tag)}" {same}')
-        # A topic that has its name from the tag gets another with it.
+        # A topic named after the tag is changed with the tag.
         is_named = not faults or mapping.topic != mapping.name
         if is_named and mapping.reads and (other := self._readers.get(mapping.topic)):
             clash('Topic', other, f'read topic "{mapping.topic}" is the topic')
@@ -177,7 +177,7 @@ class _Clashes:
         return faults
 
     def _check_route(self, mapping: Mapping, clash: Clash) -> None:
-        """Find a station that is to be reached in two ways: replies tell only its number."""
+        """Find a station with two routes: replies tell only the number of the station."""
         if mapping.serves:
             return
         if (other := self._routed.get(mapping.station)) and other.via != mapping.via:
@@ -193,7 +193,7 @@ class _Clashes:
                                 'in the row')
 
     def _check_words(self, mapping: Mapping, clash: Clash) -> None:
-        """Find another writer of words that a heartbeat or a Fallback has for itself."""
+        """Find another writer of words that only a heartbeat or a Fallback may write."""
         for other in self._changing if _changes(mapping) else ():
             if (_owns(mapping) or _owns(other)) and mapping.shares_words(other):
                 clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '

@@ -59,10 +59,10 @@ _Choice = TypeVar('_Choice', bound=Enum)
 @dataclass(frozen=True, slots=True)
 class CellFault:
     """
-    What is wrong with a row, in parts, as a row may come from a file or a command line.
+    The fault of a cell, in parts, as a row may come from a file or a command line.
 
-    ``text`` says it, or goes on after the ``value`` in ``column``: "should be one of Low, High".
-    With ``is_superfluous`` there should be no value at all. ``args`` fill the numbered
+    ``text`` is the whole fault, or what follows the ``value`` in ``column``: "should be one of
+    Low, High". With ``is_superfluous`` the cell should be empty. ``args`` fill the numbered
     ``message``, except for the item.
     """
 
@@ -103,7 +103,7 @@ class RowReader:
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
         command = self._choice('Command', Command, None)
-        # 255 is everybody, who may be written to but cannot answer.
+        # 255 is a broadcast: all stations take it, and none answers.
         last_station = BROADCAST if command is Command.WRITE else MAX_STATION
         station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
                                MAX_STATION + 1)
@@ -137,7 +137,7 @@ class RowReader:
         return replace(mapping, remarks=remarks) if remarks else mapping
 
     def _with_conditions(self, mapping: Mapping) -> Mapping:
-        """Return the mapping with its heartbeat, fallback and what its values depend on."""
+        """Return the mapping with its heartbeat, fallback and condition for values."""
         row, command, fault = self._row, mapping.command, self._condition_fault
         heartbeat = None
         if command is Command.HEARTBEAT:
@@ -264,7 +264,7 @@ class RowReader:
         return access
 
     def _is_read_only(self, command: Command | None) -> bool:
-        """Tell whether others may only read the words of a Serve row."""
+        """Tell whether the other end may only read the words of a Serve row."""
         return command is Command.SERVE and self._row.get('Access').lower() == READ_ONLY.lower()
 
     def _processor(self, plc_type: PlcType, command: Command | None,
@@ -293,7 +293,7 @@ class RowReader:
         return None
 
     def _check(self, mapping: Mapping) -> None:
-        """Check what concerns more than one column."""
+        """Check what depends on more than one column."""
         self._check_type(mapping)
         if self.faults:
             return
@@ -348,7 +348,7 @@ class RowReader:
                 and not mapping.dialect.writes_bits:
             self._fault('Address', f'Access {self._row.get("Access")} has no command that '
                                    'changes single bits; write the whole word, or only read')
-        # A structure that we serve is our own: the program behind ROS is its processor.
+        # Structures of our own table may be written: there the ROS program is the processor.
         fault = None if mapping.serves else write_fault(address, mapping.type, mapping.length)
         if fault:
             self._fault('Address', fault)

@@ -32,7 +32,7 @@ from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, val
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.values import Codec, ValueType, WordOrder
 
-# Access of a Serve row that the other end may only read.
+# Access of a Serve row whose words the other end may only read.
 READ_ONLY = 'Read'
 
 
@@ -40,7 +40,7 @@ def _or_empty(value: int | None) -> str:
     return '' if value is None else str(value)
 
 
-# By column: the part of a mapping that it stands in, and how that is written.
+# By column: the attribute of a mapping, and how its value is written in a cell.
 _DEPENDENT_CELLS: dict[str, tuple[str, Callable[[Any], str]]] = {
     'Requires': ('heartbeat', lambda entry: ' '.join(entry.requires)),
     'Requires_Timeout': ('heartbeat', lambda entry: _or_empty(entry.requires_timeout)),
@@ -77,7 +77,7 @@ class Mapping:
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
-    is the gateway that the station is behind, None for a station of the line itself. With
+    is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
     ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
     ``remarks`` say what is odd about the row.
@@ -108,8 +108,7 @@ class Mapping:
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None
     remarks: tuple[str, ...] = field(default=(), compare=False)
-    # What turns words into raw values and back, and what is said to the PLC: made once, they
-    # are needed at every read.
+    # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False, compare=False)
     dialect: Dialect = field(init=False, repr=False, compare=False)
 
@@ -153,7 +152,7 @@ class Mapping:
         return self.command not in (Command.READ, Command.HEARTBEAT)
 
     def shares_words(self, other: Mapping) -> bool:
-        """Tell whether both have words of one station in common; bits only where they meet."""
+        """Tell whether both have words of one station in common; for bits, the same bits."""
         if (self.station, self.address.area) != (other.station, other.address.area):
             return False
         unit = 1 if self.type is other.type is ValueType.BOOL else 16

@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""ROS names made of tags: what ``rcl`` accepts, and nothing that surprises."""
+"""ROS names made of tags, as ``rcl`` accepts them."""
 
 from __future__ import annotations
 
 import re
 
-# A topic name of 247 characters is the longest that DDS takes; 150 leave room for the
-# namespace, the node and "/write/".
+# DDS takes topic names of at most 247 characters; 150 leave room for the namespace, the node and
+# "/write/".
 MAX_LENGTH = 150
 
 

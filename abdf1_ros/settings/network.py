@@ -35,7 +35,6 @@ from abdf1_ros.settings.csv_table import read_rows, shown
 from abdf1_ros.settings.station_lists import octal_remarks
 
 MODES = ('Master', 'Slave', 'Peer')
-SUPPORTED_MODES = MODES
 _MODE_WORDS = {
     'fullduplex': 'Peer', 'full': 'Peer', 'df1fullduplex': 'Peer', 'peertopeer': 'Peer',
     'halfduplex': 'Master, or Slave where another is the master', 'df1halfduplexmaster': 'Master',
@@ -54,8 +53,8 @@ class NetField:
     A number lies from ``low`` to ``high`` or is one of ``choices``; a text is one of
     ``choices`` in any letter case, or anything where there are none. A bad value is reported
     with ``message``, whose places after the value are filled from ``message_args``.
-    ``other_words`` are what others call a choice, in small letters alone, and what it is here;
-    ``also`` are ways to write one that are accepted.
+    ``other_words`` are names of choices in other programs, in lower case, with the choice to
+    advise; ``also`` are other spellings that are accepted.
     """
 
     column: str
@@ -159,7 +158,7 @@ class Network:
         'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
     polling: str = _net(
         'Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
-    # What is odd about how the file says it.
+    # Remarks about the way the file is written.
     remarks: tuple[str, ...] = field(default=(), compare=False)
 
     @property
@@ -213,7 +212,7 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
     """
     Check ``values`` (by field name: text, and where it comes from) and make a network of them.
 
-    What is not among them is taken from ``base``. Raises ConfigurationError.
+    Other fields are taken from ``base``. Raises ConfigurationError.
     """
     base = base or Network()
     checked: dict[str, Any] = {entry.name: getattr(base, entry.name) for entry in fields(base)}
@@ -221,20 +220,12 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
     for name, (text, where) in values.items():
         try:
             checked[name] = FIELDS[name].parse(text, where)
-            _check_mode(name, checked[name], where)
             _check_port(name, checked[name], where)
         except Problem as problem:
             problems.append(problem)
     if problems:
         raise ConfigurationError(problems)
     return Network(**checked)
-
-
-def _check_mode(name: str, value: int | str, where: Place | str) -> None:
-    if name == 'mode' and value not in SUPPORTED_MODES:
-        raise Problem(where, f'Mode = "{value}" is not available yet',
-                      Message.CRT_UNSUPPORTED_MODE,
-                      (MODES.index(str(value)), ', '.join(SUPPORTED_MODES)))
 
 
 def _check_port(name: str, value: int | str, where: Place | str) -> None:
@@ -247,7 +238,7 @@ def _check_port(name: str, value: int | str, where: Place | str) -> None:
 
 
 def _is_url(text: str) -> bool:
-    """Tell whether ``text`` is the URL of a device server: host and port, and nothing behind."""
+    """Tell whether ``text`` is the URL of a device server: host, port, and nothing after them."""
     try:
         url = urlsplit(text)
         return '://' in text and url.scheme in _DEVICE_SERVERS and bool(

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is odd about settings that are valid: they are run with, and somebody may wonder later."""
+"""Remarks about settings that are valid, but may have effects that nobody expects."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _time_remarks(network: Network) -> Iterator[str]:
     if network.timeout >= network.cmd_timeout:
         yield (f'Timeout {network.timeout} ms is not shorter than Cmd_Timeout '
                f'{network.cmd_timeout} ms: after one lost frame there is no time to repeat it')
-    # Before the reply come the command and, in half duplex, the poll.
+    # The command comes before the reply, and in half duplex the poll as well.
     times = 1 if network.mode == 'Peer' else 2
     if times * network.tx_delay >= network.cmd_timeout:
         yield (f'TX_Delay {network.tx_delay} ms comes {"once" if times == 1 else "twice"} before '

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Engineering values: what the columns Scale and Offset make of the raw values of a PLC."""
+"""Engineering values: raw values of a PLC converted by the columns Scale and Offset."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Scaling:
         return array('f', [value * self.scale + self.offset for value in raw])
 
     def raw(self, values: Sequence[float], kind: ValueType) -> list[float]:
-        """Return the nearest raw values; FormatError where ``kind`` does not reach that far."""
+        """Return the nearest raw values; FormatError where they exceed the range of ``kind``."""
         low, high = kind.range
         found: list[float] = []
         for index, value in enumerate(values):
@@ -60,15 +60,15 @@ class Scaling:
         """
         Return why values of ``kind`` cannot be scaled so, None when they can.
 
-        What is published has to be a float32, and of 16-bit values each its own: then writing
-        it back gives the same raw value.
+        Published values are float32. Two different 16-bit values must not become the same
+        float32: only then does writing it back give the same raw value.
         """
         if kind in (ValueType.BOOL, ValueType.STRING):
             return f'Scale and Offset are for numbers, not for {kind.value}'
         widest = max(map(abs, self.limits(kind)))
         if kind is not ValueType.FLOAT32 and widest > FLOAT_MAX:
             return f'a float32 cannot hold {self._range(kind)}'
-        # So the float32 is at most a quarter of a raw step off, the next raw value half of one.
+        # The float32 is off by a quarter of a raw step at most; half a step would be too much.
         if kind.words == 1 and 2 * _float32_step(widest) > abs(self.scale):
             return ('a float32 has too few digits to tell the values apart in '
                     f'{self._range(kind)}')

@@ -43,7 +43,7 @@ def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
 
 
 def octal_remarks(row: Row) -> Iterator[str]:
-    """Yield that a Station with a leading zero is decimal here; panels of a PLC-5 show octal."""
+    """Yield a remark on a Station with a leading zero: here decimal, on PLC-5 panels octal."""
     text = row.get('Station')
     if _LEADING_ZERO.fullmatch(text) and int(text, 8) != int(text):
         yield str(Problem(row.where('Station'), (

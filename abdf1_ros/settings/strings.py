@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 
-COUNTED_CHARACTERS = 82  # of an ST element, behind its length word
+COUNTED_CHARACTERS = 82  # of an ST element, after its length word
 COUNTED_WORDS = 1 + COUNTED_CHARACTERS // 2
 
 
@@ -35,7 +35,7 @@ def decode_counted(data: bytes) -> str:
 
 
 def encode_counted(text: str) -> bytes:
-    """Return an ST element; FormatError for more than 82 characters and for strange ones."""
+    """Return an ST element; FormatError for more than 82 characters or not Latin-1."""
     characters = _characters(text)
     if len(characters) > COUNTED_CHARACTERS:
         raise FormatError(
@@ -45,12 +45,12 @@ def encode_counted(text: str) -> bytes:
 
 
 def decode_packed(data: bytes) -> str:
-    """Return the text in words that hold characters only, without the NULs behind it."""
+    """Return the text in words that hold characters only, without the NULs after it."""
     return _swap(data).rstrip(b'\0').decode('latin-1')
 
 
 def encode_packed(text: str, words: int) -> bytes:
-    """Return words full of characters, NULs behind ``text``; FormatError when it is too long."""
+    """Return words of characters, NULs after ``text``; FormatError when it is too long."""
     characters = _characters(text)
     if len(characters) > 2 * words:
         raise FormatError(

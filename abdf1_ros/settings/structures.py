@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What of a structure in a PLC can be read as what, and what of it may be written."""
+"""Which words of a structure in a PLC have which type, and which may be written."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from abdf1_ros.settings.values import ValueType
 
 
 def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
-    """Return which of the words that ``length`` elements take is no ``kind``, None if all are."""
+    """Return the word of ``length`` elements that is not a ``kind``, None if all are."""
     if not address.file_type.is_structure or kind is ValueType.BOOL:
         return None
     for place in _places(address, kind, length):
@@ -34,7 +34,7 @@ def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
 
 
 def write_fault(address: Address, kind: ValueType, length: int) -> str | None:
-    """Return which part of a structure is not for others to write, None if all may be."""
+    """Return the part of a structure that must not be written, None if all may be."""
     if not address.file_type.is_structure:
         return None
     if kind is ValueType.BOOL:

@@ -27,6 +27,7 @@ from typing import Any
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.settings import strings
 
@@ -47,7 +48,7 @@ class ValueType(Enum):
 
     @property
     def words(self) -> int:
-        """Return the words that one element takes in a PLC (a bit: none of its own)."""
+        """Return the words that one element takes in a PLC, 0 for a bit."""
         return _WORDS[self]
 
     @property
@@ -135,7 +136,7 @@ class Codec:
 
     @property
     def element_words(self) -> int:
-        """Return the words that have to stay together to be one value."""
+        """Return the words of one value, which must not be divided."""
         return 1 if self.packed else max(1, self.type.words)
 
     @property
@@ -196,6 +197,15 @@ class Codec:
         size = self.type.words * 2
         mask = (1 << 8 * size) - 1
         return b''.join((int(value) & mask).to_bytes(size, 'little') for value in values)
+
+    def store(self, table: DataTable, start: Address, values: Sequence[float] | str) -> None:
+        """Write values into a data table; bits leave the others of their words as they are."""
+        if self.type is not ValueType.BOOL:
+            table.write(start, self.encode(values))
+            return
+        assert not isinstance(values, str)
+        for change in self.bit_changes(start, values):
+            table.write_bits(*change)
 
     def bit_changes(self, start: Address,
                     values: Sequence[float]) -> list[tuple[Address, int, int]]:

@@ -82,7 +82,7 @@ class _Mover:
             changed = [(value + steps) % _RAMP_TOP for value in values]
         else:
             changed = [int(not value) if steps % 2 else value for value in values]
-        _store(table, self.address, self.codec, changed)
+        self.codec.store(table, self.address, changed)
 
 
 @dataclass(slots=True)
@@ -324,7 +324,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     except (FormatError, NoSuchFile) as error:
         raise Problem(row.where('Address'), str(error)) from None
     if row.get('Values'):
-        _store(plc.table, address, codec, _values(row, codec))
+        codec.store(plc.table, address, _values(row, codec))
     if motion is not Motion.NONE:
         if codec.type is ValueType.STRING:
             raise Problem(row.where('Motion'), 'a string does not move')
@@ -393,13 +393,3 @@ def numbers(texts: Sequence[str]) -> list[float]:
             raise ValueError(f'"{text}" should be a number')
         values.append(value)
     return values
-
-
-def _store(table: DataTable, address: Address, codec: Codec,
-           values: list[float] | str) -> None:
-    if codec.type is not ValueType.BOOL:
-        table.write(address, codec.encode(values))
-        return
-    assert not isinstance(values, str)
-    for change in codec.bit_changes(address, values):
-        table.write_bits(*change)

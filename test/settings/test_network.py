@@ -26,8 +26,8 @@ from abdf1_ros.settings.network import (
     FIELDS,
     load_network,
     make_network,
+    MODES,
     Network,
-    SUPPORTED_MODES,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -46,7 +46,7 @@ NUMBERS = [
     ('TX_Delay', 'tx_delay', 0, ('0', '65535'), ('-1', '65536', '0.5')),
 ]
 CHOICES = [
-    ('Mode', 'mode', 'Master', SUPPORTED_MODES),
+    ('Mode', 'mode', 'Master', MODES),
     ('PLC_Type', 'plc_type', 'PLC5', ('PLC2', 'PLC3', 'PLC5', 'SLC')),
     ('Error_Code', 'error_code', 'CRC', ('BCC', 'CRC')),
     ('Parity', 'parity', 'None', ('None', 'Even', 'Odd')),
@@ -171,15 +171,6 @@ def test_long_cell_is_shown_without_its_end(path: Path, column: str) -> None:
     fault, = faults(path, column, 'x' * 5000)
     assert f'{column} = "{"x" * 100}..." should be ' in fault
     assert len(fault) < 500
-
-
-@pytest.mark.parametrize('mode, number', [('Slave', 1), ('peer', 2)])
-def test_mode_that_this_version_does_not_have(
-        path: Path, monkeypatch: pytest.MonkeyPatch, mode: str, number: int) -> None:
-    monkeypatch.setattr('abdf1_ros.settings.network.SUPPORTED_MODES', ('Master',))
-    assert faults(path, 'Mode', mode) == [
-        f'FILE:2:1 (Mode): 2554 CRT_UNSUPPORTED_MODE: Unsupported Driver Mode ({number}), '
-        f'Supported Mode(s): Master; Mode = "{mode.title()}" is not available yet']
 
 
 def test_every_numbered_fault_is_critical(path: Path) -> None:

@@ -39,7 +39,7 @@ from types import FrameType
 
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
-from abdf1_ros.cli.terminal import command_parser, drop_output, prepare_output, seconds_option
+from abdf1_ros.cli.terminal import command_parser, has_reader_left, prepare_output, seconds_option
 from abdf1_ros.errors import FormatError
 from abdf1_ros.text import printable
 from rclpy.utilities import remove_ros_args
@@ -197,13 +197,8 @@ def main(args: Sequence[str] | None = None) -> int:
     except (FormatError, RuntimeError, ValueError) as error:  # also rclpy's, for --ros-args
         _say(' '.join(str(error).split()))
         return EXIT_USAGE
-    except BrokenPipeError:  # whoever reads us has seen enough
-        drop_output()
-        return 0
-    except OSError as error:  # such as a full disk
-        drop_output()
-        _say(f'cannot print: {error.strerror or error}')
-        return EXIT_USAGE
+    except OSError as error:
+        return 0 if has_reader_left(error, _say) else EXIT_USAGE
 
 
 def _run(options: argparse.Namespace, words: list[str]) -> int:

@@ -37,6 +37,7 @@ from abdf1_ros.cli.terminal import (
     colour,
     drop_output,
     GREEN,
+    has_reader_left,
     interruptible,
     prepare_output,
     Progress,
@@ -83,14 +84,12 @@ def _run(options: argparse.Namespace) -> int:
         for problem in error.problems:
             _complain(str(problem))
         return EXIT_USAGE
-    except BrokenPipeError:
-        drop_output()
-        return EXIT_USAGE if options.command == 'write' else 0  # nothing has been written then
-    except OSError as error:  # the port's has no number, that of a full disk has
-        if error.errno is not None:
-            drop_output()
-        _complain(f'cannot print: {error.strerror}' if error.strerror else str(error))
-        return EXIT_USAGE
+    except OSError as error:
+        if error.errno is None:  # of the port
+            _complain(str(error))
+        elif has_reader_left(error, _complain) and options.command != 'write':
+            return 0
+        return EXIT_USAGE  # nothing has been written then
     except PortLost as error:
         _complain(str(error))
         return EXIT_FAILED
