@@ -61,6 +61,11 @@ class FallbackRow:
         self.is_under_way = False
         self.is_held_up = False
         self.stands = False
+        # From when the time counts: the last confirmed message, or, after a fallback, the first
+        # whose outcome is unknown.
+        self._counts_from = -math.inf
+        # Whether a message has ended otherwise since the last that was confirmed.
+        self._has_failed = False
         self._values = mapping.fallback.values
         self._settle_time = 2 * cmd_timeout
         self._due_since = 0.0
@@ -83,11 +88,16 @@ class FallbackRow:
         """
         Return when the fallback becomes due (clock value in s), infinite for never.
 
-        ``youngest`` is when the youngest message was published that waits or is under way.
+        ``youngest`` is when the youngest message was published that waits or is under way. It is
+        waited for while all goes well: there is always one where they come faster than the PLC
+        refuses them.
         """
         if self.cause is not None:
             return self._due_since
-        return math.inf if self.stands else max(self.refreshed, youngest) + self.after
+        if self.stands:
+            return math.inf
+        return self.after + (
+            self._counts_from if self._has_failed else max(self._counts_from, youngest))
 
     def judge(self, now: float, youngest: float) -> None:
         """Make the fallback due when the time of the last message is up."""
@@ -130,11 +140,14 @@ class FallbackRow:
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
         """Take note how a message of the row ended that had the line (rule 7)."""
+        self._has_failed = outcome is not Outcome.WRITTEN
         if outcome is Outcome.WRITTEN:
-            self.refreshed = max(self.refreshed, requested)
+            self._counts_from = self.refreshed = max(self.refreshed, requested)
             self._is_unconfirmed, self._again_at = False, math.inf
         elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
             self._is_unconfirmed = True
+            if self.stands:
+                self._counts_from = requested
         else:
             return
         self.stands = False

@@ -69,6 +69,7 @@ class Cell:
         self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
         self.is_alive = True
         self.refused: set[str] = set()
+        self.spared: int | None = None  # this value is taken all the same
         self.writes: list[tuple[float, str, int]] = []
         self._tick()
         if start:
@@ -87,7 +88,9 @@ class Cell:
 
     def _serve(self, command: Packet) -> Packet:
         before = self._words()
-        if command.cmd == 0x0F and command.data[0] == 0x67 and self.refused & self._named(command):
+        is_spared = int.from_bytes(command.data[-2:], 'little') == self.spared
+        if command.cmd == 0x0F and command.data[0] == 0x67 and not is_spared \
+                and self.refused & self._named(command):
             return command.reply(sts=0x10)
         reply = self.plc.serve(command)
         after = self._words()
@@ -321,6 +324,22 @@ def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
     cell.run(2.0)
     assert cell.word('N7:0') == 7
     assert TIMEOUT in cell.results()
+
+
+@pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
+def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
+    speed = speed_row()
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(0.1)
+    cell.refused, cell.spared = {'N7:0'}, 7
+    cell.publish(speed, 99, times=round(2.0 / gap), gap=gap)
+    cell.run(AFTER + 0.1)
+    assert cell.word('N7:0') == 7
+    assert cell.results().count(TIMEOUT) == 1
+    cell.run(1.0)
+    assert cell.results().count(TIMEOUT) == 1  # it stands, whatever is refused after it
 
 
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
