@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a link counts and reports, and how its commands end; the same at every kind of node."""
+"""What every kind of link counts and reports, and how its commands end."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
 
 
 def wrong_message(packet: Packet, station: int) -> Event:
-    """Return the event of a message from ``station`` that answers nothing outstanding."""
+    """Return the event of a message from ``station`` that is not a reply to any command."""
     return Event(Message.ERR_WRONG_MESSAGE, (packet.src, packet.dst, packet.tns), station)
 
 
@@ -67,7 +67,7 @@ class Accounting:
         self.report(Event(message, args, station))
 
     def sent(self, packet: Packet) -> None:
-        """Count a message of ours, once however often it is sent."""
+        """Count a message of ours once, also if it is sent several times."""
         if packet.is_reply:
             self.counters.replies_sent += 1
             self.counters.error_messages_sent += packet.sts != 0
@@ -83,7 +83,7 @@ class Accounting:
             self.counters.commands_received += 1
 
     def stale(self, reply: Packet) -> None:
-        """Count and report a reply to nothing outstanding."""
+        """Count and report a reply that no command waits for."""
         self.counters.stale_messages += 1
         self.report(wrong_message(reply, reply.src))
 
@@ -111,7 +111,7 @@ class Accounting:
             task.reply(reply)
 
     def late(self, station: int, *, keeps_others_waiting: bool) -> None:
-        """Account for a reply that has not come within Cmd_Timeout (S0, counter 2545)."""
+        """Count and report a reply that has not come within Cmd_Timeout (S0, counter 2545)."""
         self.counters.command_timeouts += 1
         self._stations[station].overdue += keeps_others_waiting
         self.note(Message.ERR_COMMAND_TIMEOUT, station=station)

@@ -45,7 +45,7 @@ class Checksum(Enum):
         return crc16(covered if station is None else bytes((station, 0x02)) + covered)
 
     def encode(self, value: int) -> bytes:
-        """Return the check as it stands on the line: the CRC low byte first (M 5-6)."""
+        """Return the check bytes as they are sent: of a CRC the low byte first (M 5-6)."""
         return value.to_bytes(self.size, 'little')
 
 

@@ -36,7 +36,7 @@ from abdf1_ros.df1.packet import HEADER_SIZE
 MAX_LINK_DATA = 261
 
 # Bytes that wait to be read while a machine does not listen, some seconds of the fastest line.
-# What comes beyond is lost, as it is in a UART.
+# Further bytes are lost, as in a UART.
 MAX_WAITING = 65536
 
 
@@ -90,7 +90,7 @@ def poll_frame(station: int) -> bytes:
 
 
 class FrameFault(Enum):
-    """Why a received frame is not to be used."""
+    """Why a received frame cannot be used."""
 
     BAD_CHECK = 'wrong check'
     TOO_SHORT = 'shorter than a header'
@@ -115,13 +115,13 @@ _CONTROLS = {pair: Control(Code(pair[1])) for pair in (ACK, NAK, EOT, ENQ)}
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A pair DLE x that is not a symbol, or means nothing here; ``byte`` is x."""
+    """A pair DLE x that is not a symbol, or not one of this duplex; ``byte`` is x."""
 
     byte: int
 
     @property
     def is_misplaced(self) -> bool:
-        """Tell whether it is a symbol elsewhere (S0, message 2514)."""
+        """Tell whether it is a symbol of the other duplex (S0, message 2514)."""
         return self.byte in _CODES
 
 
@@ -168,14 +168,14 @@ class Need(Enum):
 MORE: Final = Need.MORE
 
 Decoded = Symbol | Need | None
-"""What a step comes to: a symbol, the need of more bytes, or nothing but the next step."""
+"""The result of a step: a symbol, the need of more bytes, or None where the next step follows."""
 
 
 class Damaged(bytes):
     """
     Characters that the UART has found damaged, by parity or stop bit.
 
-    Nothing they belong to is good: M 4-7 has a message thrown away for them as for a bad check.
+    A message with one of them is dropped, as with a bad check (M 4-7).
     """
 
 

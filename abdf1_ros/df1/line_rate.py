@@ -13,25 +13,25 @@
 # limitations under the License.
 
 """
-How fast a line really is, from what is sent and heard on it.
+The real speed of a line, measured from what is sent and heard on it.
 
-Two things can be known without the line's help. An exchange cannot be over before its characters
-have passed: where most of them are, the line is faster than it is set. And the bytes of a long
-message follow each other as fast as its sender and the line can do: where the fastest of several
-messages is slower than the set speed, so is the line. Both need many samples, as an operating
-system and an adapter hold bytes back, and as an answer may be a late one.
+Two facts are used. An exchange cannot end before its characters have passed: where most exchanges
+do, the line is faster than its setting. And the bytes of a long message follow each other as fast
+as its sender and the line can send: where even the fastest of several messages is slower than the
+setting, the line is slower. Both need many samples, because an operating system or an adapter may
+hold bytes back, and because an answer may be a late one.
 """
 
 from __future__ import annotations
 
-# Samples of each kind before something is said, and afterwards before it is said anew.
+# Samples of each kind before there is a result, and before there is a new one.
 EXCHANGES = 32
 MESSAGES = 16
 
 # A message is long that has so many characters after its first bytes.
 LONG_MESSAGE = 32
 
-# Less than this is not to be told from the accuracy of clocks and of waking up.
+# A smaller difference may come from clocks and from the time of waking up.
 _FASTER = 1.25
 _SLOWER = 0.75
 
@@ -40,10 +40,10 @@ class LineRate:
     """
     The rate of a line on which a character should take ``char_time`` seconds.
 
-    Where it ``is_half_duplex``, what is heard cannot pass while something is sent.
+    Where it ``is_half_duplex``, nothing is received while something is sent.
 
-    ``seen`` is the rate in multiples of the set one, None while nothing speaks against that.
-    Above 1 it is a lower limit; below 1 it is what the bytes of messages come at.
+    ``seen`` is the measured rate in multiples of the set one, None while both agree. Above 1 it is
+    a lower limit; below 1 it is the rate of the bytes of messages.
     """
 
     def __init__(self, char_time: float, is_half_duplex: bool = True) -> None:
@@ -58,13 +58,13 @@ class LineRate:
         self._messages: list[float] = []
 
     def sent(self, characters: int, heard: int, now: float) -> None:
-        """Take note of characters that are to be answered; ``heard`` counts what has come."""
+        """Take note of sent characters that want an answer; ``heard`` counts received ones."""
         if self._asked is None:
             self._asked, self._sent, self._heard = now, 0, heard
         self._sent += characters
 
     def answered(self, heard: int, now: float) -> None:
-        """Take note of an answer, the last of whose characters is here."""
+        """Take note that the last character of an answer has come."""
         if self._asked is None:
             return
         seconds, self._asked = now - self._asked, None
@@ -96,6 +96,6 @@ class LineRate:
         self._messages = []
 
     def forget(self) -> None:
-        """Begin anew: it may be another line."""
+        """Start again: it may be another line."""
         self.seen, self._asked = None, None
         self._exchanges, self._fast, self._messages = 0, [], []

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every kind of link is, for those who run one and tell how it is."""
+"""What every kind of link offers to the driver and to the diagnostics."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ScanTimes:
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
     """
-    What only some links have to tell.
+    Details that only some kinds of links have.
 
     ``last_poll`` is the clock value (s) of the last poll of a slave, or of its start; ``scans``
     are the times of a master's poll lists, by their names.
@@ -57,7 +57,7 @@ class Link(Protocol):
     """A node on a line: a master of either kind, a slave or a peer."""
 
     def run(self, source: TaskSource) -> Procedure:
-        """Carry out the tasks of ``source``, and serve who asks us, for ever."""
+        """Carry out the tasks of ``source``, and serve commands that come, for ever."""
 
     def status(self) -> LinkStatus:
-        """Return what this link has to tell; may be called from any thread."""
+        """Return the details of this link; may be called from any thread."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A decoder for a line of somebody else's, which finds out what is spoken there."""
+"""A decoder for the traffic of others, which finds out check and duplex by itself."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ from abdf1_ros.df1.frames import (
     Symbol,
 )
 
-# One in 256 wrong frames has what looks like a good BCC, so one alone proves nothing.
+# One in 256 wrong frames seems to have a good BCC, so a single one proves nothing.
 _BCC_FRAMES = 2
-# So many frames in a row that are right with the other check only: the guess was wrong.
+# After so many frames in a row that are right with the other check only, the guess was wrong.
 _CONTRARY_FRAMES = 3
-# Bytes that are kept of what is not a message, or one that does not end.
+# Bytes that are kept of noise, or of a message that does not end.
 _MOST_KEPT = 2048
 
 
 @dataclass(slots=True)
 class LineKind:
     """
-    Check and discipline of a line, None while nobody knows; both directions share one.
+    Check and discipline of a line, None while not known; both directions share one.
 
-    ``is_certain`` tells that the check is not to be found out, nor found wrong.
+    With ``is_certain`` the check is given and never changed.
     """
 
     checksum: Checksum | None = None
@@ -59,13 +59,13 @@ class ListeningDecoder(FrameDecoder):
     """
     A frame decoder that finds check and duplex by itself, where ``kind`` does not have them.
 
-    DLE SOH and DLE EOT exist in half duplex only (M 2-6); a message that neither came before is
-    taken for full duplex until one of them comes. A frame whose CRC is right settles the check
-    for CRC, two with a right BCC settle it for BCC. Until then a frame is given out when the
-    byte after its BCC is there, which may be the second byte of a CRC. When three frames in a row
-    would be right with the other check only, the guess was wrong and is changed.
+    DLE SOH and DLE EOT exist in half duplex only (M 2-6); a message before the first of them is
+    taken for full duplex. One frame with a right CRC settles the check for CRC, two with a right
+    BCC settle it for BCC. Until then a frame is given out when the byte after its BCC is there,
+    which may be the second byte of a CRC. When three frames in a row are right with the other
+    check only, the check is changed.
 
-    ``wire`` is what stood on the line for the last symbol, without noise before it.
+    ``wire`` has the bytes of the last symbol, without noise before it.
     """
 
     def __init__(self, kind: LineKind) -> None:
@@ -104,7 +104,7 @@ class ListeningDecoder(FrameDecoder):
         return symbol
 
     def _keep(self, symbol: Symbol) -> None:
-        """Put into ``wire`` what has been taken for a symbol."""
+        """Put the bytes of a symbol into ``wire``."""
         taken = len(self._heard) - len(self._buffer)
         heard = bytes(self._heard[:taken])
         del self._heard[:taken]
@@ -121,7 +121,7 @@ class ListeningDecoder(FrameDecoder):
         self.wire = heard[start:]
 
     def finish(self) -> Frame | None:
-        """Return a frame that waits for a second check byte which will not come."""
+        """Return a frame that still waits for a second check byte, at the end of the traffic."""
         waits = self._step == self._check and len(self._buffer) == 1
         if not waits or self._kind.checksum is not None or not self._matches(Checksum.BCC):
             return None
@@ -151,7 +151,7 @@ class ListeningDecoder(FrameDecoder):
         if self._kind.checksum is not None:
             self._checksum = self._kind.checksum
             if not self._kind.is_certain and len(self._buffer) >= self._checksum.size:
-                self._doubt()
+                self._reconsider()
         elif len(self._buffer) < Checksum.CRC.size:
             return MORE
         else:
@@ -168,8 +168,8 @@ class ListeningDecoder(FrameDecoder):
             if self._bcc_frames == _BCC_FRAMES:
                 self._kind.checksum = Checksum.BCC
 
-    def _doubt(self) -> None:
-        """Change over to the other check when the frames of late have been right with it only."""
+    def _reconsider(self) -> None:
+        """Change to the other check when the last frames have been right with that one only."""
         other = Checksum.BCC if self._checksum is Checksum.CRC else Checksum.CRC
         if self._matches(self._checksum):
             self._contrary_frames = 0

@@ -29,10 +29,10 @@ A station that passes a retry limit becomes inactive.
 
 A transaction therefore ends within (NAK_Retries + 1) x Timeout for delivery, Cmd_Timeout for
 polling, and (ENQ_Retries + 1) x Timeout for the last poll. The retries of a phase are never
-cut short by Cmd_Timeout: with S0's defaults (both 1000 ms) no retry would ever happen. Nor is
-it up as long as messages come that were queued before the reply, but for a few of them only.
+cut short by Cmd_Timeout: with S0's defaults (both 1000 ms) no retry would ever happen. The time
+is also extended for a few messages that the slave had queued before the reply.
 
-Messages between slaves that are to be passed on take turns with transactions of our own.
+Messages between slaves, which the master passes on, take turns with its own transactions.
 """
 
 from __future__ import annotations
@@ -67,14 +67,14 @@ class HalfDuplexMaster:
         self._line = MasterLine(machine, settings, stations, report, serve)
 
     def status(self) -> LinkStatus:
-        """Return that there is nothing to tell."""
+        """Return that there are no details."""
         return NO_STATUS
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source``, one after the other, for ever."""
         self._line.forget_forwards()
         while True:
-            # In turns: slaves that never stop talking must not keep us from asking.
+            # In turns, or slaves that send all the time would keep our own commands from the line.
             if self._line.has_forwards():
                 yield from self._forward()
             now = self._machine.now
@@ -129,7 +129,7 @@ class HalfDuplexMaster:
             reply = yield from self._collect(
                 self._stations.via(packet.dst), packet, self._machine.now)
         except (StationInactive, CommandTimeout):
-            return  # the sender has a time limit of its own
+            return  # the sender of the command has a time-out of its own
         self._line.take_unwanted(packet.dst, reply)
 
     def _collect(self, number: int, command: Packet, started: float,
@@ -153,7 +153,7 @@ class HalfDuplexMaster:
                 raise CommandTimeout
 
     def _give_up(self, number: int) -> Talk:
-        """Account for a reply that did not come in time (S0, counter 2545)."""
+        """Count and report a reply that did not come in time (S0, counter 2545)."""
         self._line.accounting.late(number, keeps_others_waiting=True)
         if self._settings.nak_on_command_timeout:
             self._line.counters.naks_sent += 1

@@ -18,9 +18,9 @@ What every half-duplex master does on its line: deliver, poll, receive, pass on.
 The rules are S0's, "Functional Overview", and those of M 3-12..3-17; how they make up a
 transaction is in ``master``, how they make up a polling scan in ``polling``.
 
-Every good message is acknowledged, also one that is not wanted, because the slave holds it
-until then (M 3-15). A master never asks for a repetition with DLE NAK, which is the reset of
-the whole line (M 2-7, 3-11).
+Every good message is acknowledged, also one that nobody waits for: the slave keeps it until then
+(M 3-15). A master never asks for a repetition with DLE NAK, which resets all slaves of the line
+(M 2-7, 3-11).
 """
 
 from __future__ import annotations
@@ -42,26 +42,26 @@ from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
 
-# What an operating system or USB adapter may hold a byte back; no wait is shorter, so that
-# Timeout = 0 (S0 allows it) still means "as short as the equipment can do".
+# An operating system or USB adapter may hold a byte back for so long (s). No wait is shorter, so
+# Timeout = 0, which S0 allows, means "as short as the equipment can do".
 MIN_RESPONSE_TIME = 0.02
 
-# Nobody answers a broadcast; so long (s) the line is left to the slaves after one.
+# No station answers a broadcast; after one the master waits so long (s) for the slaves.
 BROADCAST_PAUSE = 0.05
 
 # Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
 MAX_FORWARDS = 16
 
-# The same with the replies among them, which are always acknowledged. There are never so many
-# unless a slave sends replies to nothing; those are dropped.
+# The limit with the replies among them, which are always acknowledged. Only a slave that sends
+# replies to no command can exceed it; those are dropped.
 MAX_KEPT = 2 * MAX_FORWARDS
 
-# Messages that a slave may have queued before the reply we want. They are taken even when the
-# time of the command is up, or on a slow line each reply would for ever be found after the one
-# before it.
+# Messages that a slave may have queued before the reply to our command. They are taken even when
+# the time of the command is up. Otherwise, on a slow line, each reply would stay queued after an
+# older one for ever.
 MOST_QUEUED = 8
 
-# After inactive stations have had the line for t, 7 t are left to the active ones.
+# After polling an inactive station for t, leave 7 t to active ones.
 _OTHERS_SHARE = 7
 
 # What answers a message and a poll, but for the frames that answer a poll too.
@@ -70,11 +70,11 @@ _LISTEN_ON_ECHOED = LISTEN_ON._replace(is_echoed=True)
 _MESSAGE_ANSWERS = (Control.ACK, Control.NAK)
 _POLL_ANSWERS = (Control.EOT, Control.NAK)
 
-# Less time (s) than this is none: no wait ends so exactly.
+# A shorter time (s) counts as none: no wait ends so exactly.
 _MOMENT = 0.0001
 
-# So many characters, and what the equipment may hold back, make a pause after a message that has
-# broken off.
+# A pause of so many characters, plus the time that the equipment may hold bytes back, ends a
+# message that has broken off.
 _QUIET_CHARACTERS = 10
 
 _NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
@@ -87,9 +87,9 @@ class MasterSettings:
     """
     The settings of a half-duplex master, named as in S0; times in seconds.
 
-    ``poll_pause`` passes between an EOT and the next poll of the same station, to let it
-    finish. With ``accept_slave_messages`` what slaves send by themselves is served or passed
-    on to the station it is for; otherwise it is acknowledged and dropped.
+    ``poll_pause`` is the time between an EOT and the next poll of the same station, which lets it
+    finish. With ``accept_slave_messages`` commands of slaves are served, or passed on to their
+    destination; otherwise they are acknowledged and dropped.
     """
 
     station: int = 5
@@ -118,8 +118,8 @@ class MasterLine:
         self.counters = machine.counters
         self.settings = settings
         self.stations = stations
-        self.polled: Container[int] = ()  # stations that somebody else polls all the time
-        # Takes a reply that came too late for its poll; tells whether it was waited for.
+        self.polled: Container[int] = ()  # stations that are polled all the time anyway
+        # Takes a reply that came too late for its poll; returns whether a command waited for it.
         self.take_reply: Callable[[int, Packet], bool] = lambda number, reply: False
         self.accounting = Accounting(machine.counters, stations, report)
         self.note = self.accounting.note
@@ -268,8 +268,8 @@ class MasterLine:
         """
         Listen until the line is quiet; return the good frame that follows, or else ``broken``.
 
-        A bit error that looks like a symbol breaks a message off for us, and not for its sender,
-        who would not hear what is said now. Nothing else of what follows means anything.
+        A bit error that looks like a symbol ends the message for us, but its sender goes on
+        sending and does not listen. Other symbols in the rest of the message mean nothing.
         """
         quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * self.machine.char_time
         end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.char_time
@@ -289,8 +289,8 @@ class MasterLine:
         """
         Take a message of another station than the one asked; return whether it was one.
 
-        It answers an earlier poll, whose time was up. It gets no ACK, which would be taken by
-        the station asked now for that of its own message; so it comes again, and then is known.
+        It answers an earlier poll, whose time was up. It gets no ACK: the station asked now would
+        take that for its own message. So the message comes again, and is then a repetition.
         """
         src = source(frame.data)
         if src not in self.stations or self._speaks_for(number, src):
@@ -322,9 +322,9 @@ class MasterLine:
         """
         Acknowledge a good message; return it, or None when it is a repetition.
 
-        A message says who sends it. One that does not is damaged in a way that no check shows
-        (a CRC begins with 0, so it does not see a leading 00 come or go), and gets no ACK, unless
-        the station insists on it.
+        SRC has to be the station that was polled. Another SRC comes from damage that no check
+        shows (a CRC begins with 0, so it does not notice a lost or inserted leading 00). Such a
+        message gets no ACK, unless the station sends it again.
         """
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
@@ -366,7 +366,7 @@ class MasterLine:
             self.stations.heard(reply.src, self.machine.now)
 
     def check_reply(self, reply: Packet, command: Packet) -> None:
-        """Account for the reply to ``command``; WrongCommandCode when it is another's."""
+        """Count the reply to ``command``; WrongCommandCode when it is another's."""
         self._heard_from(reply)
         self.accounting.check(reply, command)
 
@@ -374,7 +374,7 @@ class MasterLine:
         """
         Take a message that answers nothing of ours (S0, DispatchAbDf1Message).
 
-        It is served, kept to be passed on, or dropped and accounted for.
+        It is served, kept to be passed on, or dropped and counted.
         """
         has_room = len(self._forwards) < MAX_KEPT
         if self._is_to_forward(packet) and has_room:
@@ -413,7 +413,7 @@ class MasterLine:
         return packet
 
     def _probe_for_others(self, number: int) -> Talk:
-        """Poll an inactive station, but not where it has its turn, nor beyond an eighth."""
+        """Poll an inactive station, if the share of probes allows and it has no turn anyway."""
         if number in self.polled or not self.may_probe:
             raise StationInactive(number)
         begun = self.machine.now
@@ -449,7 +449,7 @@ class MasterLine:
         return self.settings.accept_slave_messages and packet.dst != self.settings.station
 
     def fail_inactive(self, number: int) -> NoReturn:
-        """Take a station out of the active ones, and say so."""
+        """Make a station inactive, and report it."""
         self.stations.lost(number, self.machine.now)
         self.note(Message.ERR_INACTIVE_STATION, number, station=number)
         raise StationInactive(number)
@@ -463,7 +463,7 @@ class MasterLine:
             self.counters.naks_received += control is Control.NAK
 
     def _note_fault(self, frame: Frame, number: int) -> Message:
-        """Count and report what is wrong with a frame; return the message that names it."""
+        """Count and report the fault of a frame; return the message that names it."""
         event = count_fault(frame, self.settings.checksum, self.counters, number)
         self._report(event)
         return event.message

@@ -23,8 +23,8 @@ import math
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import DLE, ETX, STX
 
-# So much of a message (s) is given out at a time, and again when so much is left on the line. A
-# response waits for one portion at most; a thread that comes a little late leaves no gap.
+# A portion of a message takes so long (s) on the line; the next one is given out when so much is
+# left. A response waits for one portion at most, and a thread that is a little late leaves no gap.
 _AHEAD = 0.03
 _LEFT = 0.015
 
@@ -37,7 +37,7 @@ class Outgoing:
 
     Between two data symbols a response may be embedded, and nowhere else (M 4-3): not between a
     DLE and its partner, nor between the data and DLE ETX with its check. ``char_time`` is seconds
-    per character; without one, and where a portion is the message, all goes out at once. ``due``
+    per character; where it is 0, or the message is short, all is given out at once. ``due``
     is when to call ``next`` (clock value in s), None for never.
     """
 
@@ -83,7 +83,7 @@ class Outgoing:
         self.due, self.size = None, 0
 
     def _symbols(self, frame: bytes) -> Iterator[bytes]:
-        """Yield what must not be divided; of a frame that is not a message all of it."""
+        """Yield the parts that must not be divided; a frame that is not a message is one part."""
         end = len(frame) - len(ETX) - self._check_size
         if not frame.startswith(STX):
             yield frame

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The message that a frame carries: the header all commands and replies share."""
+"""The message in a frame, with the header that commands and replies share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from abdf1_ros.errors import FormatError
 _HEADER = struct.Struct('<BBBBH')
 HEADER_SIZE = _HEADER.size
 REPLY_BIT = 0x40
-# High priority: it says nothing about what is to be done (M 6-5).
+# The bit of high priority, which does not change the command (M 6-5).
 PRIORITY_BIT = 0x20
 BROADCAST = 255
 
@@ -70,7 +70,7 @@ class Packet:
 
     @property
     def is_reply(self) -> bool:
-        """Tell a reply from a command."""
+        """Tell whether this is a reply, not a command."""
         return bool(self.cmd & REPLY_BIT)
 
     @property
@@ -94,7 +94,7 @@ class Packet:
         return self.dst, self.cmd & ~REPLY_BIT, self.tns
 
     def answers(self, command: Packet) -> bool:
-        """Tell whether this is a reply to ``command``, whatever its command code says."""
+        """Tell whether this is a reply to ``command``; the command code is not compared."""
         return self.is_reply and (self.src, self.dst, self.tns) == (
             command.dst, command.src, command.tns)
 

@@ -28,17 +28,17 @@ message: an old ACK must not count for a new message that got lost.
 
 A response does not say which message it is for. One that comes before all bytes of our message
 have left is not for that message (M 4-5: WAIT follows SEND). After the start, and after a
-transfer that needed a second try, there is a short pause: responses that come in it are late, and
-would be taken for the response to the next message.
+transfer that needed a second try, there is a short pause: a response in that pause is late, and
+must not be taken for the response to the next message.
 
 An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
 at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
 A reply that overtakes its ACK counts as one (M 4-13).
 
 A message is sent again when its sender has not understood our response (M 4-5). So a repetition
-comes within the time that the sender's retries take; if the sender has acknowledged our reply and
-has not asked again, within the time of one retry. Any later message with the same number is a
-new one: some processors count from 0 after each power-up, some programs always send 0.
+comes within the time that the sender's retries take. If the sender has acknowledged our reply and
+has not asked again, it comes within the time of one retry. A later message with the same number is
+a new one: some processors count from 0 after each power-up, some programs always send 0.
 """
 
 from __future__ import annotations
@@ -73,15 +73,15 @@ MAX_WAITING_REPLIES = 8
 
 _MIN_RESPONSE_TIME = 0.02
 
-# How long (s) a response may come after it was waited for, after another one, or after the reply
+# A response may come so late (s): after its time-out, after another response, or after the reply
 # that overtook it.
 _LATE_RESPONSE = 0.1
 
-# The ACK time-out (s) and ENQs of the products as they come.
+# The ACK time-out (s) and the number of ENQs in the default settings of the products.
 _ACK_TIMEOUT = 1.0
 _ENQ_LIMIT = 3
 
-# How often (s) a look is taken at what has become overdue while a response is waited for.
+# While a response is waited for, overdue commands are looked for so often (s).
 _TICK = 0.25
 
 Hearing = Generator[Step, Heard, None]
@@ -100,7 +100,7 @@ class PeerSettings:
     duplicate_detection: bool = True
 
     def retry_time(self, enq_retries: int) -> float:
-        """Return how long (s) so many ENQs take the other end, set like us or as it comes."""
+        """Return the seconds that the other end needs for so many ENQs, at most."""
         return (enq_retries + 1) * max(_ACK_TIMEOUT, self.timeout)
 
 
@@ -145,17 +145,17 @@ class FullDuplexPeer:
         return self._machine.counters
 
     def status(self) -> LinkStatus:
-        """Return that there is nothing to tell."""
+        """Return that there are no details."""
         return NO_STATUS
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve the other end, for ever."""
         self._forget()
-        yield from self._listen()  # what comes now answers a process before us
+        yield from self._listen()  # it answers an earlier process
         while True:
             self._expire()
             source.expire(self._machine.now)
-            # In turns: an other end that never stops asking must not keep us from asking.
+            # In turns, or an other end that asks all the time would keep our commands waiting.
             if self._replies:
                 yield from self._send_reply(self._replies.popleft())
             task = self._next_task(source)
@@ -184,7 +184,7 @@ class FullDuplexPeer:
         return source.next_task(self._machine.now)
 
     def _idle_time(self, source: TaskSource) -> float | None:
-        """Return the seconds until a reply is overdue or, with room for it, a task is due."""
+        """Return the seconds until a reply is overdue or a task is due that may be sent."""
         moments: list[float | None] = [entry.deadline for entry in self._outstanding.values()]
         if len(self._outstanding) < self._settings.max_outstanding:
             moments.append(source.next_due())
@@ -303,7 +303,7 @@ class FullDuplexPeer:
         return silence.last_byte if self._machine.now - silence.seconds > begun else 0
 
     def _listen(self, seconds: float = _LATE_RESPONSE) -> Hearing:
-        """Only receive for a while; responses that come now belong to nothing."""
+        """Only receive for a while; responses that come now are late and count for nothing."""
         end = max(self._machine.now, self._machine.free_at) + seconds
         symbol = yield from self._next(b'', end)
         while not isinstance(symbol, Silence) or self._left(end) > 0:
@@ -333,7 +333,7 @@ class FullDuplexPeer:
         if symbol is Control.ENQ:
             self._expect_repetition()
             self._counters.enqs_received += 1
-            # What was heard since the last response was no message, or it would have had one.
+            # What was heard since the last response was not a message, or it would have had one.
             is_clean = self._machine.decoder.noise == self._noise
             return self._respond(self._last_response if is_clean else frames.NAK)
         if symbol is Control.ACK or symbol is Control.NAK:
@@ -350,12 +350,12 @@ class FullDuplexPeer:
             self._report(count_fault(frame, self._settings.checksum, self._counters))
             if frame.fault is not FrameFault.NO_ETX:
                 return self._respond(frames.NAK)
-            # Its sender asks with ENQ, begins anew with DLE STX, or has sent what is no
+            # Its sender asks with ENQ, begins again with DLE STX, or has sent a pair that is not a
             # symbol; only the last of these needs a NAK now (M 4-8).
             self._last_response, self._is_aborted = frames.NAK, True
             return b''
-        # Who sends responses inside of messages understands them too; as the products do with
-        # Embedded Responses = Auto-detect, we begin with it then (M 4-3).
+        # An end that embeds responses understands embedded ones. So we embed ours from now on,
+        # like the products with Embedded Responses = Auto-detect (M 4-3).
         self._machine.embeds |= self._embedded_in == self._machine.decoder.begun
         packet = Packet.decode(frame.data)
         self._counters.messages_received += 1
@@ -379,7 +379,7 @@ class FullDuplexPeer:
         return self._respond(frames.ACK)
 
     def _is_repetition(self, packet: Packet) -> bool:
-        """Tell whether this is the last message once more (M 4-4, 4-8)."""
+        """Tell whether this is a repetition of the last message (M 4-4, 4-8)."""
         last, settings = self._accepted, self._settings
         if last is None or last.key != packet.duplicate_key or not settings.duplicate_detection:
             return False
@@ -393,7 +393,7 @@ class FullDuplexPeer:
             self._accepted.may_come_again = True
 
     def _take_reply(self, packet: Packet) -> None:
-        """Hand a reply to the command it belongs to, if it is still waited for."""
+        """Give a reply to its command, if that still waits."""
         self._expire()
         self._accounting.received(packet)
         entry = self._outstanding.pop((packet.src, packet.tns), None)

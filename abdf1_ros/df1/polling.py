@@ -25,7 +25,7 @@ the PLC-5 and Logix masters). One scan is::
 
 A command leaves before the next station is polled ("between stations"), or when the master's
 own address comes up in the list ("in sequence"). It completes when its station is polled and
-has the reply ready, so the thinking times of several stations run side by side, and commands
+has the reply ready. So several stations work on their replies at the same time, and commands
 complete in the order of the poll list.
 
 A station that does not answer is polled again up to ENQ_Retries, then becomes inactive; any
@@ -65,7 +65,7 @@ COMMANDS_BETWEEN_POLLS = 4
 # A poll and the EOT that answers it.
 _POLL_CHARACTERS = 6
 
-# Between scans in which nobody could be polled (s).
+# Pause between scans in which no station could be polled (s).
 _PAUSE = 0.05
 
 
@@ -75,8 +75,8 @@ class PollingSettings:
     How stations are polled.
 
     ``priority`` and ``normal`` are the poll lists; ``group_size`` normal stations are polled
-    in a scan, 0 for all. With ``multiple`` a station is polled until it has nothing more. With
-    ``in_sequence`` commands wait for the master's own address to come up.
+    in a scan, 0 for all. With ``multiple`` a station is polled until it has no more messages. With
+    ``in_sequence`` commands wait until the master's own address comes up.
     """
 
     normal: tuple[int, ...]
@@ -138,12 +138,13 @@ class StandardPollingMaster:
         self._line.polled = self._listed
         self._line.take_reply = self._take_reply
         stations.add(self._polled)
-        # Stations that were passed a command and have not replied, and until when (clock value in
-        # s) they may. There is no second one for them, or several senders would soon fill a sink
-        # that a poll empties by one message, and our own commands would find no room in it.
+        # Stations that got a command of another station and have not replied, and until when
+        # (clock value in s) they may. They get no second one meanwhile: several senders would
+        # soon fill the sink, which a poll empties by one message only, and our own commands would
+        # find no room.
         self._given: dict[int, float] = {}
-        # Stations that have answered a probe, and no command since. What they cost is as good as
-        # the time of another probe: one that takes no commands would else come back at once.
+        # Stations that have answered a probe, but no command since. Their time on the line counts
+        # as that of a probe: otherwise a station that takes no commands would come back at once.
         self._unproven: set[int] = set()
         self._last_probed: _PollList | None = None
 
@@ -162,12 +163,12 @@ class StandardPollingMaster:
         while True:
             begun = self._machine.now
             yield from self._scan(source)
-            if self._machine.now == begun:  # nobody is there to be polled now
+            if self._machine.now == begun:  # no station can be polled now
                 yield from self._between_polls(source)
                 yield Step(None, _PAUSE)
 
     def _is_active(self, number: int) -> bool:
-        """Tell whether a place in a list has its turn; our own is not a station of the line."""
+        """Tell whether an entry of a list is polled; our own is not a station of the line."""
         return number == self._settings.station or self._stations[number].active
 
     def _scan(self, source: TaskSource) -> Talk:
@@ -198,7 +199,7 @@ class StandardPollingMaster:
             yield from self._visit_inactive(normal, source)
 
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
-        """Poll one inactive station of a list, if the active ones can spare the time."""
+        """Poll one inactive station of a list, if the share of probes allows."""
         number = polled.inactive(self._is_active)
         polled.is_kept_waiting = number is not None and not self._line.may_probe
         other = self._normal if polled is self._priority else self._priority
@@ -217,7 +218,7 @@ class StandardPollingMaster:
             self._line.probed(begun)
 
     def _visit(self, number: int, source: TaskSource) -> Talk:
-        """Send what waits, then poll one active station; our own place is for commands."""
+        """Send what waits, then poll one active station; at our own number only send."""
         if number == self._settings.station:
             yield from self._send_commands(source)
             return
@@ -245,18 +246,18 @@ class StandardPollingMaster:
                 if station in self._outstanding]
 
     def _reply_size(self, number: int) -> int:
-        """Return the size of the reply that comes next, 0 where nobody knows."""
+        """Return the size of the reply that comes next, 0 where that is not known."""
         sizes = [entry.task.reply_size for _, entry in self._waiting_for(number)]
         return sizes[0] if len(sizes) == 1 else 0
 
     def _pace(self, begun: float) -> Talk:
-        """Poll a line without a speed of its own, such as TCP, no faster than the set one."""
+        """Poll a line without a real speed, such as TCP, not faster than its Baud setting."""
         rest = begun + _POLL_CHARACTERS * self._machine.char_time - self._machine.now
         if rest > 0:
             yield Step(None, rest)
 
     def _answered(self, number: int, answer: Control | Frame) -> Talk:
-        """Take what a station has answered to a poll."""
+        """Take the answer of a station to a poll."""
         packet = None
         if isinstance(answer, Frame):
             packet = yield from self._line.receive(number, answer)
@@ -287,7 +288,7 @@ class StandardPollingMaster:
 
     def _overdue(self, number: int) -> None:
         """End the command whose reply has not come in time."""
-        # It keeps nobody waiting: others are polled meanwhile.
+        # No other station waits for it: the others are polled meanwhile.
         self._line.accounting.overdue(
             self._outstanding.pop(number).task, keeps_others_waiting=False)
 
@@ -302,7 +303,7 @@ class StandardPollingMaster:
             yield from self._send_commands(source)
 
     def _send_commands(self, source: TaskSource) -> Talk:
-        """Send messages to be passed on, and commands to stations that owe us no reply."""
+        """Pass messages on, and send commands to stations without a reply outstanding."""
         self._given = {number: until for number, until in self._given.items()
                        if self._is_active(number) and self._machine.now < until}
         while self._line.has_forwards(self._given):
@@ -331,7 +332,7 @@ class StandardPollingMaster:
             task.reply(task.command.reply())
             return
         if not self._stations[number].active:
-            task.fail(StationInactive(number))  # it is polled in its turn
+            task.fail(StationInactive(number))  # it is polled when its turn comes
             return
         task.sent = True
         entry = self._outstanding[station] = Outstanding(task)

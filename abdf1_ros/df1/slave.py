@@ -15,9 +15,9 @@
 """
 The half-duplex slave: a station that answers a master (M 3-4, 3-5, 3-9..3-11; KF2 4-31).
 
-It is reactive, so it is one method: ``handle`` takes a symbol and returns the bytes to send.
-A slave never sends DLE NAK: what it cannot accept it passes over in silence, and the master
-tries again.
+A slave only reacts, so it is one method: ``handle`` takes a symbol and returns the bytes to send.
+It never sends DLE NAK. To a message that it cannot accept it gives no answer, and the master tries
+again.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ class SlaveSettings:
     The settings of a slave, with the defaults of Allen-Bradley's.
 
     ``retries`` is how often a message is sent again before it is given up; ``queue_size`` how
-    many replies may wait for a poll before the sink is full. With ``eot_suppression`` a poll
-    is answered with silence instead of EOT, which spares modems and looks dead to the master.
+    many replies may wait for a poll before the sink is full. With ``eot_suppression`` a poll is
+    not answered with EOT. That saves time with modems, but the master sees no difference to a
+    dead station.
     """
 
     station: int
@@ -60,7 +61,7 @@ class SlaveSettings:
 
 
 class Initiator(Protocol):
-    """Where a slave gets commands of its own, and who is told what becomes of them."""
+    """Gives a slave commands to send, and takes their results."""
 
     def polled(self) -> None:
         """Take note that the master has polled us."""
@@ -92,7 +93,7 @@ class HalfDuplexSlave:
 
     ``serve`` executes a command and returns its reply. It is called after the command has been
     accepted, once for each command, never for a repetition. ``initiator`` has commands of its
-    own to send, if there are any; ``report`` gets what is wrong with messages for us.
+    own to send, if there are any; ``report`` gets the faults of messages for us.
     """
 
     def __init__(self, settings: SlaveSettings, serve: Callable[[Packet], Packet],
@@ -110,7 +111,7 @@ class HalfDuplexSlave:
         self._last_key: tuple[int, int, int] | None = None
 
     def handle(self, symbol: Symbol) -> bytes:
-        """Return what this station puts on the line when it hears ``symbol``; mostly nothing."""
+        """Return the bytes that this station sends after ``symbol``, mostly none."""
         just_sent, self._just_sent = self._just_sent, False
         if isinstance(symbol, Poll):
             return self._polled(symbol)
@@ -131,24 +132,24 @@ class HalfDuplexSlave:
         return b''
 
     def reset(self) -> None:
-        """Begin again, with nothing to send and nothing heard."""
+        """Forget all messages to send and the last one heard."""
         self._held, self._last_key = None, None
         self._just_sent, self._sent_reply = False, True
         self._queue.clear()
 
     def withdraw(self) -> None:
-        """Do not send a command of our own again; whoever calls this has ended it."""
+        """Do not send a command of our own again; the caller has ended it."""
         if self._held is not None and not self._held.packet.is_reply:
             self._held = None
 
     def _is_echo(self, frame: Frame) -> bool:
-        """Tell whether we hear ourselves, which two-wire adapters let us."""
+        """Tell whether this is our own frame, which two-wire adapters give back."""
         held = self._held
         return held is not None and frame.station is None and frame.fault is None \
             and frame.data == held.packet.encode()
 
     def _release(self, error: LinkError | None = None) -> None:
-        """Let go of the held message; a command's sender is told how it went (KF2 4-31)."""
+        """Drop the held message; the sender of a command is told the result (KF2 4-31)."""
         held, self._held = self._held, None
         if held is None or held.packet.is_reply or self._initiator is None:
             return
@@ -196,7 +197,7 @@ class HalfDuplexSlave:
 
     def _ack(self, frame: Frame) -> bytes:
         if frame.station == BROADCAST:
-            return b''  # everyone would answer at once (M 3-4)
+            return b''  # all stations would answer at once (M 3-4)
         self.counters.acks_sent += 1
         return frames.ACK
 
@@ -225,7 +226,7 @@ class HalfDuplexSlave:
         """
         Return a reply that waits, or a command of our own.
 
-        They take turns: a master that polls only for its replies would never get our commands.
+        They take turns, or a master that always has a reply to fetch would never get our commands.
         """
         if self._initiator is not None and (self._sent_reply or not self._queue):
             command = self._initiator.next_command()
@@ -258,11 +259,11 @@ class Responder(Protocol):
 def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
            look: Callable[[], None] = lambda: None) -> Generator[Step, Heard, None]:
     """
-    Send what ``handle`` answers to ``symbol``, after TX_Delay; meanwhile ``look`` now and then.
+    Send the answer of ``handle`` to ``symbol`` after TX_Delay; meanwhile call ``look`` repeatedly.
 
-    An answer belongs to what was said last: a master that says something else waits for it no
-    more, and would take it for the answer to that. So a poll or a message after which there is
-    something else already is passed over, as if it had not been heard.
+    A master that has sent something else does not wait for the old answer any more, and would take
+    it for the answer to the new symbol. So a poll or a message is ignored when another symbol has
+    come after it.
     """
     heard: Symbol | None = symbol
     while heard is not None:
@@ -274,14 +275,14 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
 
 
 def _wants_answer(symbol: Symbol) -> bool:
-    """Tell whether a slave may have to say something now."""
+    """Tell whether a slave may have to answer."""
     return isinstance(symbol, Poll) or (
         isinstance(symbol, Frame) and symbol.station not in (None, BROADCAST))
 
 
 def _next_within(machine: Machine, seconds: float,
                  look: Callable[[], None]) -> Generator[Step, Heard, Symbol | None]:
-    """Return what is heard next, if it has been heard already or comes within ``seconds``."""
+    """Return the next symbol, if it is here already or comes within ``seconds``."""
     end = machine.now + seconds
     symbol = machine.decoder.next_symbol()
     while symbol is None and (left := end - machine.now) > 0:

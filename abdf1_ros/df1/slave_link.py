@@ -15,9 +15,9 @@
 """
 A slave that is a driver of its own: it serves the master, and sends commands when it is polled.
 
-Its commands go to other stations by way of the master, which passes them on, and so do the
-replies. Nothing leaves before a poll: a slave that is not polled for the poll timeout fails
-what it wanted to send, so that no old command is sent when the polls come back.
+The master passes its commands on to other stations, and their replies back. Nothing is sent before
+a poll: when no poll has come for the poll timeout, all waiting commands fail, so that no old
+command is sent when the polls come back.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class SlaveLink:
     Serve the master on the line of ``machine``, and send the commands of a source.
 
     ``cmd_timeout`` (s) is how long a command waits for its reply after the master has taken
-    it, or before that for the next poll, ``poll_timeout`` (s, 0 for ever) how long we may be
-    left unpolled. ``serve`` and ``report`` are those of every link. It is the ``Initiator`` of
+    it, or before that for the next poll, ``poll_timeout`` (s, 0 for never) is when commands fail
+    without a poll. ``serve`` and ``report`` are those of every link. It is the ``Initiator`` of
     its own slave. ``last_poll`` is the clock value (s) of the last poll, or of the start.
     """
 
@@ -69,7 +69,7 @@ class SlaveLink:
         self.last_poll = self._machine.now
         next_look = self._machine.now + TICK
         while True:
-            # Not afresh after each symbol: the line may never be still.
+            # At a fixed time, not so long after each symbol: the line may never be quiet.
             symbol = yield Step(None, max(0.0, next_look - self._machine.now))
             if not isinstance(symbol, Silence):
                 yield from answer(
@@ -84,7 +84,7 @@ class SlaveLink:
         entry = self._outstanding
         if entry is None or entry.is_delivered:
             return
-        # A command that is not repeated any more must not wait for a master to come back.
+        # A command that is not repeated must not wait until a master comes back.
         entry.deadline = self.last_poll + self._cmd_timeout
         if self.last_poll > entry.task.expires:
             self._outstanding = None
@@ -144,7 +144,7 @@ class SlaveLink:
             self._fail()
         if not is_alone:
             return
-        waiting = []  # all first: a read that fails is soon due again
+        waiting = []  # first take all of them: a read that fails is soon due again
         while (task := source.next_task(now)) is not None:
             waiting.append(task)
         for task in waiting:

@@ -23,7 +23,7 @@ from abdf1_ros.df1.packet import Packet
 
 MAX_STATION = 254
 
-# So many commands in a row without a reply in time are not an accident.
+# After so many commands in a row without a reply in time the station is treated as silent.
 _MOST_OVERDUE = 2
 
 
@@ -35,7 +35,7 @@ class Station:
     ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
     first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
     nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
-    message whose addresses cannot be so. ``overdue`` counts the commands in a row that
+    message whose addresses cannot be right. ``overdue`` counts the commands in a row that
     were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
     """
 
@@ -53,7 +53,7 @@ class Station:
 
     @property
     def replies_in_time(self) -> bool:
-        """Tell whether commands are worth their time, as far as one knows."""
+        """Tell whether this station is likely to reply to a command in time."""
         return self.active and self.overdue < _MOST_OVERDUE
 
     def accepts(self, packet: Packet) -> bool:
@@ -64,7 +64,7 @@ class Station:
         return True
 
     def repeats(self, packet: Packet) -> bool:
-        """Tell whether ``packet`` is the last message once more."""
+        """Tell whether ``packet`` is a repetition of the last message."""
         return (packet.dst, *packet.duplicate_key) == self.last_key
 
 
@@ -73,12 +73,11 @@ class ActiveStationList:
     All stations the master talks to.
 
     Every station counts as active at start (S0). ``on_change`` is called with a station of the
-    list whenever it becomes active or inactive. A station outside of it, to which a slave wants
-    something passed on, has a record like any other, but is not in the list: no message can
-    put a station there.
+    list whenever it becomes active or inactive. A station outside of the list, to which a slave
+    sends something, has a record as well, but no message can put it into the list.
 
-    ``routes`` gives, by number, the gateway of this line that a station is behind: it is polled
-    in place of the station, and what it is, active or not, all behind it are (M 3-7).
+    ``routes`` gives the gateway to a station, by number: the gateway is polled in place of the
+    station, and all its stations are active while the gateway is (M 3-7).
     """
 
     def __init__(self, numbers: Iterable[int] = (),
@@ -112,11 +111,11 @@ class ActiveStationList:
         return station or self._strangers.setdefault(number, Station(number))
 
     def via(self, number: int) -> int:
-        """Return the station of this line that speaks for a station: a gateway, or itself."""
+        """Return the station of this line that is polled for a station: its gateway, or itself."""
         return self._routes.get(number, number)
 
     def behind(self, number: int) -> list[int]:
-        """Return the stations for which a station of this line speaks, itself the first."""
+        """Return a station of this line, and the stations to which it is the gateway."""
         return [number, *(station for station, via in self._routes.items() if via == number)]
 
     def heard(self, number: int, now: float) -> None:

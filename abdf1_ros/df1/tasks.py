@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a link carries out: tasks, each one command after the other, and where they come from."""
+"""The tasks of a link, which are commands with their replies, and their source."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Task(Protocol):
     The link sets ``sent`` when the command has been on the line: without a reply its outcome
     is then unknown. It ends the command by calling ``reply`` or ``fail``, once. ``reply_size``
     is the bytes after the header of a good reply, 0 where that is not known. After ``expires``
-    (clock value in s) the command is not sent, nor sent once more.
+    (clock value in s) the command is neither sent nor repeated.
     """
 
     command: Packet
@@ -53,8 +53,8 @@ class Outstanding:
     A task whose command is on its way or waits for its reply.
 
     ``deadline`` (clock value in s) is when the reply is overdue; it runs from the delivery
-    (``is_delivered``), and what counts before that is the link's matter. ``passed_over`` counts
-    other messages that came in its place.
+    (``is_delivered``), before that as each kind of link has it. ``passed_over`` counts other
+    messages that came in its place.
     """
 
     task: Task
@@ -67,7 +67,7 @@ class TaskSource(Protocol):
     """Where a link gets its tasks."""
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return what has the line next, but not for a ``busy`` station; None for nothing."""
+        """Return what has the line next, not for a ``busy`` station; None for nothing."""
 
     def next_due(self) -> float | None:
         """Return when something will be due (clock value in s), None for never."""

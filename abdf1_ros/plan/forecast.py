@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What a line will be able to do, told before anything is connected.
+The forecast of a line: what it will be able to do, before anything is connected.
 
-It is the line model of the planner, and an assumption: how long a station takes to answer. A
+It uses the line model of the planner, and assumes how long a station takes to answer. A
 transaction has two answers (M 14-2): to the command, and to the poll, or in full duplex the
 reply. PLCs serve the port once in a program scan.
 """
@@ -35,8 +35,8 @@ USUAL_RESPONSE_TIME = 0.01
 ANSWERS = 2
 _POLL_CHARACTERS = 4
 
-# A read without a period takes what the others leave, but has its turn at least in so many
-# times the time in which everything could be read once.
+# A read without a period gets the time that the others leave, but at least one turn in so many
+# times the time of reading everything once.
 PATIENCE = 4
 
 
@@ -57,9 +57,9 @@ def scan_time(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIM
 
 def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
     """
-    Return the part of the line's time that is needed to keep every period; above 1 they slip.
+    Return the part of the line's time that all periods need; above 1 they cannot be kept.
 
-    Blocks without a period take what is left and are not counted.
+    Blocks without a period take the rest and are not counted.
     """
     return sum(block_time(block, response_time) / block.period
                for block in blocks if block.period)
@@ -68,11 +68,11 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
 def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME,
               own_load: float = 0.0) -> dict[float, float]:
     """
-    Return the seconds from one read to the next to be expected of blocks, by their period (s).
+    Return the expected seconds between two reads of a block, by its period (s).
 
-    That is the period, as far as the line allows. Where it does not, all become longer by the
-    factor of its load, but none by more than a poll cycle: that is what ``ReadQueue`` gives.
-    ``own_load`` is the part of the line's time that heartbeats need.
+    That is the period, as far as the line allows. Otherwise all periods become longer by the
+    factor of the load, but none by more than a poll cycle, as in ``ReadQueue``. ``own_load`` is
+    the part of the line's time that heartbeats need.
     """
     blocks = list(blocks)
     once, needed = scan_time(blocks, response_time), load(blocks, response_time) + own_load
@@ -85,7 +85,7 @@ def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIM
 
 
 def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
-    """Return the seconds that the longest of all transactions has the line."""
+    """Return the seconds that the longest single transaction takes."""
     return max((block_time(block, response_time) / len(block.requests) for block in blocks),
                default=0.0)
 
@@ -94,14 +94,14 @@ def longest_transaction(network: Network) -> float:
     """
     Return the seconds that a transaction takes at most, every repetition included (S0).
 
-    What the frames take on the line comes on top.
+    The time of the frames on the line has to be added.
     """
     tries = network.nak_retries + 1 + network.enq_retries + 1
     return (tries * network.timeout + network.cmd_timeout) / 1000
 
 
 def longest_probe(network: Network) -> float:
-    """Return the seconds that a silent station has the line when it is asked once."""
+    """Return the seconds that one poll of a silent station takes."""
     return max(network.timeout / 1000, MIN_RESPONSE_TIME) + network.timing.tx_delay \
         + _POLL_CHARACTERS * network.timing.char_time
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What heartbeats, fallback values and guarded reads cost, and what they can promise.
+What heartbeats, fallback values and guarded reads cost, and which times they can keep.
 
 The numbers of rules are those of docs/heartbeats.md. T is the longest transaction that the
 settings allow, with all repetitions. Times are in seconds.
@@ -50,10 +50,10 @@ _STATUS_BYTES = 1, 26  # of the command after TNS, and of the longest usual repl
 @dataclass(frozen=True, slots=True)
 class Bound:
     """
-    What a row can promise (rule 16), in seconds.
+    The bound of a row (rule 16), in seconds.
 
-    Of a row with Fallback, how long its outputs stand at most without a message: None where a
-    master of the line decides that. Of a heartbeat, what the timer in the PLC has to be set to.
+    For a row with Fallback: how long its outputs keep their value at most without a message; None
+    where a master of the line decides that. For a heartbeat: the preset for the timer in the PLC.
     """
 
     mapping: Mapping
@@ -93,14 +93,14 @@ def bounds(network: Network, mappings: Sequence[Mapping],
                 yield Bound(mapping, after + longest + fallbacks + scan)
         elif mapping.heartbeat is not None and mapping.period is not None:
             period = mapping.period / 1000
-            # The scan of the PLC counts as what it takes to answer.
+            # The response time stands for the scan of the PLC.
             preset = max(3 * period, period + 2 * longest + beats + response_time)
             yield Bound(mapping, None if network.mode == 'Slave' else preset)
 
 
 def remarks(network: Network, mappings: Sequence[Mapping],
             response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
-    """Yield what is odd about the times of heartbeats and fallbacks (rule 16)."""
+    """Yield remarks on the times of heartbeats and fallbacks (rule 16)."""
     longest = _longest(network, mappings, response_time)
     for mapping in mappings:
         if mapping.heartbeat is not None and mapping.period is not None \
@@ -136,7 +136,7 @@ def _time(model: LineModel, command: int, reply: int, response_time: float) -> f
 
 def own_load(network: Network, mappings: Iterable[Mapping], default_period: float,
              response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
-    """Return the part of the line's time for heartbeats, and for asking who is in RUN."""
+    """Return the part of the line's time for heartbeats and for questions for the mode."""
     model = forecast.line_model(network)
     load, asked = 0.0, dict[int, float]()
     for mapping in mappings:
@@ -156,7 +156,7 @@ def _ask(asked: dict[int, float], station: int, period: float) -> None:
 
 
 def _longest(network: Network, mappings: Iterable[Mapping], response_time: float) -> float:
-    """Return T: that of the settings, and what the longest of our writes takes on the line."""
+    """Return T: the longest transaction of the settings plus the time of our longest write."""
     return forecast.longest_transaction(network) + max(
         (write_time(network, mapping, response_time) for mapping in mappings
          if mapping.heartbeat or mapping.fallback), default=0.0)

@@ -15,8 +15,8 @@
 """
 What a transaction costs on the line: the model that plans and forecasts are made with.
 
-It counts the characters of the real frames. What it does not know is the data of a reply, of
-which one byte in 256 has to be doubled (M 2-7), and how long a station thinks.
+It counts the characters of the real frames. It does not know the data of a reply, of which one
+byte in 256 has to be doubled (M 2-7), nor the response time of a station.
 """
 
 from __future__ import annotations

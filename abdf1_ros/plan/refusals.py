@@ -15,11 +15,11 @@
 """
 What to read instead of a block that a station refuses.
 
-A block is refused as a whole for one address that the station does not have: that of a
-mapping, or of a gap that was bridged. It is divided until the parts are good or can be divided
-no more. A long mapping may also be refused because the processor takes shorter packets than we
-think: it is tried in shorter ones. What has been found is then known to the planner, and all
-mappings of the block are planned anew: the good ones together, and never again with the bad.
+A station refuses a whole block for one address that it does not have: of a mapping, or of a gap
+between mappings. The block is divided until each part is good or cannot be divided any more. A
+long mapping may also be refused because the processor takes only shorter packets than we expect:
+then it is tried in shorter ones. The planner keeps the result, and all mappings of the block are
+planned again: the good ones together, and never again with the bad ones.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Change:
 
 
 class _RefusalSearch:
-    """The search for what is refused of one block."""
+    """The search for the refused words of one block."""
 
     def __init__(self, block: Block) -> None:
         self.mappings = block.mappings
@@ -67,7 +67,7 @@ class _RefusalSearch:
         return self._open == 0
 
     def findings(self) -> list[Span]:
-        """Return the spans that cannot be read; a gap where both sides of it are good."""
+        """Return the spans that cannot be read; a gap is one where both of its sides are good."""
         found = list(self._refused)
         smaller = list(self._refused)
         for span, gap in reversed(self._divided):  # parts before the whole
@@ -78,14 +78,14 @@ class _RefusalSearch:
 
 
 class Refusals:
-    """Tell the blocks to read after a refusal, and teach ``planner`` what comes of it."""
+    """Return the blocks to read after a refusal, and tell ``planner`` the result."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._searches: dict[Block, _RefusalSearch] = {}
 
     def refused(self, block: Block) -> Change | None:
-        """Take note that a station has refused a block; None: read it again all the same."""
+        """Take note that a station has refused a block; None: go on reading it."""
         search = self._searches.pop(block, None)
         halves = self._planner.split(block)
         if not halves:

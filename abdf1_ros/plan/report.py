@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What two checked files will make of a line: the read plan, its times, and what is odd about it.
+The report on two checked files: the read plan, its times, and remarks.
 
-All times are forecasts (see ``forecast``), in seconds. A remark is something that the node runs
-with and that somebody will still wonder about at the machine.
+All times are forecasts (see ``forecast``), in seconds. A remark is about a setting that is valid,
+but may have an effect that nobody expects.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class RemarkKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """Something odd; ``station`` is the one that it is about, None for the line."""
+    """Something unusual; ``station`` is the one that it is about, None for the line."""
 
     kind: RemarkKind
     text: str
@@ -90,7 +90,7 @@ class Report:
 
     @property
     def bounds(self) -> list[interlocks.Bound]:
-        """Return what heartbeats and fallbacks can promise."""
+        """Return the bounds of heartbeats and fallbacks."""
         return list(interlocks.bounds(self.network, self.mappings, self.response_time))
 
     def time(self, block: Block) -> float:
@@ -103,7 +103,7 @@ class Report:
             self.network, self.mappings, self.default_period, self.response_time)
 
     def remarks(self) -> list[Remark]:
-        """Return all that is odd."""
+        """Return all remarks."""
         found = [*setting_remarks(self.network, self.mappings)]
         if not self.mappings:
             text = 'the map has no usable row: nothing is read or written'
@@ -122,7 +122,7 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
 
 
 def setting_remarks(network: Network, mappings: Iterable[Mapping]) -> Iterator[Remark]:
-    """Find what is valid and still odd in both files."""
+    """Find valid, but unusual settings in both files."""
     for text in network_remarks(network):
         yield Remark(RemarkKind.SETTING, text)
     for mapping in mappings:
@@ -135,7 +135,7 @@ def _row_order(block: Block) -> tuple[int, int]:
 
 
 def _station_remarks(report: Report) -> Iterator[Remark]:
-    """Find addresses of stations that clash."""
+    """Find stations whose numbers or types clash."""
     network = report.network
     stations: defaultdict[int, list[Mapping]] = defaultdict(list)
     for mapping in report.mappings:
@@ -170,7 +170,7 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
 
 def _gateway_remarks(network: Network,
                      stations: dict[int, list[Mapping]]) -> Iterator[Remark]:
-    """Find what is odd about the column Via."""
+    """Find unusual values in the column Via."""
     for station, mappings in sorted(stations.items()):
         via = mappings[0].via
         if via is None:
@@ -202,7 +202,7 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
 
 
 def _interlock_remarks(report: Report) -> Iterator[Remark]:
-    """Find heartbeats and fallbacks whose times do not go with those of the line."""
+    """Find heartbeats and fallbacks with times that the line cannot keep."""
     for text in interlocks.remarks(report.network, report.mappings, report.response_time):
         yield Remark(RemarkKind.INTERLOCK, text)
 
@@ -218,7 +218,7 @@ def _period_remarks(report: Report) -> Iterator[Remark]:
 
 
 def _gap_remarks(report: Report) -> Iterator[Remark]:
-    """Find what stands so far apart that reading it together costs much more."""
+    """Find tags that are so far apart in the PLC that reading them costs much more."""
     groups: defaultdict[tuple[StationArea, float], list[Block]] = defaultdict(list)
     for block in report.blocks:
         groups[block.station_area, block.period].append(block)
