@@ -25,6 +25,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 import json
+import math
 from pathlib import Path
 import sys
 from typing import Any
@@ -217,6 +218,7 @@ def _text(found: Findings, report: Report | None) -> str:
     remarks = report.remarks()
     parts += ['', _line_text(report), '', _rows_text(report), '', _plan_text(report), '',
               _times_text(report)]
+    parts += [f'note: {printable(note)}' for note in report.notes()]
     parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
               for remark in remarks]
     if not found.problems and not remarks:
@@ -236,25 +238,35 @@ def _line_text(report: Report) -> str:
 
 def _rows_text(report: Report) -> str:
     """Return what becomes of each row as a table: what a ROS user gets."""
-    head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value'
+    head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms'
     rows = []
-    for mapping in report.mappings:
-        entry = _row(mapping)
-        rows.append([printable(mapping.tag), entry['address'], str(mapping.station),
-                     ' '.join(entry['topics']), entry['message'], str(mapping.length),
-                     entry['value']])
-    return table(head, rows, right=(2, 5))
+    for entry in _rows(report.mappings, report):
+        rows.append([printable(entry['tag']), entry['address'], str(entry['station']),
+                     ' '.join(entry['topics']), entry['message'], str(entry['length']),
+                     entry['value'], '' if entry['stale_ms'] is None else str(entry['stale_ms'])])
+    return table(head, rows, right=(2, 5, 7))
 
 
-def _row(mapping: Mapping) -> dict[str, Any]:
-    """Return what there is to say of a row; a heartbeat has no topic."""
+def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, Any]]:
+    """Return what there is to say of each row."""
+    promised = report.promises(DriverSettings().stale_after) if report else {}
+    return [_row(mapping, promised.get(mapping)) for mapping in mappings]
+
+
+def _row(mapping: Mapping, stale: float | None) -> dict[str, Any]:
+    """
+    Return what there is to say of a row; a heartbeat has no topic.
+
+    ``stale`` is what its topic promises as deadline (s), None for nothing.
+    """
     topics = [f'~/{what}/{mapping.topic}' for what, is_there in (
         ('read', mapping.reads), ('write', mapping.writes)) if is_there]
     return {
         'tag': mapping.tag, 'command': mapping.command.value, 'address': str(mapping.address),
         'station': mapping.station, 'topics': topics,
         'message': mapping.message_type.message if topics else '', 'length': mapping.length,
-        'value': mapping.type.value + _formula(mapping.scaling)}
+        'value': mapping.type.value + _formula(mapping.scaling),
+        'stale_ms': None if stale is None else math.ceil(stale * 1000)}
 
 
 def _formula(scaling: Scaling | None) -> str:
@@ -310,14 +322,14 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
     """Return what there is to say; every key is always there, times are in ms."""
     content: dict[str, Any] = {
         'errors': [_problem(problem) for problem in found.problems],
-        'warnings': [], 'network': None, 'mappings': len(found.mappings),
-        'rows': [_row(mapping) for mapping in found.mappings], 'blocks': [],
+        'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),
+        'rows': _rows(found.mappings, report), 'blocks': [],
         'scan_time_ms': None, 'load': None, 'needed_baud': None, 'bounds': [],
         'response_time_ms': None}
     if report is not None:
         content |= {
             'network': {name: getattr(report.network, name) for name in FIELDS},
-            'warnings': [*map(_remark, report.remarks())],
+            'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
             'scan_time_ms': _ms(report.scan_time), 'load': round(report.load, 4),
             'needed_baud': report.needed_baud(),

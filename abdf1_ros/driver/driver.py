@@ -52,12 +52,12 @@ from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.plan.forecast import (
     block_time,
-    intervals,
     line_model,
     longest_probe,
     longest_transaction,
-    longest_wait,
+    period_of,
     scan_time,
+    stale_times,
 )
 from abdf1_ros.plan.interlocks import MODE_PERIOD, own_load
 from abdf1_ros.plan.planner import Block, Planner
@@ -234,20 +234,12 @@ class Driver:
 
     def _make_points(self, blocks: Sequence[Block]) -> dict[Mapping, ReadPoint]:
         """Return the points of all mappings that read, in their order."""
-        expected = intervals(blocks, own_load=own_load(
-            self.network, self.mappings, self._settings.default_period))
-        found = {mapping: expected[block.period] for block in blocks for mapping in block.mappings}
-        wait = longest_wait(blocks)
+        default = self._settings.default_period
+        stale = stale_times(blocks, default, self._settings.stale_after,
+                            own_load(self.network, self.mappings, default))
         return {mapping: self._served_point(mapping) if mapping.serves
-                else self._polled_point(mapping, found[mapping], wait)
+                else ReadPoint(mapping, period_of(mapping, default), stale[mapping])
                 for mapping in self.mappings if mapping.reads}
-
-    def _polled_point(self, mapping: Mapping, interval: float, wait: float) -> ReadPoint:
-        """Return a point; its block is read every ``interval`` s, at most ``wait`` s late."""
-        period = self._settings.default_period if mapping.period is None \
-            else mapping.period / 1000
-        return ReadPoint(
-            mapping, period, self._settings.stale_after * max(period, interval) + wait)
 
     def _served_point(self, mapping: Mapping) -> ReadPoint:
         # Without a Period the other end may write at any time, or never.

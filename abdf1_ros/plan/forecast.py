@@ -90,6 +90,26 @@ def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_
                default=0.0)
 
 
+def stale_times(blocks: Iterable[Block], default_period: float, stale_after: float,
+                own_load: float = 0.0) -> dict[Mapping, float]:
+    """
+    Return after how many seconds a value of each mapping that is read counts as lost.
+
+    That is what topics promise: ``stale_after`` times the interval that can be expected, and the
+    longest wait for the line. ``default_period`` is in seconds.
+    """
+    blocks = list(blocks)
+    expected, wait = intervals(blocks, own_load=own_load), longest_wait(blocks)
+    return {mapping: stale_after * max(period_of(mapping, default_period),
+                                       expected[block.period]) + wait
+            for block in blocks for mapping in block.mappings}
+
+
+def period_of(mapping: Mapping, default_period: float) -> float:
+    """Return the seconds that a mapping wants from one read to the next."""
+    return default_period if mapping.period is None else mapping.period / 1000
+
+
 def longest_transaction(network: Network) -> float:
     """
     Return the seconds that a transaction takes at most, every repetition included (S0).

@@ -137,22 +137,42 @@ def _time(model: LineModel, command: int, reply: int, response_time: float) -> f
 def own_load(network: Network, mappings: Iterable[Mapping], default_period: float,
              response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
     """Return the part of the line's time for heartbeats and for questions for the mode."""
-    model = forecast.line_model(network)
-    load, asked = 0.0, dict[int, float]()
+    mappings = list(mappings)
+    beats = sum(write_time(network, mapping, response_time) / (mapping.period / 1000)
+                for mapping in mappings if mapping.heartbeat is not None and mapping.period)
+    return beats + sum(_question_time(network, response_time) / period
+                       for period in _asked(mappings, default_period).values())
+
+
+def _asked(mappings: Iterable[Mapping], default_period: float) -> dict[int, float]:
+    """Return the seconds between two questions for the mode, by station."""
+    asked: dict[int, float] = {}
+
+    def ask(station: int, period: float) -> None:
+        asked[station] = min(period, asked.get(station, period))
+
     for mapping in mappings:
-        if mapping.heartbeat is not None and mapping.period:
-            load += write_time(network, mapping, response_time) / (mapping.period / 1000)
         if (mapping.heartbeat or mapping.fallback) and not mapping.serves:
-            _ask(asked, mapping.station, MODE_PERIOD)
-        if mapping.publish_while is not None and mapping.publish_while.tag is None:
-            period = default_period if mapping.period is None else mapping.period / 1000
-            _ask(asked, mapping.station, max(period, 0.01))
-    status = _time(model, *_STATUS_BYTES, response_time)
-    return load + sum(status / period for period in asked.values())
+            ask(mapping.station, MODE_PERIOD)
+        if mapping.needs_run:
+            ask(mapping.station, max(forecast.period_of(mapping, default_period), 0.01))
+    return asked
 
 
-def _ask(asked: dict[int, float], station: int, period: float) -> None:
-    asked[station] = min(period, asked.get(station, period))
+def _question_time(network: Network, response_time: float) -> float:
+    """Return the seconds that it takes to ask a station for its mode."""
+    return _time(forecast.line_model(network), *_STATUS_BYTES, response_time)
+
+
+def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
+          response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
+    """Yield what Publish_While RUN costs, for each station."""
+    guarded = {mapping.station for mapping in mappings if mapping.needs_run}
+    for station, period in sorted(_asked(mappings, default_period).items()):
+        if station in guarded:
+            part = _question_time(network, response_time) / period
+            yield (f'Publish_While RUN: asking station {station} for its mode about every '
+                   f'{_ms(period)} takes {part:.0%} of the time')
 
 
 def _longest(network: Network, mappings: Iterable[Mapping], response_time: float) -> float:

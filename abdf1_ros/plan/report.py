@@ -32,9 +32,10 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.plan import forecast, interlocks
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
+from abdf1_ros.settings.values import ValueType
 
 _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the poll cycle
@@ -93,6 +94,15 @@ class Report:
         """Return the bounds of heartbeats and fallbacks."""
         return list(interlocks.bounds(self.network, self.mappings, self.response_time))
 
+    def promises(self, stale_after: float) -> dict[Mapping, float]:
+        """Return the stale time (s) of each row that we read and that promises to publish."""
+        # As the node forecasts it, whatever a PLC really takes to answer.
+        stale = forecast.stale_times(
+            self.blocks, self.default_period, stale_after,
+            interlocks.own_load(self.network, self.mappings, self.default_period))
+        return {mapping: time for mapping, time in stale.items()
+                if mapping.publish is Publish.ALWAYS}
+
     def time(self, block: Block) -> float:
         """Return the seconds that a block takes, answers included."""
         return forecast.block_time(block, self.response_time)
@@ -101,6 +111,17 @@ class Report:
         """Return the lowest baud rate that is enough for the periods, None when none is."""
         return forecast.needed_baud(
             self.network, self.mappings, self.default_period, self.response_time)
+
+    def notes(self) -> list[str]:
+        """Return what somebody should know, and what is not odd at all."""
+        found = list(interlocks.costs(
+            self.network, self.mappings, self.default_period, self.response_time))
+        bits = [mapping for mapping in self.mappings if mapping.command is Command.READ
+                and mapping.type is ValueType.BOOL and mapping.publish_while is None]
+        if bits:
+            found.append(f'bits without Publish_While: {_tags(bits)}; their values go on when the '
+                         'program of the PLC stops')
+        return found
 
     def remarks(self) -> list[Remark]:
         """Return all remarks."""

@@ -151,6 +151,11 @@ class Mapping:
         """Tell whether values of messages are written."""
         return self.command not in (Command.READ, Command.HEARTBEAT)
 
+    @property
+    def needs_run(self) -> bool:
+        """Tell whether values are published only while the PLC says that it is in RUN."""
+        return self.publish_while is not None and self.publish_while.tag is None
+
     def shares_words(self, other: Mapping) -> bool:
         """Tell whether both have words of one station in common; for bits, the same bits."""
         if (self.station, self.address.area) != (other.station, other.address.area):

@@ -59,8 +59,9 @@ def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     assert 'Mode Master, 9600 baud' in out
     cells = out.splitlines()[7].split()
     assert '\n'.join(out.splitlines()[3:5]) == (
-        'tag    address  station  topic         message          Length  value\n'
-        'speed  N7:0           1  ~/read/speed  Int16MultiArray       2  int16')
+        'tag    address  station  topic         message          Length  value  stale ms\n'
+        # Three Periods, and the 74.2 ms below.
+        'speed  N7:0           1  ~/read/speed  Int16MultiArray       2  int16      3075')
     # 52 characters of 10 bits at 9600 baud, and two answers of 10 ms.
     assert cells == ['1', 'PLC5', 'N7:0', 'N7:1', '2', '4', '1', '54.2', '74.2', '1000.0', 'speed']
     assert 'expected poll cycle: 74.2 ms' in out
@@ -141,8 +142,20 @@ def test_rows_tell_what_a_ros_user_gets(files: tuple[Path, Path],
     assert level == {
         'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
         'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
-        'length': 1, 'value': 'int16 * 0.1 -40'}
-    assert (alive['topics'], alive['message']) == ([], '')
+        'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms']}
+    assert 300 < level['stale_ms'] < 600
+    assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
+
+
+def test_notes_are_no_warnings(files: tuple[Path, Path],
+                               capsys: pytest.CaptureFixture[str]) -> None:
+    bits = 'bits,Read,B3:0/0,1,PLC5,3,1000'
+    assert check(files, GOOD_NET, (bits,)) == 0
+    note = 'bits without Publish_While: bits; their values go on when the program of the PLC stops'
+    assert capsys.readouterr().out.endswith(f'\nnote: {note}\nno errors, no warnings\n')
+    assert check(files, GOOD_NET, (bits,), '--json') == 0
+    content = parsed(capsys)
+    assert (content['notes'], content['warnings']) == ([note], [])
 
 
 def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,8 +163,8 @@ def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
     assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0
     content = parsed(capsys)
     assert list(content) == [
-        'errors', 'warnings', 'network', 'mappings', 'rows', 'blocks', 'scan_time_ms', 'load',
-        'needed_baud', 'bounds', 'response_time_ms']
+        'errors', 'warnings', 'notes', 'network', 'mappings', 'rows', 'blocks', 'scan_time_ms',
+        'load', 'needed_baud', 'bounds', 'response_time_ms']
     assert content['blocks'][1]['last'] == 'F8:0'
     assert content['blocks'][0] == {
         'station': 1, 'plc_type': 'PLC5', 'first': 'N7:0', 'last': 'N7:1', 'words': 2,

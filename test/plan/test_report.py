@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
+from abdf1_ros.settings.heartbeats import PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -227,3 +228,25 @@ def test_many_tags_are_not_all_named() -> None:
     report = report_of(*(make_mapping(f'N7:{number}', period=20, tag=f't{number}', item=number)
                          for number in range(5)))
     assert texts(report, RemarkKind.PERIOD)[0].startswith('t0, t1, t2 and 2 more: a read takes')
+
+
+def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None:
+    run = PublishWhile(None, None)
+    rows = [make_mapping('B3:0/0', tag='door', period=1000),
+            make_mapping('B3:0/1', tag='guarded', period=1000, publish_while=run),
+            make_mapping('B3:0/2', 'ReadWrite', tag='command', period=1000),
+            make_mapping('N7:0', tag='word', period=1000)]
+    # A command of 7 bytes in a frame of 16, ACK 2, poll 4, reply of 32 in a frame of 38, ACK 2.
+    cost, bits = report_of(*rows).notes()
+    assert bits == ('bits without Publish_While: door; their values go on when the program of the '
+                    'PLC stops')
+    assert cost == ('Publish_While RUN: asking station 1 for its mode about every 1000 ms takes '
+                    f'{62 * CHARACTER + ANSWERS:.0%} of the time')
+    assert report_of(rows[3]).notes() == []
+
+
+def test_rows_promise_three_intervals_and_a_read() -> None:
+    row, silent = make_mapping('N7:0', length=2), make_mapping('N7:0', publish='Change')
+    assert report_of(row, silent).promises(3) == {row: pytest.approx(3 + TWO_WORDS + ANSWERS)}
+    # The node does not know how slow the PLC is, and so promises the same.
+    assert report_of(row, response=0.1).promises(3) == report_of(row).promises(3)
