@@ -58,8 +58,8 @@ from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
-from abdf1_ros.sniffer.session import TrafficDecoder
 from abdf1_ros.sniffer.summary import Summary
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import printable
 
 EXIT_LOST = 1  # a port that was there, or a file that cannot be read

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a PLC's words are reached, where its family has more than one way."""
+"""The ways to the words of a PLC, for families that have more than one."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Addressing(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """A stretch of data table whose words are numbered through: a file, or one I/O slot."""
+    """A stretch of data table with words numbered from 0: a file, or one I/O slot."""
 
     plc_type: PlcType
     file_type: FileType
@@ -138,7 +138,7 @@ class Address:
         return replace(self, bit=bit)
 
     def is_value(self, words: int) -> bool:
-        """Tell whether so many words from here on are one value of a structure."""
+        """Tell whether ``words`` words from here on are one value of a structure."""
         return self.file_type.is_structure and self.layout.value_words(self.word) == words
 
     def __str__(self) -> str:

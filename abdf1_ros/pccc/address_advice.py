@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What people write for an address of a PLC-5, SLC or MicroLogix that is none, and what they mean.
+Advice for a text that is not an address of a PLC-5, SLC or MicroLogix.
 
-Each of these is refused with the words of whoever wrote it: a form of the other family, a range,
-a letter for a digit, files that these commands do not reach.
+Usual mistakes get an answer of their own: an address of the other family, a range, a letter for a
+digit, files that these commands do not reach.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _BIT_AFTER_DOT = re.compile(
     r'(?P<word>[#$]?(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})', re.ASCII)
 _SLC_IO = re.compile(r'[#$]?[IO]\d?[:;]\d+\.\d+(?:/\d+)?', re.ASCII)
 _PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0[0-7]{2}(?:/[0-7]{1,2})?', re.ASCII)
-# An O that belongs to no word, where digits stand.
+# The letter O among digits.
 _LETTER_O = re.compile(r'(?<=[:;./0-9O])O(?![A-NP-Z])', re.ASCII)
 # The function files of the MicroLogix; they are read by other commands than data files.
 _FUNCTION_FILES = re.compile(
@@ -42,7 +42,7 @@ _FUNCTION_FILES = re.compile(
 
 
 def advice(text: str, plc_type: PlcType) -> str | None:
-    """Return what is wrong with an address in capital letters, None where nothing like this is."""
+    """Return the advice for an address in capital letters, None for no usual mistake."""
     if match := _RANGE.fullmatch(text):
         return _of_range(match)
     if plc_type is PlcType.SLC and (match := _FUNCTION_FILES.fullmatch(text)):

@@ -28,7 +28,7 @@ class AddressRangeError(FormatError):
 
 
 class AddressRefusal(FormatError):
-    """The address in a command leads nowhere; ``ext_sts`` is what a PLC answers (M 8-4)."""
+    """The address in a command does not exist; a PLC answers with ``ext_sts`` (M 8-4)."""
 
     def __init__(self, ext_sts: int, text: str) -> None:
         super().__init__(text)

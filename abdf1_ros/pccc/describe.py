@@ -48,8 +48,8 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
     """
     Return what a command asks, or what a reply says.
 
-    ``command`` is the one that a reply answers; without it the data of a reply are bytes. What
-    is not known, or does not keep to its format, is given in hexadecimal.
+    ``command`` is the one that a reply answers; without it the data of a reply are bytes. Unknown
+    or malformed parts are given in hexadecimal.
     """
     if not packet.is_reply:
         return _describe_command(packet)
@@ -160,7 +160,7 @@ def _masked_write(request: slc.MaskedWrite) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _SymbolicName:
-    """A name that a PLC-3 has for a place (M 13-8); only it knows which."""
+    """A symbol of a PLC-3 for an address (M 13-8), which only that PLC knows."""
 
     name: str
 
@@ -304,7 +304,7 @@ _COMMANDS: dict[_CommandCode, _KnownCommand] = {
         'masked write', slc.MaskedWrite.read, _masked_write),
 }
 
-# What else there is (M 7-2, 7-3; 0F/94 is from practice); the parameters are given as bytes.
+# All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
 _NAMES: dict[_CommandCode, str] = {
     (0x03, None): 'physical write', (0x04, None): 'physical read',
     (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables',

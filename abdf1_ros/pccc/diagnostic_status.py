@@ -28,8 +28,8 @@ def decode_identity(data: bytes) -> Identity:
     """
     Read the data of a reply to 06/03.
 
-    What has no form that is known is shown in hexadecimal and not interpreted. Raises
-    FormatError for a reply that is too short to tell.
+    Data of an unknown layout are shown in hexadecimal. Raises FormatError for a reply that is too
+    short to tell.
     """
     if len(data) < 2:
         raise FormatError(f'a diagnostic status of {len(data)} bytes')

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-The diagnostic commands that every node answers (M 7-6..7-27), and those that nobody may send us.
+The diagnostic commands that every node answers (M 7-6..7-27), and those that we refuse.
 
-Here are their bytes. What a diagnostic status says is in ``identity``, what diagnostic counters
-count in ``link_counters``. This driver sends no command that changes a processor's mode or the
-settings of a link, and refuses those that it gets.
+This module has their bytes. The diagnostic status is in ``identity``, the diagnostic counters are
+in ``link_counters``. This driver sends no command that changes a processor's mode or the settings
+of a link, and refuses such commands.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class Dialect(Protocol):
     Turn an address and a number of words into a request, and a reply's data into words.
 
     Data are words in the order of ``Address.offset``, each low byte first. A packet that is not
-    the whole of a transfer is told which it is part of. ``writes_bits`` is False where a family
+    the whole of a transfer is encoded with that transfer. ``writes_bits`` is False where a family
     has no command that changes single bits; ``write_bits`` then raises FormatError.
     """
 
@@ -77,10 +77,10 @@ class Dialect(Protocol):
         """Return the bytes after the header of the reply to that read."""
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
-        """Return the words in the reply to that read; FormatError when they are not there."""
+        """Return the words in the reply to that read; FormatError when they are missing."""
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
         """Return a write of whole words."""
 
     def write_bits(self, address: Address, mask: int, bits: int) -> Request:
-        """Return what changes the bits of ``mask`` in one word to ``bits``."""
+        """Return a request that changes the bits of ``mask`` in one word to ``bits``."""

@@ -25,7 +25,7 @@ from abdf1_ros.pccc.identity import Mode
 
 
 class Setting(Enum):
-    """What an emulated processor can be set to."""
+    """The modes and faults that an emulated processor can be set to."""
 
     RUN = 'run'
     PROGRAM = 'program'
@@ -34,7 +34,7 @@ class Setting(Enum):
     FAULT = 'fault'
 
 
-# A processor that has faulted stands still as in program mode.
+# With a fault the program does not run, as in program mode.
 _MODES = {
     Setting.RUN: Mode.RUN, Setting.PROGRAM: Mode.REMOTE_PROGRAM, Setting.REMOTE: Mode.REMOTE_RUN,
     Setting.TEST: Mode.REMOTE_TEST, Setting.FAULT: Mode.REMOTE_PROGRAM}
@@ -46,7 +46,7 @@ class EmulatedProcessor:
     A processor of a family, and what it is set to at the moment.
 
     It is an SLC 5/03, a PLC-5/40, a PLC-3 behind the RS-232 port of a 1775-KA, or a PLC-2
-    behind a 1771-KG. What does not exist here (memory, programs) is 0.
+    behind a 1771-KG. Fields for memory and programs, which it does not have, are 0.
     """
 
     plc_type: PlcType

@@ -64,7 +64,7 @@ def accesses_of(plc_type: PlcType) -> tuple[Access, ...]:
 def dialect_of(plc_type: PlcType, access: Access | None = None,
                processor: Processor | None = None) -> Dialect:
     """
-    Return how such a PLC is spoken to; None stands for what is usual in the family.
+    Return the dialect for such a PLC; None stands for the usual access of the family.
 
     Raises FormatError when the family does not have this access, and for a processor of
     another family.

@@ -33,7 +33,7 @@ from abdf1_ros.pccc.status import Meanings, USUAL_MEANINGS
 @dataclass(frozen=True, slots=True)
 class Family:
     """
-    A PLC family: how its places are written, how it is spoken to, and how we play one.
+    A PLC family: its addresses, its commands for us as a client, and its emulation as a server.
 
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
     another family to 06/03; ``encode_identity`` makes one for a mode, a fault and full duplex.

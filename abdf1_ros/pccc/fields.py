@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Variable-length numbers of PCCC, and a reader that knows when bytes run out."""
+"""Variable-length numbers of PCCC, and a reader of fields."""
 
 from __future__ import annotations
 

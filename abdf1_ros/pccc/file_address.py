@@ -42,11 +42,11 @@ _FORM = re.compile(
 
 _FIXED_FILES = {FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2}
 _FIRST_FREE_FILE = 3
-# Files of words whose bits may be numbered through.
+# Files of words whose bits may be numbered from the first word on.
 _FLAT_BITS = (FileType.BINARY, FileType.INTEGER, FileType.ASCII, FileType.BCD)
-# S0 writes a word of such an element with "/", as others write a bit.
+# S0 writes "/" before a word of such an element, others write it before a bit.
 _NAMED_BITS = (FileType.TIMER, FileType.COUNTER, FileType.CONTROL)
-# Files that exist and that we do not know well enough to read them.
+# Files that exist, but that we do not know well enough to read.
 _OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch'}
 
 
@@ -56,7 +56,7 @@ class FileAddressing(Addressing):
     last_file: ClassVar[int]
 
     def parse(self, text: str, access: Access | None = None) -> Address:
-        """Read an address; what it raises, it raises with what would be right."""
+        """Read an address; an error says what would be right."""
         text = text.strip().upper()
         if found := advice(text, self.plc_type):
             raise AddressSyntaxError(found)
@@ -205,7 +205,7 @@ def _with_member(address: Address, name: str) -> Address:
 
 
 def _check_named(address: Address, bit: int) -> None:
-    """Refuse a bit of the first word that has no name: somebody may mean word ``bit``."""
+    """Refuse a bit of the first word without a name: the word of that number may be meant."""
     members = address.layout.members
     if any((member.word, member.bit) == (0, bit) for member in members.values()):
         return

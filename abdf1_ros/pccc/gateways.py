@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What gateways to other links, and cards of computers, say of themselves (M 10-7, 10-15..10-19).
+The identity of gateways to other links, and of computer cards (M 10-7, 10-15..10-19).
 
-They have no processor and no mode. One with its name in the reply is told by that, the others
-by two bytes; their counters lie at an address that the reply names.
+They have no processor and no mode. Some have their name in the reply, the others are known by two
+bytes; their counters are at an address that the reply has.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class _Module:
     release: int = 8
 
 
-# By the bytes from 2 on that tell it.
+# By the two bytes from byte 2 on.
 _MODULES = {
     bytes((0xEE, 0x10, 0x10)): _Module('1785-KA'),  # M 10-16
     bytes((0xEE, 0x30, 0x2F)): _Module('1785-KA5'),  # M 10-17, asked over DH+

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What a processor or module says of itself in the reply to a diagnostic status command (06/03).
+What a processor or module tells about itself in the reply to a diagnostic status command (06/03).
 
 Each family has layouts of its own: ``identity`` in the folders of the families, and
 ``gateways``; ``diagnostic_status`` finds out which one a reply has.
@@ -29,7 +29,7 @@ from abdf1_ros.text import printable
 
 
 class Mode(Enum):
-    """What the key and the programmer have set a processor to, in the words of their screens."""
+    """The mode of a processor, in the words of its programming software."""
 
     REMOTE_RUN = 'REM RUN'
     RUN = 'RUN'
@@ -51,14 +51,14 @@ class Mode(Enum):
 
     @property
     def words(self) -> str:
-        """Return what the mode is called in a sentence."""
+        """Return the name of the mode for a sentence."""
         return _MODE_WORDS[self.value.removeprefix('REM ').partition(',')[0]]
 
 
 _MODE_WORDS = {'RUN': 'run', 'PROG': 'program', 'TEST': 'test', 'SUSPEND': 'suspend',
                'DOWNLOAD': 'download'}
 
-# What to ask a module for whose counters are single bytes in an order of its own (M 9-10).
+# The size for a module whose counters are single bytes in an order of its own (M 9-10).
 _MODULE_COUNTERS = 55
 
 
@@ -69,7 +69,7 @@ _PLC_TYPES = {'SLC': PlcType.SLC, 'PLC-5': PlcType.PLC5, 'PLC-3': PlcType.PLC3,
 @dataclass(frozen=True, slots=True)
 class Identity:
     """
-    Who is there, in which mode, and what is wrong with it.
+    The type of a station, its mode, and its faults.
 
     ``family`` is SLC, PLC-5, PLC-3, PLC-2 or empty where it is unknown; ``mode`` None where the
     reply has none or one without a name, which is then in ``mode_text``. ``faults`` keep a

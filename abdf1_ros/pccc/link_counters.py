@@ -15,8 +15,8 @@
 """
 The diagnostic counters of a port, as read with 06/01 (M 9-6, 9-7, 9-31).
 
-They are words, low byte first, in an order that depends on the processor and on what its port
-is set to; the reply does not say which. A counter of 16 bits begins again at 0 after 65535.
+They are words, low byte first, in an order that depends on the processor and on the setting of its
+port; the reply does not tell the order. A counter of 16 bits begins again at 0 after 65535.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def layout_of(identity: Identity | None) -> CounterLayout | None:
 
 
 def counter_request(identity: Identity | None) -> ReadCounters:
-    """Return what reads the counters of the port of that processor."""
+    """Return the command that reads the counters of the port of that processor."""
     layout = layout_of(identity)
     if layout is not None:
         return ReadCounters(0, layout.size)

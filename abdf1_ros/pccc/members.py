@@ -15,9 +15,9 @@
 """
 The named parts of the structures in a data table, and which of them may be written.
 
-What says where a transfer goes, and what reports how something went, belongs to the processor:
-a wrong number there moves other data, a wrong bit hides a fault. So of message and block
-transfer structures only the bits are written that a program sets too, CO and TO.
+Members that hold the target of a transfer, or the result of an instruction, belong to the
+processor: a wrong number there moves other data, a wrong bit hides a fault. So in message and
+block transfer structures only the bits CO and TO may be written, which a program sets too.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ PLC5_BLOCK_TRANSFER = _flags(0, CO=11, TO=8) | _read_only(
     | _values(1, 'RLEN', 'DLEN', 'FILE', 'ELEM', 'RGS'))
 PLC5_MESSAGE = _flags(0, TO=8, CO=3) | _read_only(
     _flags(0, NR=9, EN=7, ST=6, DN=5, ER=4, EW=2) | _values(1, 'ERR', 'RLEN', 'DLEN'))
-# Behind the floats come four words of addresses and the loop's own data.
+# After the floats come four words of addresses and the loop's own data.
 PLC5_PID = _read_only(
     _flags(0, EN=15, CT=9, CL=8, PVT=7, DO=6, SWM=4, CA=2, MO=1, PE=0)
     | _values(2, 'SP', 'KP', 'KI', 'KD', 'BIAS', 'MAXS', 'MINS', 'DB', 'SO', 'MAXO', 'MINO',

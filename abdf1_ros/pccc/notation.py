@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Places and values as they stand in commands, in the words of a controls engineer."""
+"""Addresses and values of commands, written as a controls engineer writes them."""
 
 from __future__ import annotations
 

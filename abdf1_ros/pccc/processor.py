@@ -49,7 +49,7 @@ class Processor(Enum):
 
     @property
     def may_lack_masked_write(self) -> bool:
-        """Tell whether the manuals do not say that it has the masked write (0F/AB)."""
+        """Tell whether it may lack the masked write (0F/AB): no manual says that it has it."""
         return _MODELS[self] in (_OLD, _ML1000)
 
     def has_file(self, file: int, file_type: FileType) -> bool:
@@ -66,7 +66,7 @@ USUAL = Processor.SLC_5_03
 
 @dataclass(frozen=True, slots=True)
 class _Model:
-    """What processors have in common."""
+    """The properties that differ between processors."""
 
     max_read: int
     max_write: int
@@ -81,7 +81,7 @@ _OLD = _Model(82, 82, frozenset((
 _NEW = _Model(slc.MAX_READ, slc.MAX_WRITE, frozenset((FileType.LONG,)))
 # AG-UM008C 3-38; it has one file each of types O, I, S, B, T, C, R and N.
 _ML1000 = _Model(82, 82, frozenset((FileType.FLOAT,)), has_fixed_files=True)
-# 103 words are what the MicroLogix 1100 is good for (1763-RM001); the others take no less.
+# The MicroLogix 1100 takes 103 words (1763-RM001); the others take at least as many.
 _MICROLOGIX = _Model(206, 206)
 
 _MODELS = {

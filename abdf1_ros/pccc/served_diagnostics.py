@@ -40,9 +40,8 @@ def served_diagnostics(processor: EmulatedProcessor,
     """
     Return what executes each command, by CMD and FNC; FormatError for a bad request.
 
-    Without ``counters`` there are none to be read. Commands that set up a link (06/02, 04 to
-    06, 08) are not among them: what we are set up by is a file, and nobody changes it from the
-    line.
+    Without ``counters`` a read of them is refused. Commands that set up a link (06/02, 04 to 06,
+    08) are not served: our settings come from a file, and must not be changed from the line.
     """
     commands: Commands = {
         (CMD, ECHO): lambda reader: _echo(reader, max_echo(processor.plc_type)),

@@ -15,8 +15,8 @@
 """
 Answer commands from a data table, as a PLC of the table's family does.
 
-What a real one answers to a bad request is in M 8-2..8-4 only in part; the choices here are
-those that drivers in the field report.
+M 8-2..8-4 tell only a part of the answers of a real PLC to bad requests; the others are those that
+drivers in the field report.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ _ADDRESS_FAULTS = (
     EXT_BAD_SYMBOL, EXT_BAD_ADDRESS, EXT_WRONG_SIZE, EXT_PAST_THE_END, EXT_TOO_LARGE,
     EXT_DELETED_AREA, EXT_TYPE_MISMATCH, EXT_PROTECTED)
 
-# Behind these stands the address of the node that owns the file or program (M 8-5).
+# After these comes the address of the node that owns the file or program (M 8-5).
 _WITH_OWNER = (0x1A, 0x1B)
 
 _LOCAL = {
@@ -114,7 +114,7 @@ _EXTENDED = {
 
 @dataclass(frozen=True, slots=True)
 class Meanings:
-    """What a family means by codes, where that is more or something else than in M 8-2..8-4."""
+    """The meanings of a family's codes, where they differ from M 8-2..8-4."""
 
     sts: Mapping[int, str] = field(default_factory=dict)
     ext_sts: Mapping[int, str] = field(default_factory=dict)

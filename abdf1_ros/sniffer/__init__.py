@@ -13,8 +13,8 @@
 # limitations under the License.
 
 """
-What is said on a DF1 line, told to people: decoding of traffic, without clock, port or file.
+Decoding of the traffic on a DF1 line, for people; without clock, port or file.
 
-``Session`` takes chunks of bytes and gives entries, ``Summary`` counts those, ``report`` writes
-both as text or JSON.
+``TrafficDecoder`` takes chunks of bytes and gives entries, ``Summary`` counts those, ``report``
+writes both as text or JSON.
 """

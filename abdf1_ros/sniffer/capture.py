@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Captures: what has been on a line, as text that can be sent to somebody else.
+Captures: the recorded bytes of a line, as text that can be sent to somebody else.
 
 A capture is ASCII, one line for each chunk of bytes as it was read or written::
 
@@ -46,7 +46,7 @@ from abdf1_ros.text import printable
 VERSION = 1
 _MAGIC = '# abdf1_ros capture'
 _FIRST_LINE = f'{_MAGIC} {VERSION}'
-# Seconds; the time of day since 1970 is less, too.
+# Seconds; more than the seconds since 1970.
 _LATEST = 1e10
 # Characters of a line that a Problem shows.
 _SHOWN = 60
@@ -66,7 +66,7 @@ class Direction(Enum):
 
 
 class Chunk(NamedTuple):
-    """Bytes as they were read or written; ``time`` in seconds, None where nobody noted it."""
+    """Bytes as they were read or written; ``time`` in seconds, None where not recorded."""
 
     time: float | None
     direction: Direction
@@ -79,7 +79,7 @@ class Chunk(NamedTuple):
 
 class CaptureWriter:
     """
-    Write a capture to ``path``, and begin anew when it has become too long.
+    Write a capture to ``path``, and begin a new file when it has become too long.
 
     ``limit`` is the most bytes on the disk: at half of it the file is renamed to ``<path>.1``,
     in place of an older one, as is a capture that is there already. Every line is handed to the
@@ -93,7 +93,7 @@ class CaptureWriter:
         self._limit = limit / 2
         head = '\n'.join([_FIRST_LINE, *(
             f'# {name}: {printable(value)}' for name, value in (settings or {}).items())])
-        # Escaped here, so that what is counted is what is written.
+        # Escaped here, so that the escaped length is counted.
         self._head = head.encode('ascii', 'backslashreplace').decode('ascii')
         self._written = 0
         if path.exists() and not _is_capture(path):
@@ -115,7 +115,7 @@ class CaptureWriter:
     def _begin(self) -> TextIO:
         if self.path.exists():
             self.path.replace(f'{self.path}.1')
-        self.path.touch(0o640)  # what is on a line is not for everyone
+        self.path.touch(0o640)  # not for every user: it holds the values of a plant
         self._file = self.path.open('w', encoding='ascii', buffering=1)
         self._written = 0
         self._put(self._head)
@@ -142,7 +142,7 @@ def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> I
     """
     Yield the chunks of a capture, and put its settings into ``settings`` as they come.
 
-    ``name`` is the file's in the Problem that is raised for a line that is none.
+    ``name`` names the file in the Problem that is raised for a line that is not one of a capture.
     """
     for number, text in enumerate(lines, 1):
         line = text.strip()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which reply belongs to which command, and what is said twice."""
+"""Which reply belongs to which command, and which messages are repetitions."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
 from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.entries import Mark
 
-# Seconds after which no reply is expected any more: Cmd_Timeout goes up to 5 s (S0), and a
-# master with standard polling may need as long to get round to the station.
+# Seconds after which no reply is expected any more: Cmd_Timeout is at most 5 s (S0), and a master
+# with standard polling may need as long until it polls the station.
 _PATIENCE = 10.0
 _MOST_OPEN = 1000
 
@@ -34,7 +34,7 @@ _Key = tuple[int, int, int]
 
 @dataclass(slots=True)
 class _Said:
-    """A message as it was last said by one node to another."""
+    """The last message of one node to another."""
 
     packet: Packet
     acknowledged: bool = False
@@ -42,7 +42,7 @@ class _Said:
 
 @dataclass(slots=True)
 class Transaction:
-    """A command, when it was first said, and whether its reply has been heard."""
+    """A command, the time of its first transmission, and whether its reply has come."""
 
     command: Packet
     time: float | None
@@ -50,7 +50,7 @@ class Transaction:
 
 
 class MessageFacts(NamedTuple):
-    """What there is to say about a message because of those before it."""
+    """What the messages before a message tell about it."""
 
     command: Packet | None = None
     latency: float | None = None
@@ -61,8 +61,8 @@ class Conversation:
     """
     Remember the messages of a line; every good one is handed to ``take``.
 
-    Times that go back far are those of another recording; what is open then gets no reply. A
-    little they may go back where two ports are heard.
+    Times that go back far belong to another recording; open commands then get no reply. They may
+    go back a little where two ports are recorded.
     """
 
     def __init__(self) -> None:
@@ -93,7 +93,7 @@ class Conversation:
         return MessageFacts(command, latency, marks)
 
     def acknowledge(self, direction: Direction) -> None:
-        """Take an ACK that went ``direction``: it is for what went the other way."""
+        """Take an ACK in this ``direction``: it is for the last message in the other."""
         said = self._last.get(direction.opposite)
         if said is not None:
             said.acknowledged = True
@@ -117,7 +117,7 @@ class Conversation:
         return [entry for entry in self._open.values() if not entry.answered]
 
     def _repetition(self, packet: Packet, from_master: bool) -> Mark | None:
-        """Return how this message repeats another, and keep it as the last of its path."""
+        """Return how this message repeats another, and keep it as the last of its direction."""
         path = _path(packet)
         last = self._said.get((*path, from_master))
         if last is not None and last.packet == packet:
@@ -132,12 +132,12 @@ class Conversation:
         key = command.src, command.dst, command.tns
         known = self._open.get(key)
         if command.dst == BROADCAST:
-            return  # nobody replies
+            return  # no station replies
         if known is not None and mark is not None and not (
                 mark is Mark.DUPLICATE and known.answered):
             return
         if known is not None and not known.answered:
-            self._given_up.append(known)  # its TNS is used for something else
+            self._given_up.append(known)  # its TNS is used for another command
         self._open.pop(key, None)  # the new one takes its place at the end
         self._open[key] = Transaction(command, time)
 

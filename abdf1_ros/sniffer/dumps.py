@@ -29,10 +29,10 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
 
 _BLOCK = 4096
-# Bytes of a line of text: no program writes longer ones, and what has no line ends at all, such as
-# /dev/zero, must not fill the memory.
+# The longest text line in bytes: no program writes longer ones, and a file without line ends, such
+# as /dev/zero, must not fill the memory.
 _LONGEST_LINE = 1_000_000
-# The bytes, and behind two spaces what they are as characters.
+# The bytes, and after two spaces the same as characters.
 _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?',
                       re.IGNORECASE)
@@ -67,7 +67,7 @@ class Recording:
         return 100 * self._position // max(1, self._size)
 
     def chunks(self) -> Iterator[Chunk]:
-        """Yield the chunks; Problem names file and line of what cannot be read."""
+        """Yield the chunks; Problem names file and line where something cannot be read."""
         with self._file:
             if self._is_binary:
                 yield from self._binary()
@@ -103,7 +103,7 @@ def _chained(first: str, rest: Iterable[str]) -> Iterator[str]:
 
 
 def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
-    """Yield the chunks of a hex dump; Problem names file and line of what is none."""
+    """Yield the chunks of a hex dump; Problem names file and line of anything else."""
     end = 0  # where the last line with an offset has ended
     last = b''
     is_repeated = False

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One thing that was seen on the line."""
+"""An entry: one symbol or event in the traffic of a line."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from abdf1_ros.sniffer.capture import Direction
 
 
 class Kind(Enum):
-    """What an entry is; the value is how it is called in text and JSON."""
+    """What an entry is; the value is its name in text and JSON."""
 
     POLL = 'poll'
     COMMAND = 'command'
@@ -64,9 +64,9 @@ class Entry:
 
     ``time`` is seconds, None where the recording has no times. ``station`` is the slave, or
     on a full-duplex line the node that commands go to and replies come from. ``valid`` is the
-    verdict of the check of kind ``checksum``, None for what has none. ``latency`` is the
-    seconds from a command to its reply. ``size`` counts the bytes of noise. ``wire`` is what
-    stood on the line, empty for what nobody said, and for noise.
+    verdict of the check of kind ``checksum``, None where there is no check. ``latency`` is the
+    seconds from a command to its reply. ``size`` counts the bytes of noise. ``wire`` has the bytes
+    on the line; it is empty for silence, for a missing reply and for noise.
     """
 
     time: float | None

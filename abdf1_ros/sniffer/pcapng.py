@@ -17,8 +17,9 @@ Entries as a pcapng file, which Wireshark reads with the dissector of this packa
 
 The link type is USER0. Each packet is one symbol of DF1 (a message, a poll, DLE ACK, ...) as its
 bytes stood on the line, after four bytes of ours: version (1), direction (0 not known, 1 ">",
-2 "<"), check (0 none, 1 BCC, 2 CRC) and its verdict (0 none, 1 right, 2 wrong). Noise, and what
-nobody said, is in no packet. The format is that of draft-ietf-opsawg-pcapng, sections 4.1 to 4.3.
+2 "<"), check (0 none, 1 BCC, 2 CRC) and its verdict (0 none, 1 right, 2 wrong). There are no
+packets for noise, silence and missing replies. The format is that of draft-ietf-opsawg-pcapng,
+sections 4.1 to 4.3.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class PcapngWriter:
     Write entries to ``path``, a file or a named pipe; a file that is there has to be pcapng.
 
     A file is replaced; a pipe waits for its reader. Raises OSError where it cannot be written, or
-    is something else, which is left alone. Nobody else may read it: it holds what PLCs are told.
+    is something else, which is left alone. Other users may not read it: it holds the values of a
+    plant.
     """
 
     def __init__(self, path: str) -> None:
@@ -76,7 +78,7 @@ class PcapngWriter:
             self.begun = 0.0
 
     def write(self, entry: Entry) -> None:
-        """Write what stood on the line, if anything did."""
+        """Write the bytes of an entry, if it has any."""
         if not entry.wire:
             return
         data = bytes((VERSION, _DIRECTIONS[entry.direction], _CHECKS[entry.checksum],

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What all the traffic comes to: counts, latencies, the load of the line."""
+"""The summary of traffic: counts, latencies, the load of the line."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Latency:
     longest: float = 0.0
 
     def add(self, seconds: float) -> None:
-        """Take one."""
+        """Take a latency (s)."""
         self.count += 1
         self.total += seconds
         self.longest = max(self.longest, seconds)
@@ -76,9 +76,9 @@ class Counts:
 
 class Summary:
     """
-    Count what a session gives; ``baud`` is needed for the load of the line.
+    Count the entries of a ``TrafficDecoder``; ``baud`` is needed for the load of the line.
 
-    Where the times go back another recording has begun.
+    Where the times go back, another recording has begun.
     """
 
     def __init__(self, baud: int | None = None) -> None:

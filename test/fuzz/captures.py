@@ -31,7 +31,7 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
-from abdf1_ros.sniffer.session import TrafficDecoder
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 from abdf1_ros.text import printable
 from fuzz.files import path_of
 

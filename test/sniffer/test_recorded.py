@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.sniffer.entries import Kind
-from abdf1_ros.sniffer.session import TrafficDecoder
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 import pytest
 from support.captures import Capture, CAPTURES, FOLDER
 

@@ -33,7 +33,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line
-from abdf1_ros.sniffer.session import TrafficDecoder
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 import pytest
 from support.captures import CAPTURES
 from support.vectors import load_json, VECTORS

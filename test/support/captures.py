@@ -28,7 +28,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.sniffer.capture import Chunk, read_capture
 from abdf1_ros.sniffer.entries import Entry, Kind
-from abdf1_ros.sniffer.session import TrafficDecoder
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 from support.vectors import load_json, VECTOR_FOLDER
 
 FOLDER = VECTOR_FOLDER / 'captures'

@@ -44,7 +44,7 @@ class _Plc2Addressing(Addressing):
     files = FILES
 
     def parse(self, text: str, access: Access | None = None) -> Address:
-        """Read a word or bit; what it raises, it raises with what would be right."""
+        """Read a word or bit; an error says what would be right."""
         text = text.strip()
         match = _BIT_FORM.fullmatch(text) or _FORM.fullmatch(text)
         if match is None:

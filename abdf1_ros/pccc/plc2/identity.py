@@ -44,7 +44,7 @@ def decode(data: bytes) -> Identity | None:
     A module without a processor, in front of a computer, has no family and no mode.
     """
     module, processor = _MODULES.get(data[1] & 0x0F), _processor(data)
-    # What follows an expansion byte stands one byte later.
+    # After an expansion byte all fields are one byte later.
     rest = data[3 if data[1] >> 4 == _EXPANSION else 2:]
     if module is None or processor is None or len(rest) < SIZE - 2:
         return None
@@ -72,7 +72,7 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
     """
     Return the data of the reply of a PLC-2 behind a 1771-KG to 06/03.
 
-    What does not exist here (memory, programs) is 0.
+    Fields for memory and programs, which it does not have, are 0.
     """
     # There is no remote run; a PLC-2 that has faulted does not talk to its module.
     state = code_of(MODES, Mode.RUN if mode is Mode.REMOTE_RUN else mode)

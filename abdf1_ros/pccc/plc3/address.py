@@ -63,7 +63,7 @@ class _Plc3Addressing(Addressing):
     has_sections = True
 
     def parse(self, text: str, access: Access | None = None) -> Address:
-        """Read an address; what it raises, it raises with what would be right."""
+        """Read an address; an error says what would be right."""
         text = text.strip().upper()
         levels = _LEVELS.fullmatch(text)
         if levels is not None:
@@ -186,7 +186,7 @@ def _member(kind: FileType, member: str | None, bit: str | None) -> tuple[int, i
 
 
 def _check_named(kind: FileType, members: Members, bit: int | None) -> None:
-    """Refuse a number that may be meant for a word, unless it is that of a bit with a name."""
+    """Refuse a bit without a name: the word of that number may be meant."""
     bits = {name: member.bit for name, member in members.items() if member.bit is not None}
     if bit not in bits.values():
         raise AddressSyntaxError(f'bit {bit:02o} of a {kind.value} element has no name; bits: '

@@ -78,7 +78,7 @@ class ExtendedAddress:
 
 
 def _no_symbol(reader: Reader) -> AddressRefusal:
-    """Return why the symbol that follows leads nowhere: its length, or there are none here."""
+    """Return why the symbol that follows is refused: its length, or no symbols here."""
     length = 0
     while reader.byte():
         length += 1

@@ -40,7 +40,7 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
     """
     Return the data of the reply of a PLC-3, asked at the RS-232 port of a 1775-KA, to 06/03.
 
-    What does not exist here (memory, programs) is 0.
+    Fields for memory and programs, which it does not have, are 0.
     """
     # A PLC-3 has neither remote modes nor a remote run.
     local = {Mode.REMOTE_RUN: Mode.RUN, Mode.REMOTE_PROGRAM: Mode.PROGRAM,

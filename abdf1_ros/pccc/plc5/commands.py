@@ -102,7 +102,7 @@ class SystemAddress:
         """
         Take an address off ``reader``, logical binary or logical ASCII (M 13-10..13-15).
 
-        Raises AddressRefusal for one that leads nowhere, FormatError when bytes run out.
+        Raises AddressRefusal for one that does not exist, FormatError when bytes run out.
         """
         mask = reader.byte()
         if mask == 0:

@@ -94,7 +94,7 @@ def decode(data: bytes) -> Identity | None:
 
 
 def fault_request(identity: Identity) -> Request | None:
-    """Return what asks a PLC-5 for S:11 and S:12 where it has a fault that they would name."""
+    """Return a read of S:11 and S:12 for a PLC-5 with a fault, None for any other."""
     return Plc5Dialect().read(_FAULT_WORDS, 2) if _UNNAMED_FAULT in identity.faults else None
 
 
@@ -116,7 +116,7 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
     """
     Return the data of the reply of a PLC-5/40 to 06/03.
 
-    What does not exist here (memory, programs) is 0.
+    Fields for memory and programs, which it does not have, are 0.
     """
     state = code_of(MODES, mode) | MAJOR_FAULT * is_faulted
     return bytes((state, EXTENDED, PLC_5_40)).ljust(SIZE, b'\0')

@@ -38,8 +38,8 @@ MASKED_WRITE = 0xAB
 MAX_READ = 236
 MAX_WRITE = 234
 
-# The words of the whole output and input image, whatever their slots; not in the manual, which
-# reserves these types, but what SLC 5/05 answer.
+# The words of the whole output and input image, without slots. The manual reserves these types; an
+# SLC 5/05 answers them.
 FLAT_CODES = {FileType.OUTPUT: 0x82, FileType.INPUT: 0x83}
 BY_FLAT_CODE = {code: kind for kind, code in FLAT_CODES.items()}
 

@@ -84,7 +84,7 @@ def decode(data: bytes) -> Identity | None:
 
 
 def is_micrologix_1000(identity: Identity) -> bool:
-    """Tell the one of its family whose counters differ."""
+    """Tell whether this is a MicroLogix 1000, whose counters differ from those of others."""
     return identity.model == _MODELS[_MICROLOGIX_1000]
 
 
@@ -108,7 +108,7 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
     """
     Return the data of the reply of an SLC 5/03 to 06/03.
 
-    What does not exist here (memory, programs) is 0.
+    Fields for memory and programs, which it does not have, are 0.
     """
     port = FULL_DUPLEX_PORT if is_full_duplex else HALF_DUPLEX_PORT
     error = _MINOR_ERROR_LEFT if is_faulted else 0

@@ -95,7 +95,7 @@ class SlcCommands:
             raise Refusal(status.STS_ILLEGAL_COMMAND)
 
     def _places(self, address: slc.LogicalAddress, size: int) -> list[tuple[Address, int]]:
-        """Return where the words of a command lie, stretch by stretch; all of them are there."""
+        """Return where the words of a command lie, stretch by stretch; all of them exist."""
         words = size // 2
         kind = slc.BY_FLAT_CODE.get(address.type_code)
         if kind is not None and kind.default_file == address.file:

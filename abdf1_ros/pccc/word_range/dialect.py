@@ -32,7 +32,7 @@ from abdf1_ros.pccc.word_range.commands import (
 
 
 class RangeFamily(Protocol):
-    """What differs: the files, the address, and how bits are changed."""
+    """What differs between PLC-3 and PLC-5: files, address, and the bit write."""
 
     @property
     def files(self) -> Mapping[FileType, Layout]:
@@ -96,5 +96,5 @@ class WordRangeDialect:
             address.offset - whole.start.offset, whole.words).encode()
 
     def write_bits(self, address: Address, mask: int, bits: int) -> Request:
-        """Return what changes the bits of one word."""
+        """Return a request that changes bits of one word."""
         return word_range.CMD, self._family.write_bits(address, bits & mask, ~bits & mask)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From bytes to entries: who says what to whom, good or bad, once or again."""
+"""From bytes to entries: symbols with sender, receiver, check, and repetitions marked."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.conversation import Conversation, Transaction
 from abdf1_ros.sniffer.entries import Entry, Kind
 
-# Seconds of silence after which an unfinished frame is given up, as a receiver does it: some
-# characters, and what an operating system or a device server may hold bytes back.
+# Seconds of silence after which an unfinished frame is given up, as a receiver does: some
+# characters, plus the time that an operating system or a device server may hold bytes back.
 _PAUSE = 0.15
 
-# Bytes for a decoder at once, which drops what is more than MAX_WAITING: a line of a dump can be
-# as long as its file.
+# Bytes for a decoder at once, which drops more than MAX_WAITING: one line of a dump can be as long
+# as its file.
 _PART = 4096
 
 _CONTROLS = {
@@ -51,7 +51,7 @@ class _OneDirection:
         self._noise_told = 0
 
     def feed(self, chunk: Chunk) -> None:
-        """Take bytes; what broke off before a pause, or another recording, is noise."""
+        """Take bytes; a frame that broke off before a pause or another recording is noise."""
         if chunk.time is not None and self.last_time is not None and (
                 not 0 <= chunk.time - self.last_time <= _PAUSE):
             self.decoder.reset()
@@ -59,7 +59,7 @@ class _OneDirection:
         self.decoder.feed(chunk.data)
 
     def new_noise(self) -> int:
-        """Return the bytes that have belonged to nothing since this was asked last."""
+        """Return the number of bytes of noise since the last call."""
         count = self.decoder.noise - self._noise_told
         self._noise_told = self.decoder.noise
         return count
@@ -80,12 +80,12 @@ class TrafficDecoder:
         self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
         self._wires: dict[Direction, _OneDirection] = {}
         self._conversation = Conversation()
-        self._station: int | None = None  # that the master has spoken to last
-        self._awaited: tuple[Direction, str] | None = None  # asker, and what has no answer yet
+        self._station: int | None = None  # the last one that the master sent something to
+        self._awaited: tuple[Direction, str] | None = None  # asker, and question
         self._last_asker = Direction.OUT
 
     def feed(self, chunk: Chunk) -> Iterator[Entry]:
-        """Yield what the line says with these bytes."""
+        """Yield the entries that these bytes complete."""
         wire = self._wires.get(chunk.direction)
         if wire is None:
             wire = self._wires[chunk.direction] = _OneDirection(self.kind)
@@ -141,7 +141,7 @@ class TrafficDecoder:
         return self.kind.duplex is Duplex.HALF
 
     def _direction(self, symbol: Symbol, direction: Direction) -> Direction:
-        """Infer the direction on a line where all hear all: masters and slaves differ."""
+        """Infer the direction on a two-wire line: masters and slaves send different symbols."""
         if direction is not Direction.UNKNOWN or not self._is_half:
             return direction
         if _is_masters(symbol):
@@ -219,7 +219,7 @@ class TrafficDecoder:
 
 
 def _is_masters(symbol: Symbol) -> bool:
-    """Tell whether only the master of a half-duplex line says this."""
+    """Tell whether only the master of a half-duplex line sends this."""
     if isinstance(symbol, Control):
         return symbol.code is Code.NAK
     return isinstance(symbol, Poll) or isinstance(symbol, Frame) and symbol.station is not None

@@ -26,7 +26,7 @@ from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
-from abdf1_ros.sniffer.session import TrafficDecoder
+from abdf1_ros.sniffer.traffic import TrafficDecoder
 from hypothesis import given, strategies
 import pytest
 from support.multidrop import MasterBench
