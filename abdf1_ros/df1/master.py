@@ -76,7 +76,7 @@ class HalfDuplexMaster:
         while True:
             # In turns, or slaves that send all the time would keep our own commands from the line.
             if self._line.has_forwards():
-                yield from self._forward()
+                yield from self._line.forward(collect=self._collect_for_slave)
             now = self._machine.now
             task = source.next_task(now)
             if task is not None:
@@ -120,17 +120,18 @@ class HalfDuplexMaster:
         self._line.check_reply(reply, command)
         return reply
 
-    def _forward(self) -> Talk:
-        """Pass one message on; poll for the reply when it is a command (M 3-8)."""
-        packet = yield from self._line.forward()
-        if packet is None or packet.is_reply or packet.dst == BROADCAST:
-            return
+    def _collect_for_slave(self, number: int, command: Packet) -> Talk:
+        """Poll for the reply to a command that was passed on (M 3-8)."""
+        station = self._stations[command.dst]
         try:
-            reply = yield from self._collect(
-                self._stations.via(packet.dst), packet, self._machine.now)
-        except (StationInactive, CommandTimeout):
+            reply = yield from self._collect(number, command, self._machine.now)
+        except StationInactive:
             return  # the sender of the command has a time-out of its own
-        self._line.take_unwanted(packet.dst, reply)
+        except CommandTimeout:
+            station.overdue += 1
+            return
+        station.overdue = 0
+        self._line.take_unwanted(command.dst, reply)
 
     def _collect(self, number: int, command: Packet, started: float,
                  reply_size: int = 0) -> Generator[Step, Heard, Packet]:

@@ -26,7 +26,8 @@ Every good message is acknowledged, also one that nobody waits for: the slave ke
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Generator
+from collections.abc import Callable, Container, Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 import math
 from typing import NoReturn, TypeGuard
@@ -60,9 +61,6 @@ MAX_KEPT = 2 * MAX_FORWARDS
 # the time of the command is up. Otherwise, on a slow line, each reply would stay queued after an
 # older one for ever.
 MOST_QUEUED = 8
-
-# After polling an inactive station for t, leave 7 t to active ones.
-_OTHERS_SHARE = 7
 
 # What answers a message and a poll, but for the frames that answer a poll too.
 _LISTEN_ON_ECHOED = LISTEN_ON._replace(is_echoed=True)
@@ -118,7 +116,6 @@ class MasterLine:
         self.counters = machine.counters
         self.settings = settings
         self.stations = stations
-        self.polled: Container[int] = ()  # stations that are polled all the time anyway
         # Takes a reply that came too late for its poll; returns whether a command waited for it.
         self.take_reply: Callable[[int, Packet], bool] = lambda number, reply: False
         self.accounting = Accounting(machine.counters, stations, report)
@@ -128,7 +125,6 @@ class MasterLine:
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
         self._forwards: deque[Packet] = deque()
-        self._next_probe = 0.0
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf
                 ) -> Generator[Step, Heard, float]:
@@ -391,46 +387,47 @@ class MasterLine:
             self.counters.invalid_messages += not is_ours
         self._report(wrong_message(packet, number))
 
-    def forward(self, busy: Container[int] = ()
+    def forward(self, busy: Container[int] = (),
+                collect: Callable[[int, Packet], Talk] | None = None
                 ) -> Generator[Step, Heard, Packet | None]:
         """
         Deliver one message to be passed on, not to a ``busy`` station; return it if delivered.
 
         The link data stay as they are (M 3-2, 3-8). The sender of a command that cannot be
-        delivered gets an error reply.
+        delivered gets an error reply. ``collect`` gets the reply to a command, by the station of
+        the line that has it.
         """
         packet = next(packet for packet in self._forwards if packet.dst not in busy)
         self._forwards.remove(packet)
-        try:
-            number = self.stations.via(packet.dst)
-            if number != BROADCAST and not self.stations[number].active:
-                yield from self._probe_for_others(number)
-            yield from self.deliver(number, packet)
-        except StationInactive:
-            if not packet.is_reply and packet.src != self.settings.station:
-                self._forwards.append(packet.reply(sts=_NOT_DELIVERED))
+        number = self.stations.via(packet.dst)
+        if not self.stations.admits_message(packet.dst, self.machine.now):
+            self._refuse(packet)
             return None
+        with self._probe_of(packet.dst):
+            try:
+                if number != BROADCAST and not self.stations[number].active:
+                    yield from self.probe(number)
+                yield from self.deliver(number, packet)
+            except StationInactive:
+                self._refuse(packet)
+                return None
+            if collect is not None and not packet.is_reply and number != BROADCAST:
+                yield from collect(number, packet)
         return packet
 
-    def _probe_for_others(self, number: int) -> Talk:
-        """Poll an inactive station, if the share of probes allows and it has no turn anyway."""
-        if number in self.polled or not self.may_probe:
-            raise StationInactive(number)
-        begun = self.machine.now
+    def _refuse(self, packet: Packet) -> None:
+        """Answer a command that cannot be passed on."""
+        if not packet.is_reply and packet.src != self.settings.station:
+            self._forwards.append(packet.reply(sts=_NOT_DELIVERED))
+
+    @contextmanager
+    def _probe_of(self, number: int) -> Iterator[None]:
+        """Count what goes on as a probe, if the station is silent."""
+        begun = None if self.stations[number].replies_in_time else self.machine.now
         try:
-            yield from self.probe(number)
+            yield
         finally:
-            self.probed(begun)
-
-    @property
-    def may_probe(self) -> bool:
-        """Tell whether inactive stations have had less than an eighth of the line's time."""
-        return self.machine.now >= self._next_probe
-
-    def probed(self, begun: float) -> None:
-        """Take note that an inactive station has had the line since ``begun`` (s)."""
-        now = self.machine.now
-        self._next_probe = now + _OTHERS_SHARE * (now - begun)
+            self.stations.tried(number, self.machine.now, probe_begun=begun, is_message=True)
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""

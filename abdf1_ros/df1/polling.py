@@ -135,7 +135,7 @@ class StandardPollingMaster:
         self._outstanding: dict[int, Outstanding] = {}
         self._listed = frozenset((*polling.priority, *polling.normal))
         self._polled = self._listed - {settings.station}
-        self._line.polled = self._listed
+        stations.polled = self._listed
         self._line.take_reply = self._take_reply
         stations.add(self._polled)
         # Stations that got a command of another station and have not replied, and until when
@@ -201,7 +201,8 @@ class StandardPollingMaster:
     def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
         """Poll one inactive station of a list, if the share of probes allows."""
         number = polled.inactive(self._is_active)
-        polled.is_kept_waiting = number is not None and not self._line.may_probe
+        is_too_early = self._machine.now < self._stations.probes.next
+        polled.is_kept_waiting = number is not None and is_too_early
         other = self._normal if polled is self._priority else self._priority
         is_others_turn = other.is_kept_waiting and polled is self._last_probed
         if number is None or polled.is_kept_waiting or is_others_turn:
@@ -214,8 +215,7 @@ class StandardPollingMaster:
         if is_good(answer):
             yield from self._answered(number, answer)
             self._unproven.add(number)
-        if any(station.active for station in self._stations):
-            self._line.probed(begun)
+        self._stations.polled_in_vain(begun, self._machine.now)
 
     def _visit(self, number: int, source: TaskSource) -> Talk:
         """Send what waits, then poll one active station; at our own number only send."""
@@ -354,4 +354,4 @@ class StandardPollingMaster:
             self._end(station, error)
         if number in self._unproven:
             self._unproven.remove(number)
-            self._line.probed(begun)
+            self._stations.polled_in_vain(begun, self._machine.now)

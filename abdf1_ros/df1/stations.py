@@ -16,10 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.probes import Probes
 
 MAX_STATION = 254
 
@@ -77,12 +78,16 @@ class ActiveStationList:
     sends something, has a record as well, but no message can put it into the list.
 
     ``routes`` gives the gateway to a station, by number: the gateway is polled in place of the
-    station, and all its stations are active while the gateway is (M 3-7).
+    station, and all its stations are active while the gateway is (M 3-7). ``polled`` are the
+    stations of this line that the link polls all the time: nobody else need ask whether they are
+    there again. ``probes`` says when others may be asked; one takes ``probe_time`` seconds.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
                  on_change: Callable[[Station], None] = lambda station: None,
-                 routes: Mapping[int, int] | None = None) -> None:
+                 routes: Mapping[int, int] | None = None, probe_time: float = 0.0) -> None:
+        self.polled: Collection[int] = ()
+        self.probes = Probes(probe_time)
         self._stations: dict[int, Station] = {}
         self._strangers: dict[int, Station] = {}
         self._on_change = on_change
@@ -135,6 +140,43 @@ class ActiveStationList:
             if station.active:
                 station.active, station.silent_since = False, now
                 self._tell(station)
+
+    def is_polled(self, number: int) -> bool:
+        """Tell whether the link polls a station, or its gateway, all the time."""
+        return self.via(number) in self.polled
+
+    def admits_message(self, number: int, now: float) -> bool:
+        """Tell whether a message may go to a station: to a silent one in its probes' time only."""
+        return self[number].replies_in_time or (
+            not self.is_polled(number) and self.probes.admits_message(now))
+
+    def tried(self, number: int, now: float, *, probe_begun: float | None,
+              is_message: bool = False) -> None:
+        """
+        Take note that a station had the line until now; what a silent one took is its probes'.
+
+        ``probe_begun`` is from when on (clock value, s), None where it was not silent then.
+        """
+        if self[number].replies_in_time or self.is_polled(number):
+            return
+        if not self._someone_waits:
+            self.probes.nobody_waits(now)
+        elif probe_begun is None:
+            self.probes.died(now)
+        else:
+            seconds = max(now - probe_begun, self.probes.usual)
+            self.probes.spent(seconds, now, is_message=is_message)
+
+    def polled_in_vain(self, begun: float, now: float) -> None:
+        """Take note that the link has asked a silent station from ``begun`` until now."""
+        if self._someone_waits:
+            self.probes.spent(now - begun, now)
+        else:
+            self.probes.nobody_waits(now)
+
+    @property
+    def _someone_waits(self) -> bool:
+        return any(station.replies_in_time for station in self)
 
     def _tell(self, station: Station) -> None:
         if station.number in self._stations:

@@ -25,7 +25,7 @@ its turn. Then there are three queues:
 - ``reads`` go in the order of ``read_queue``.
 
 A command that asks a silent station whether it is there again is a probe. Probes get at most an
-eighth of the line's time (``probes``).
+eighth of the line's time (``df1.probes``).
 """
 
 from __future__ import annotations
@@ -35,11 +35,10 @@ import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.checks import Check, CheckKind, Checks
+from abdf1_ros.driver.checks import Check, Checks
 from abdf1_ros.driver.interlocks import Interlocks, OwnWrite
 from abdf1_ros.driver.job_tasks import JobTask, JobTasks
 from abdf1_ros.driver.points import Write, WriteResult
-from abdf1_ros.driver.probes import Probes
 from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.reads import Reads
 from abdf1_ros.driver.writes import WriteQueue
@@ -52,20 +51,18 @@ class Agenda:
     """
     Decide which of the ``writes``, ``checks`` and ``reads`` has the line next.
 
-    ``tasks`` are those under way: each packet of a write has a turn of its own. A probe usually
-    takes ``probe_time`` seconds. ``patience`` and ``report`` are for the writes. ``interlocks`` is
-    set later, where the map has heartbeats or fallbacks.
+    ``tasks`` are those under way: each packet of a write has a turn of its own. ``patience`` and
+    ``report`` are for the writes. ``interlocks`` is set later, where the map has heartbeats or
+    fallbacks.
     """
 
     def __init__(self, stations: ActiveStationList, checks: Checks, tasks: JobTasks, *,
-                 probe_time: float, patience: float,
-                 report: Callable[[WriteResult], None]) -> None:
+                 patience: float, report: Callable[[WriteResult], None]) -> None:
         self._stations = stations
         self._tasks = tasks
-        self._probes, self._write_probes = Probes(probe_time), Probes(probe_time)
         self.checks = checks
-        self.reads = Reads(stations, self._probes)
-        self.writes = WriteQueue(stations, self._write_probes, patience, report)
+        self.reads = Reads(stations)
+        self.writes = WriteQueue(stations, patience, report)
         self.interlocks: Interlocks | None = None
         self._own_in_a_row = 0
         self._writes_in_a_row = 0
@@ -124,9 +121,9 @@ class Agenda:
 
         Where reads of silent stations wait as well, echoes and reads take turns.
         """
-        if now >= self._probes.next and self.reads.has_silent and self._last_probe_was_echo:
-            return now + self._probes.interval
-        return self._probes.next
+        probes = self._stations.probes
+        is_reads_turn = self._last_probe_was_echo and self.reads.has_silent
+        return now + probes.pause if is_reads_turn and now >= probes.next else probes.next
 
     def _read(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return a probe or read that is due."""
@@ -147,22 +144,13 @@ class Agenda:
             moments.append(own)
         return min(moments, default=None)
 
-    def write_ended(self, write: Write, begun: float, now: float, *, is_answered: bool) -> None:
+    def write_ended(self, write: Write, begun: float, now: float) -> None:
         """Take note that a write has ended that had the line from ``begun`` on."""
         self.writes.ended(write)
-        station = write.mapping.station
-        if is_answered or station == BROADCAST or self._stations[station].active:
-            return
-        if self.reads.others_wait:
-            self._write_probes.spend(now - begun if write.is_probe else 0.0, now)
-        else:
-            self._write_probes.wait(0.0, now)
+        if write.mapping.station != BROADCAST:
+            self._stations.tried(write.mapping.station, now, is_message=True,
+                                 probe_begun=begun if write.is_probe else None)
 
     def check_ended(self, check: Check, begun: float, now: float) -> None:
         """Take note that a check has ended that had the line from ``begun`` on."""
-        if check.kind is not CheckKind.ECHO or self._stations[check.station].active:
-            return
-        if self.reads.others_wait:
-            self._probes.spend(now - begun if check.is_probe else 0.0, now)
-        else:
-            self._probes.wait(0.0, now)
+        self._stations.tried(check.station, now, probe_begun=begun if check.is_probe else None)

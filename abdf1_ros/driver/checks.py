@@ -65,7 +65,7 @@ class Check:
 
     It is infinite while the job is under way, and while there is no station to ask.
     ``period`` is in seconds, infinite for a job that is done once. ``is_probe`` tells that it asks
-    an inactive station whether it is there again.
+    a silent station whether it is there again.
     """
 
     station: int
@@ -180,7 +180,8 @@ class Checks:
             if check.due <= now:
                 check.due = self._wanted_from(check, echo_from)
                 if check.due <= now:
-                    check.due, check.is_probe = math.inf, not self._stations[check.station].active
+                    check.due = math.inf
+                    check.is_probe = not self._stations[check.station].replies_in_time
                     self._plan()
                     return check
         self._plan()

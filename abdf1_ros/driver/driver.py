@@ -109,7 +109,7 @@ class Driver:
         self.stations = ActiveStationList(
             (mapping.station for mapping in mappings
              if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
-            _routes(network, mappings))
+            _routes(network, mappings), longest_probe(network))
         self.machine = make_machine(network, self._run, self.counters)
         self.is_online = False
         self._inbox: Inbox[Write] = Inbox(is_open=False)
@@ -133,8 +133,8 @@ class Driver:
             lambda station, error: self._link_failed(station, (), error),
             self._clock, self._status_periods())
         self._agenda = Agenda(
-            self.stations, self.health, self._tasks, probe_time=longest_probe(network),
-            patience=settings.write_timeout, report=listener.written)
+            self.stations, self.health, self._tasks, patience=settings.write_timeout,
+            report=listener.written)
         self._reads, self._writes = self._agenda.reads, self._agenda.writes
         self.interlocks = self._agenda.interlocks = Interlocks(
             () if settings.read_only else mappings, self.stations, self._writes,
@@ -485,13 +485,12 @@ class Driver:
             point.fail(str(error))
 
     def _write_steps(self, write: Write) -> Steps[None]:
-        station, begun, is_answered = write.mapping.station, self.machine.now, True
+        station, begun = write.mapping.station, self.machine.now
         self._read_backs.overtaken(write, begun)
         try:
             result = yield from carry_out(write, self._clock)
-            is_answered = not isinstance(result.error, LinkError)
         finally:
-            self._agenda.write_ended(write, begun, self.machine.now, is_answered=is_answered)
+            self._agenda.write_ended(write, begun, self.machine.now)
         if result.is_unconfirmed:
             self._read_backs.add(write, result, self.blocks, self.machine.now)
         else:

@@ -26,18 +26,17 @@ from collections.abc import Container, Iterable
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Write
-from abdf1_ros.driver.probes import Probes
 from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
 
 
 class Reads:
-    """Keep all read jobs; ``probes`` says when one of a silent station may be sent."""
+    """Keep all read jobs; ``stations.probes`` says when one of a silent station may be sent."""
 
-    def __init__(self, stations: ActiveStationList, probes: Probes) -> None:
+    def __init__(self, stations: ActiveStationList) -> None:
         self._stations = stations
-        self._probes = probes
         self._due = ReadQueue()
         self._aside: dict[int, deque[ReadJob]] = {}
+        self._put_off = 0.0  # until when, as nobody replies (clock value, s)
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
@@ -48,11 +47,6 @@ class Reads:
     def has_silent(self) -> bool:
         """Tell whether reads of silent stations wait for their probe."""
         return bool(self._aside)
-
-    @property
-    def others_wait(self) -> bool:
-        """Tell whether a probe would keep other reads waiting."""
-        return bool(self._due)
 
     @property
     def scan_time(self) -> float | None:
@@ -80,8 +74,11 @@ class Reads:
         for number in list(self._aside):
             if self._stations[number].replies_in_time:  # to a write, or to somebody else
                 self.release(number, now)
-        station = next((number for number in self._aside if number not in busy), None)
-        if station is None or now < self._probes.next:
+        if now < self._next_probe():
+            return None
+        station = next((number for number in self._aside
+                        if number not in busy and not self._stations.is_polled(number)), None)
+        if station is None:
             return None
         jobs = self._aside.pop(station)
         job = jobs.popleft()
@@ -117,9 +114,12 @@ class Reads:
     def next_due(self) -> float | None:
         """Return when the next read or probe is due (clock value in s), None for never."""
         due = self._due.next_due()
-        if not self._aside:
+        if all(map(self._stations.is_polled, self._aside)):
             return due
-        return self._probes.next if due is None else min(due, self._probes.next)
+        return self._next_probe() if due is None else min(due, self._next_probe())
+
+    def _next_probe(self) -> float:
+        return max(self._stations.probes.next, self._put_off)
 
     def ended(self, job: ReadJob, now: float) -> None:
         """Take a job back after a good or failed read, unless it has been replaced."""
@@ -127,11 +127,9 @@ class Reads:
             return
         station = self._stations[job.station]
         if not station.replies_in_time:
-            if not self._due:
-                self._probes.wait(job.block.period, now)
-            else:
-                self._probes.spend(now - job.started if job.is_probe or station.active else 0.0,
-                                   now)
+            is_probe = job.is_probe or station.active  # or a reply that is late once more
+            self._stations.tried(job.station, now, probe_begun=job.started if is_probe else None)
+            self._put_off = now if self._due else now + job.block.period
             self._set_aside(job)
             return
         self.release(job.station, now)

@@ -29,7 +29,6 @@ import math
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.driver.probes import Probes
 from abdf1_ros.messages import Message
 from abdf1_ros.settings.mapping import Mapping
 
@@ -50,15 +49,14 @@ class WriteQueue:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
 
-    ``report`` gets the results of those that end here. A write to an inactive station is a
-    probe; a further write that comes sooner than ``probes`` allow ends unsent. Another thread
-    may only ask for the length.
+    ``report`` gets the results of those that end here. A write to a silent station is a probe;
+    one that ``stations.probes`` does not admit ends unsent. Another thread may only ask for the
+    length.
     """
 
-    def __init__(self, stations: ActiveStationList, probes: Probes, patience: float,
+    def __init__(self, stations: ActiveStationList, patience: float,
                  report: Callable[[WriteResult], None]) -> None:
         self._stations = stations
-        self._probes = probes
         self._patience = patience
         self._report = report
         self._waiting: deque[Write] = deque()
@@ -105,7 +103,7 @@ class WriteQueue:
             self._waiting.remove(write)
             self._under_way.append(write)
             station = write.mapping.station
-            write.is_probe = station != BROADCAST and not self._stations[station].active
+            write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
         return write
 
     def _first_free(self, busy: Container[int]) -> Write | None:
@@ -177,8 +175,8 @@ class WriteQueue:
         if now >= self._expiry(write):
             return waited_too_long(patience_of(write.mapping, self._patience))
         station = write.mapping.station
-        # A write has just found the station inactive, and other commands want the line.
-        if now < self._probes.next and station != BROADCAST \
-                and not self._stations[station].active:
-            return Message.ERR_INACTIVE_STATION.line(station)
-        return ''
+        if self._stations.admits_message(station, now):
+            return ''
+        is_late = self._stations[station].active
+        return (Message.ERR_COMMAND_TIMEOUT.line() if is_late
+                else Message.ERR_INACTIVE_STATION.line(station))

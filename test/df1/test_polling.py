@@ -87,7 +87,7 @@ def test_group_goes_on_where_it_stopped(size: int, expected: list[int]) -> None:
 def test_group_counts_active_stations_only() -> None:
     rig = bench(PollingSettings((1, 2, 3, 4), priority=(9,), group_size=2), dead=(1, 3))
     rig.start(1, 3)
-    rig.master.link._line._next_probe = 1e9  # type: ignore[union-attr]
+    rig.master.stations.probes.spent(1e9, 0.0)
     assert polls(rig, 6) == [9, 2, 4, 9, 2, 4]
 
 

@@ -52,12 +52,13 @@ class Bench:
 
     def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
         self.results: list[WriteResult] = []
-        self.stations = ActiveStationList([job.station for job in jobs])
+        self.stations = ActiveStationList(
+            [job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks = JobTasks(5, 0)
         stations = {job.station for job in jobs}
         checks = Checks(self.stations, stations, 0.0, lambda station, error: None, lambda: 0.0)
         checks.begin(0.0)
-        self.agenda = Agenda(self.stations, checks, self.tasks, probe_time=PROBE_TIME,
+        self.agenda = Agenda(self.stations, checks, self.tasks,
                              patience=write_timeout, report=self.results.append)
         self.reads, self.writes = self.agenda.reads, self.agenda.writes
         self.reads.replace((), jobs, 0.0)

@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 import heapq
 import itertools
 
-from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.slave import multidrop, Responder
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver, Listener
@@ -121,7 +121,8 @@ class _FarEnd(Machine):
     """All stations of the line; what they hear and say goes through two filters."""
 
     def __init__(self, stations: Sequence[Responder], network: Network) -> None:
-        super().__init__(multidrop(stations), checksum=network.checksum)
+        super().__init__(multidrop(stations), checksum=network.checksum,
+                         timing=LineTiming(network.timing.char_time))
         self.hear: Callable[[bytes], bytes] = bytes
         self.say: Callable[[bytes], bytes] = bytes
 

@@ -1,0 +1,61 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How often a station that does not answer is asked whether it is there again."""
+
+from __future__ import annotations
+
+# After a probe that has taken the line for t, 7 t are left to the other stations.
+_OTHERS_SHARE = 7
+
+
+class Probes:
+    """
+    Keep what is spent on silent stations to an eighth of the line's time, whoever asks them.
+
+    Two kinds of askers take turns: whoever asks one silent station after the other, from ``next``
+    on (clock value, s), and a message that is for one of them. A message cannot wait; one that
+    comes too early gets nowhere, but the next turn is then kept free for one like it.
+    ``usual`` is the seconds that a probe takes, ``pause`` those that are left to others after it.
+    """
+
+    def __init__(self, usual: float) -> None:
+        self.usual, self.pause = usual, _OTHERS_SHARE * usual
+        self._free = 0.0
+        self._is_kept_for_message = False
+        self._was_message = False
+
+    @property
+    def next(self) -> float:  # noqa: A003
+        """Return from when on (clock value, s) silent stations may be asked in their order."""
+        return self._free + self.pause if self._is_kept_for_message else self._free
+
+    def admits_message(self, now: float) -> bool:
+        """Tell whether a message may go to a silent station now."""
+        is_admitted = now >= (self._free + self.pause if self._was_message else self._free)
+        self._is_kept_for_message |= not is_admitted and not self._was_message
+        return is_admitted
+
+    def spent(self, seconds: float, now: float, *, is_message: bool = False) -> None:
+        """Take note that a silent station has had the line for so long until now."""
+        self._free = max(self._free, now) + _OTHERS_SHARE * seconds
+        self._is_kept_for_message, self._was_message = False, is_message
+
+    def died(self, now: float) -> None:
+        """Take note that a station does not answer any more: it may have a moment to come back."""
+        self._free = max(self._free, now + self.pause)
+
+    def nobody_waits(self, now: float) -> None:
+        """Take note that there is nobody whom probes keep waiting."""
+        self._free, self._is_kept_for_message, self._was_message = now, False, False

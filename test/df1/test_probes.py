@@ -1,0 +1,71 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The turns of those who ask silent stations, on a clock that the test moves."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.probes import Probes
+from abdf1_ros.df1.stations import ActiveStationList
+
+
+def test_seven_times_as_long_is_left_to_others() -> None:
+    probes = Probes(1.0)
+    assert probes.next == 0.0
+    probes.spent(2.0, 10.0)
+    assert probes.next == 24.0
+    probes.spent(1.0, 12.0)  # two at a time
+    assert probes.next == 31.0
+
+
+def test_stations_that_die_one_after_the_other_are_not_added_up() -> None:
+    probes = Probes(1.0)
+    for now in (0.0, 4.0, 8.0):
+        probes.died(now)
+    assert probes.next == 15.0
+
+
+def test_message_that_came_too_early_has_the_next_turn_and_the_round_the_one_after() -> None:
+    probes = Probes(1.0)
+    probes.spent(1.0, 1.0)
+    assert probes.next == 8.0
+    assert not probes.admits_message(7.9)
+    assert probes.next == 15.0
+    assert probes.admits_message(8.0)
+    probes.spent(1.0, 9.0, is_message=True)
+    assert probes.next == 16.0
+    assert not probes.admits_message(22.9) and probes.admits_message(23.0)
+    assert probes.next == 16.0  # kept for nobody: it was not the turn of a message
+    probes.spent(1.0, 17.0)
+    assert probes.admits_message(24.0)
+
+
+def test_where_nobody_waits_nobody_is_put_off() -> None:
+    stations = ActiveStationList((1, 2), probe_time=1.0)
+    stations.lost(1, 0.0)
+    stations.tried(1, 0.0, probe_begun=None)
+    assert not stations.admits_message(1, 1.0) and stations.admits_message(2, 1.0)
+    stations.lost(2, 2.0)
+    stations.tried(2, 2.0, probe_begun=None)
+    assert stations.admits_message(1, 2.0) and stations.admits_message(2, 2.0)
+
+
+def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_asked() -> None:
+    stations = ActiveStationList((1, 2, 3), probe_time=1.0)
+    stations[1].overdue = 2
+    stations.tried(1, 5.0, probe_begun=3.0)
+    assert stations.probes.next == 19.0
+    stations.polled = {2}
+    stations.lost(2, 20.0)
+    assert stations.admits_message(1, 20.0) and not stations.admits_message(2, 20.0)

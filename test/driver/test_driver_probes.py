@@ -1,0 +1,127 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""All that asks stations that are gone takes an eighth of the line's time at most."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.plan.forecast import longest_probe
+from abdf1_ros.settings.network import Network
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+import pytest
+from support.driver_bench import DriverBench, simulated_plc
+from support.mappings import make_mapping
+from support.multidrop import Slave
+
+LIVING, STRANGERS = 254, (252, 253)
+PROBES = 10
+
+
+class Bench(DriverBench):
+    """
+    A driver that knows that all stations but one are gone, and notes who has the line.
+
+    Of each three that are gone one has a read, one a write, one both. The living one is read
+    twice in the time of a probe and has messages for others. With ``is_deaf`` some of those
+    that are gone answer polls, and take no command.
+    """
+
+    def __init__(self, network: Network, gone: int, *, is_deaf: bool) -> None:
+        kinds = 'Read', 'Write', 'ReadWrite'
+        self.unit = longest_probe(network)
+        self.living = make_mapping(
+            'N7:0', station=LIVING, period=max(100, int(500 * self.unit)))
+        self.gone = [make_mapping('N7:0', kinds[station % 3], station=station, period=100)
+                     for station in range(1, gone + 1) if station != network.station]
+        super().__init__([self.living, *self.gone], network=network, start=False, chunk=1,
+                         settings=DriverSettings(write_timeout=20 * self.unit))
+        self.spoken: list[tuple[float, int, float]] = []
+        self._decoder = FrameDecoder(Checksum.CRC, Duplex.HALF)
+        self._begun: float | None = None
+        self.far.hear = self._note
+        numbers = [*(row.station for row in self.gone), *STRANGERS]
+        for number in numbers:
+            self.driver.stations.lost(number, 0.0)
+        for number in numbers[-7:] if is_deaf else ():
+            deaf = Slave(number, self.clock)
+            deaf.deaf = True
+            self.connect(deaf)
+        plc = simulated_plc(LIVING, 'PLC5', self.clock, ('N7:0', 10))
+        self.talker = Slave(LIVING, self.clock, plc.serve)
+        self.connect(self.talker)
+        for tns in range(8 * PROBES):
+            self.at(tns * self.unit, lambda tns=tns: self._disturb(tns, numbers))
+        self.open()
+
+    def _note(self, data: bytes) -> bytes:
+        if self._begun is None:
+            self._begun = self.clock() - self.network.timing.char_time
+        self._decoder.feed(data)
+        while (symbol := self._decoder.next_symbol()) is not None:
+            station = symbol.station if isinstance(symbol, Poll | Frame) else None
+            if station is not None:
+                self.spoken.append((self._begun, station, self.clock()))
+            self._begun = None
+        return data
+
+    def _disturb(self, count: int, numbers: list[int]) -> None:
+        """Ask for writes to stations that are gone, and let the living one talk to them."""
+        for row in self.gone[count % 7::7]:
+            if row.writes:
+                self.write(row, [count])
+        if len(self.talker.outbox) < 2:
+            dst = numbers[-1 - count % min(5, len(numbers))]
+            self.talker.outbox.append(Packet(dst, LIVING, 0x06, 0, count, b'\x00\x01'))
+
+    def spent(self) -> tuple[float, float]:
+        """Return the seconds that stations had that are gone, in all and at most at a time."""
+        total = longest = now = 0.0
+        last = LIVING
+        for (begun, station, sent), (after, _, _) in pairwise(self.spoken):
+            spent = min(after - begun, sent - begun + self.unit)
+            now = spent + (now if station == last else 0.0)
+            if station != LIVING:
+                longest, total = max(longest, now), total + spent
+            last = station
+        return total, longest
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])
+@settings(max_examples=8)
+@given(timeout=st.integers(0, 360_000) | st.integers(0, 50), tx_delay=st.integers(0, 65_535),
+       nak_retries=st.integers(0, 10), enq_retries=st.integers(0, 10),
+       gone=st.integers(1, 251), is_deaf=st.booleans())
+@example(timeout=200, tx_delay=0, nak_retries=3, enq_retries=3, gone=9, is_deaf=False)
+@example(timeout=200, tx_delay=0, nak_retries=3, enq_retries=3, gone=9, is_deaf=True)
+def test_stations_that_are_gone_get_an_eighth_of_the_line_at_most(
+        polling: str, timeout: int, tx_delay: int, nak_retries: int, enq_retries: int, gone: int,
+        is_deaf: bool) -> None:
+    """Reads, writes, echoes and messages to be passed on together, in the legal ranges."""
+    # So slow a line that a run has few transactions.
+    network = Network(
+        baud=200 / max(timeout / 1000, 0.02), timeout=timeout, tx_delay=tx_delay,  # type: ignore
+        cmd_timeout=10 ** 9, nak_retries=nak_retries, enq_retries=enq_retries, polling=polling)
+    bench = Bench(network, gone, is_deaf=is_deaf)
+    window = 8 * PROBES * bench.unit
+    bench.run(window)
+    total, longest = bench.spent()
+    assert 0 < total <= window / 8 + longest + bench.unit
+    assert len(bench.listener.times(bench.living)) > PROBES / 2
