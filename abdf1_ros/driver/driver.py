@@ -122,9 +122,9 @@ class Driver:
         self.machine.background = self
         self.link = make_link(network, settings, self.machine, self.stations,
                               self._serve, listener.happened)
-        planner = Planner(line_model(network), settings.default_period)
-        self._refusals = Refusals(planner)
-        blocks = planner.plan(mappings)
+        self._planner = Planner(line_model(network), settings.default_period)
+        self._refusals = Refusals(self._planner)
+        blocks = self._planner.plan(mappings)
         self.expected_scan_time = scan_time(blocks)
         self.points = self._make_points(blocks)
         self._guards = Guards(self.points.values())
@@ -403,16 +403,18 @@ class Driver:
         finally:
             self._agenda.check_ended(check, begun, self.machine.now)
         if check.kind is CheckKind.STATUS:
-            self._mode_told(check.station, begun)
+            self._status_told(check.station, begun)
 
-    def _mode_told(self, station: int, asked: float) -> None:
-        """Tell guards and interlocks which mode a station has answered with."""
+    def _status_told(self, station: int, asked: float) -> None:
+        """Use what a station has answered: its mode, and which packets it takes."""
         known = self.health.known(station)
         identity = known.identity if known.told is not None and known.told >= asked else None
         self._guards.mode_told(station, identity, asked)
         if identity is not None and identity.is_running is not None:
             self.interlocks.mode_seen(
                 station, identity.is_running and not identity.faults, self.machine.now)
+        if identity is not None:
+            self._change(self._refusals.processor_told(station, identity.processor, self.blocks))
 
     def _status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""
@@ -488,7 +490,7 @@ class Driver:
         station, begun = write.mapping.station, self.machine.now
         self._read_backs.overtaken(write, begun)
         try:
-            result = yield from carry_out(write, self._clock)
+            result = yield from self._carry_out(write)
         finally:
             self._agenda.write_ended(write, begun, self.machine.now)
         if result.is_unconfirmed:
@@ -506,7 +508,7 @@ class Driver:
         if own.urgency is Urgency.FALLBACK:
             self._read_backs.overtaken(write, self.machine.now)
         try:
-            result = yield from carry_out(write, self._clock)
+            result = yield from self._carry_out(write)
             outcome = result.outcome
         finally:
             self._writes.ended(write)
@@ -514,6 +516,10 @@ class Driver:
         self._write_failed(own.station, result.error)
         if own.urgency is Urgency.FALLBACK and (result.packets_done or result.is_unconfirmed):
             self._reads.refresh(write, self.machine.now)
+
+    def _carry_out(self, write: Write) -> Steps[WriteResult]:
+        write.speak(self._planner.dialect(write.mapping))
+        return carry_out(write, self._clock)
 
     def _write_failed(self, station: int, error: LinkError | RemoteError | None) -> None:
         """Count the error that has ended a write early, if any."""

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.text import printable
 
 
@@ -76,7 +77,8 @@ class Identity:
     processor from doing its work, ``remarks`` do not. ``name`` is in the processor's own words
     with control characters made visible, ``memory`` in its own unit. ``interface`` is the code
     of the port that was asked; ``counter_address`` and ``counter_size`` (bytes) are for
-    ``ReadCounters``.
+    ``ReadCounters``. ``processor`` is what the map file would call it, None where it has no word
+    for it.
     """
 
     family: str
@@ -93,6 +95,7 @@ class Identity:
     interface: int | None = None
     counter_address: int = 0
     counter_size: int = _MODULE_COUNTERS
+    processor: Processor | None = None
 
     @property
     def plc_type(self) -> PlcType | None:

@@ -28,7 +28,8 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.diagnostics import ReadCounters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.pccc.slc.identity import HALF_DUPLEX_PORT, is_micrologix_1000
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.slc.identity import HALF_DUPLEX_PORT
 
 _MODEM_LINES = 'modem lines'
 _LINES = ('CTS', 'RTS', 'DSR', 'DCD', 'DTR')
@@ -77,7 +78,7 @@ def layout_of(identity: Identity | None) -> CounterLayout | None:
         return CounterLayout.PLC5
     if identity.family != 'SLC':
         return None
-    if is_micrologix_1000(identity):
+    if identity.processor is Processor.ML1000:
         return CounterLayout.MICROLOGIX_1000
     is_half_duplex = identity.interface == HALF_DUPLEX_PORT
     return CounterLayout.SLC_SLAVE if is_half_duplex else CounterLayout.SLC_FULL_DUPLEX

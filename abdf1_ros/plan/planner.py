@@ -31,7 +31,9 @@ import math
 
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.families import dialect_of
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.plan.line_model import LineModel, ReadRequest
 from abdf1_ros.plan.partition import Candidate, CostModel, partition, Span
 from abdf1_ros.settings.mapping import Mapping
@@ -116,11 +118,13 @@ class Planner:
     Plan reads for a line; mappings without a period get ``default_period`` (s).
 
     ``refuse`` and ``allow`` tell which words stations were found to lack or to have; no block
-    holds all words of a refused span.
+    holds all words of a refused span. ``processors`` are those that stations have said to be:
+    their packets are kept to, even where the map says that longer ones are taken.
     """
 
     def __init__(self, line: LineModel, default_period: float) -> None:
         self.line = line
+        self.processors: dict[int, Processor] = {}
         self._default_period = default_period
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
         # Words per packet of blocks that were refused with more of them.
@@ -176,6 +180,17 @@ class Planner:
         self._refused[area] -= wrong
         return bool(wrong)
 
+    def dialect(self, mapping: Mapping) -> Dialect:
+        """Return how the station of a mapping is spoken to, as far as one knows."""
+        processor = self.processors.get(mapping.station)
+        if processor is None or mapping.plc_type is not PlcType.SLC:
+            return mapping.dialect
+        return min(mapping.dialect, dialect_of(PlcType.SLC, processor=processor),
+                   key=lambda dialect: dialect.max_read(FileType.INTEGER))
+
+    def _max_words(self, mapping: Mapping) -> int:
+        return self.dialect(mapping).max_read(mapping.address.file_type)
+
     def _period(self, mapping: Mapping) -> float:
         if mapping.period is None:
             return self._default_period
@@ -202,7 +217,7 @@ class Planner:
 
     def _cost_model(self, example: Mapping, refused: Iterable[Span]) -> CostModel:
         """Return the cost model of the area of ``example``."""
-        key = example.dialect, example.address.file_type
+        key = self.dialect(example), example.address.file_type
         if key not in self._costs:
             self._costs[key] = self._costs_of(example)
         return CostModel(self._costs[key], _per_element(example), refused)
@@ -210,7 +225,7 @@ class Planner:
     def _costs_of(self, example: Mapping) -> list[float]:
         """Return the seconds that a read takes, by its number of words."""
         start, per_element = example.address.at_offset(0), _per_element(example)
-        costs = [0.0] * (_max_words(example) + 1)
+        costs = [0.0] * (self._max_words(example) + 1)
         for words in {1, *range(per_element, len(costs), per_element)}:
             costs[words] = self.line.read_time(example.dialect, ReadRequest(start, words))
         value = next((place for place in map(start.at_offset, range(per_element))
@@ -221,7 +236,8 @@ class Planner:
 
     def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
         first = mappings[0]
-        limit = min(_max_words(first), self._limits.get((_station_area(first), span), span.words))
+        limit = min(self._max_words(first),
+                    self._limits.get((_station_area(first), span), span.words))
         if span.words > limit:  # a long mapping: no packet ends within a value
             limit -= limit % _whole(mappings)
         requests = tuple(
@@ -240,10 +256,6 @@ def _station_area(mapping: Mapping) -> StationArea:
 def _whole(mappings: Sequence[Mapping]) -> int:
     """Return the words of the longest value or element, which no packet may divide."""
     return max(_per_element(mappings[0]), *(mapping.codec.element_words for mapping in mappings))
-
-
-def _max_words(mapping: Mapping) -> int:
-    return mapping.dialect.max_read(mapping.address.file_type)
 
 
 def _per_element(mapping: Mapping) -> int:

@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.plan.partition import Span
 from abdf1_ros.plan.planner import Block, Planner
 
@@ -103,10 +104,23 @@ class Refusals:
             return self._settle(search, block, is_refused=False)
         if not self._planner.allow(block.station_area, block.span):
             return None
-        old = [other for other in blocks
-               if other.station_area == block.station_area and other not in self._searches]
+        return self._planned_anew(
+            other for other in blocks if other.station_area == block.station_area)
+
+    def processor_told(self, station: int, processor: Processor | None,
+                       blocks: Iterable[Block]) -> Change | None:
+        """Take note what a station has said to be; keep to the packets of such a processor."""
+        if processor is None or self._planner.processors.get(station) is processor:
+            return None
+        self._planner.processors[station] = processor
+        change = self._planned_anew(block for block in blocks if block.station == station)
+        return None if set(change.old) == set(change.new) else change
+
+    def _planned_anew(self, blocks: Iterable[Block]) -> Change:
+        """Return what to read in place of ``blocks``, but for those that are being divided."""
+        old = [block for block in blocks if block not in self._searches]
         return Change(old, self._planner.plan(
-            mapping for other in old for mapping in other.mappings))
+            mapping for block in old for mapping in block.mappings))
 
     def _settle(self, search: _RefusalSearch, block: Block, is_refused: bool) -> Change | None:
         if not search.settle(block, is_refused):

@@ -46,17 +46,22 @@ def trouble(identity: Identity | None) -> str | None:
 def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping],
                file: str) -> str | None:
     """
-    Return that a PLC is of another family than a row of the map says, None when it is not.
+    Return that a PLC is not what a row of the map says, None when it is.
 
-    Rows of type PLC2 are right for any PLC: all families know these commands.
+    That is of another PLC_Type, or another Processor. Rows of type PLC2 are right for any PLC: all
+    families know these commands.
     """
     if identity is None or identity.plc_type is None:
         return None
     for row in rows:
         if row.plc_type not in (identity.plc_type, PlcType.PLC2):
-            article = 'an' if identity.model.startswith('SLC') else 'a'
-            return (f'station {station} is {article} {identity.model}, {file}:{row.line} says '
-                    f'{row.plc_type.value}')
+            said = row.plc_type.value
+        elif row.processor not in (identity.processor, None) and identity.processor is not None:
+            said = f'{row.processor.value} in the column Processor'
+        else:
+            continue
+        article = 'an' if identity.model.startswith('SLC') else 'a'
+        return f'station {station} is {article} {identity.model}, {file}:{row.line} says {said}'
     return None
 
 

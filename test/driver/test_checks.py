@@ -349,6 +349,60 @@ def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:
     assert bench.listener.changes[len(dead):] == [(2, True)]
 
 
+# packets
+
+
+class OldSlc(Ears):
+    """An SLC 5/01: no more than 82 bytes of data in a packet (M 7-17, 7-18)."""
+
+    def __init__(self, bench: DriverBench, plc: SimulatedPlc) -> None:
+        super().__init__(bench, plc)
+        self.answer = self._answer
+        self.refused = 0
+        self.writes: list[int] = []
+
+    def _answer(self, command: Packet) -> Packet:
+        reply = self._plc.serve(command)
+        if command.cmd == 0x06:  # type and name of M 10-4
+            return replace(reply, data=reply.data[:3] + b'\x18' + reply.data[4:5]
+                           + b'5/01'.ljust(11) + reply.data[16:])
+        self.writes += [command.data[1]] if command.data[0] == 0xAA else []
+        if command.data[1] <= 82:
+            return reply
+        self.refused += 1
+        return command.reply(sts=0x10)
+
+
+@pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
+def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: Network) -> None:
+    rows = [make_mapping('N7:0', 'ReadWrite', plc='SLC', length=100),
+            *(word(text=f'N7:{number}') for number in range(100, 200))]
+    bench = DriverBench(rows, network=network, start=False,
+                        settings=DriverSettings(processor_period=PERIOD, write_timeout=10.0))
+    plc = simulated_plc(1, 'SLC', bench.clock, *FILES)
+    old = OldSlc(bench, plc)
+    bench.connect(old)
+    bench.open()
+    bench.run(1.0)
+    planned = bench.driver.blocks
+    bench.write(rows[0], list(range(100)))
+    bench.run(2 * PERIOD)
+    assert old.refused == 0
+    assert all(bench.listener.values(row) for row in rows)
+    assert old.writes == [82, 82, 36]
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert bench.listener.values(rows[0])[-1] == list(range(100))
+    assert bench.driver.blocks == planned  # once, not at each answer
+
+
+def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
+    row = make_mapping('N7:0', plc='SLC', length=100, processor='ML1000')
+    bench, _, _ = make_bench(row)  # it says that it is a 5/03
+    bench.open()
+    bench.run(2 * PERIOD)
+    assert [request.words for request in bench.driver.blocks[0].requests] == [41, 41, 18]
+
+
 # link counters
 
 

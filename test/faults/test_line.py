@@ -200,11 +200,12 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('fault, text', [
     ('delay 2 300', 'written'),
-    ('delay 2 3000', UNKNOWN + '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
+    # Not sent, where two reads before it were too late already.
+    ('delay 2 3000', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
 def test_station_is_slow(line: Boxed, fault: str, text: str) -> None:
     rig, _ = line
     rig.simulator.say(fault)
-    assert rig.write(3.0).startswith(text)
+    assert text in rig.write(3.0)
     rig.status('mappings', ERROR)
     rig.status('link', OK)  # it answers its polls
     rig.speeds.next()  # the other goes on

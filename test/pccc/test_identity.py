@@ -22,8 +22,8 @@ from abdf1_ros.pccc.diagnostics import ReadCounters
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.link_counters import counter_request
 from abdf1_ros.pccc.plc5 import identity as plc5
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc.faults import major_error
-from abdf1_ros.pccc.slc.identity import is_micrologix_1000
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -46,7 +46,7 @@ def test_slc_of_the_vectors() -> None:
     assert str(identity) == 'SLC 5/04 series B revision 3, RUN'
     assert identity == Identity(
         'SLC', 'SLC 5/04', 'B', '3', Mode.RUN, 'RUN', name='5/04', program_id=0x1234,
-        memory='32 K', interface=0x34)
+        memory='32 K', interface=0x34, processor=Processor.SLC_5_04)
     assert identity.is_running
 
 
@@ -114,29 +114,34 @@ def test_plc5_faults_and_remarks() -> None:
         'forces installed', 'memory protected')
 
 
-@pytest.mark.parametrize(('code', 'model'), [
-    (0x1A, 'SLC 500 fixed'), (0x18, 'SLC 5/01'), (0x25, 'SLC 5/02'), (0x49, 'SLC 5/03'),
-    (0x5B, 'SLC 5/04'), (0x78, 'SLC 5/05'), (0x58, 'MicroLogix 1000'),
-    (0x88, 'MicroLogix 1200'), (0x89, 'MicroLogix 1500 LSP'), (0x8C, 'MicroLogix 1500 LRP'),
-    (0x9C, 'MicroLogix 1100')])
-def test_slc_models(code: int, model: str) -> None:
+@pytest.mark.parametrize(('code', 'model', 'processor'), [
+    (0x1A, 'SLC 500 fixed', '5/01'), (0x18, 'SLC 5/01', '5/01'), (0x25, 'SLC 5/02', '5/02'),
+    (0x49, 'SLC 5/03', '5/03'), (0x5B, 'SLC 5/04', '5/04'), (0x78, 'SLC 5/05', '5/05'),
+    (0x58, 'MicroLogix 1000', 'ML1000'), (0x88, 'MicroLogix 1200', 'ML1200'),
+    (0x89, 'MicroLogix 1500 LSP', 'ML1500'), (0x8C, 'MicroLogix 1500 LRP', 'ML1500'),
+    (0x9C, 'MicroLogix 1100', 'ML1100')])
+def test_slc_models(code: int, model: str, processor: str) -> None:
     identity = changed(SLC, byte4=code, byte6=0)  # without a name
     assert str(identity) == f'{model} series B revision 3, REM RUN'
-    assert is_micrologix_1000(identity) == (code == 0x58)
+    assert identity.processor is Processor(processor)
 
 
-@pytest.mark.parametrize(('code', 'name', 'model', 'remarks'), [
-    (0xB9, b'1766-LEC   ', 'MicroLogix 1400', ()), (0x77, b'1747-L542B ', '1747-L542B', ()),
-    (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', ()),
-    (0x1A, b'500-20     ', 'SLC 500 fixed', ()),
-    (0x78, b'5/04       ', 'SLC 5/04', ('its processor code 0x78 is that of a SLC 5/05',)),
-    (0x9C, b'1762-L24   ', 'MicroLogix 1200',
+@pytest.mark.parametrize(('code', 'name', 'model', 'processor', 'remarks'), [
+    (0xB9, b'1766-LEC   ', 'MicroLogix 1400', Processor.ML1400, ()),
+    (0x77, b'1747-L542B ', '1747-L542B', None, ()),
+    (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', Processor.ML1500, ()),
+    (0x1A, b'500-20     ', 'SLC 500 fixed', Processor.SLC_5_01, ()),
+    (0x78, b'5/04       ', 'SLC 5/04', Processor.SLC_5_04,
+     ('its processor code 0x78 is that of a SLC 5/05',)),
+    (0x9C, b'1762-L24   ', 'MicroLogix 1200', Processor.ML1200,
      ('its processor code 0x9C is that of a MicroLogix 1100',)),
-    (0x18, b'5/06       ', '5/06', ('its processor code 0x18 is that of a SLC 5/01',))])
+    (0x18, b'5/06       ', '5/06', None, ('its processor code 0x18 is that of a SLC 5/01',))])
 def test_name_of_an_slc_counts_more_than_its_code(
-        code: int, name: bytes, model: str, remarks: tuple[str, ...]) -> None:
+        code: int, name: bytes, model: str, processor: Processor | None,
+        remarks: tuple[str, ...]) -> None:
     identity = decode_identity(SLC[:3] + bytes((code,)) + SLC[4:5] + name + SLC[16:])
     assert (identity.family, identity.model, identity.remarks) == ('SLC', model, remarks)
+    assert identity.processor is processor
 
 
 @pytest.mark.parametrize(('code', 'text'), [

@@ -29,6 +29,7 @@ from abdf1_ros.pccc.link_counters import (
     served_counters,
     ServedCounters,
 )
+from abdf1_ros.pccc.processor import Processor
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -110,7 +111,8 @@ def test_any_bytes_are_counters_or_a_format_error(data: bytes,
     (Identity('SLC', 'SLC 5/03', interface=0x34), CounterLayout.SLC_FULL_DUPLEX,
      ReadCounters(0, 26)),
     (Identity('SLC', 'SLC 5/03', interface=0x36), CounterLayout.SLC_SLAVE, ReadCounters(0, 26)),
-    (Identity('SLC', 'MicroLogix 1000', interface=0x34), CounterLayout.MICROLOGIX_1000,
+    (Identity('SLC', 'MicroLogix 1000', interface=0x34, processor=Processor.ML1000),
+     CounterLayout.MICROLOGIX_1000,
      ReadCounters(0, 22)),
     (Identity('PLC-5', 'PLC-5/40'), CounterLayout.PLC5, ReadCounters(0, 26)),
     (Identity('PLC-2', 'PLC-2', counter_address=0x4144), None, ReadCounters(0x4144, 55)),

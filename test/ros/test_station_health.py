@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 import time
 
@@ -24,6 +25,7 @@ from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.station_health import health_values, LinkCounterService, trouble, wrong_type
 from abdf1_ros.settings.mapping import Mapping
@@ -69,7 +71,12 @@ LEVEL = make_mapping('N7:0', plc='SLC', item=6)
     (SLC, [LEVEL, make_mapping('N7:0', plc='PLC5', item=2)],
      'station 1 is an SLC 5/03, map.csv:3 says PLC5'),
     (PLC5, [make_mapping('020', plc='PLC2')], None), (Identity('', '1770-KF2'), [LEVEL], None),
-    (None, [LEVEL], None), (PLC5, [], None)])
+    (None, [LEVEL], None), (PLC5, [], None),
+    (replace(SLC, processor=Processor.SLC_5_03), [LEVEL], None),
+    (replace(SLC, processor=Processor.SLC_5_03),
+     [make_mapping('N7:0', plc='SLC', item=6, processor='5/02')],
+     'station 1 is an SLC 5/03, map.csv:7 says 5/02 in the column Processor'),
+    (SLC, [make_mapping('N7:0', plc='SLC', item=6, processor='5/02')], None)])
 def test_plc_of_another_family_than_its_rows(
         identity: Identity | None, rows: list[Mapping], text: str | None) -> None:
     assert wrong_type(1, identity, rows, 'map.csv') == text

@@ -26,6 +26,7 @@ from abdf1_ros.pccc.identity import (
     release,
     word_at,
 )
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc.faults import major_error
 
 EXTENDED = 0xEE  # byte 2: interface and processor type follow, then a name
@@ -34,12 +35,11 @@ SIZE = 24
 FULL_DUPLEX_PORT = 0x34
 HALF_DUPLEX_PORT = 0x36
 SLC_5_03 = 0x49
-_MICROLOGIX_1000 = 0x58
 
 # Byte 4; the codes from 78 on are those that drivers in the field know.
 _MODELS = {
     0x18: 'SLC 5/01', 0x1A: 'SLC 500 fixed', 0x25: 'SLC 5/02', SLC_5_03: 'SLC 5/03',
-    0x5B: 'SLC 5/04', _MICROLOGIX_1000: 'MicroLogix 1000', 0x78: 'SLC 5/05',
+    0x5B: 'SLC 5/04', 0x58: 'MicroLogix 1000', 0x78: 'SLC 5/05',
     0x88: 'MicroLogix 1200', 0x89: 'MicroLogix 1500 LSP', 0x8C: 'MicroLogix 1500 LRP',
     0x9C: 'MicroLogix 1100'}
 
@@ -49,6 +49,15 @@ _NAMES = {
     '5/05': 'SLC 5/05', '500': 'SLC 500 fixed', '1761': 'MicroLogix 1000',
     '1762': 'MicroLogix 1200', '1763': 'MicroLogix 1100', '1764': 'MicroLogix 1500',
     '1766': 'MicroLogix 1400', '5/': '', '1747': ''}
+
+# By what the name of a model begins with. The fixed ones take the packets of the 5/01 (M 7-17).
+_PROCESSORS = {
+    'SLC 500 fixed': Processor.SLC_5_01, 'SLC 5/01': Processor.SLC_5_01,
+    'SLC 5/02': Processor.SLC_5_02, 'SLC 5/03': Processor.SLC_5_03,
+    'SLC 5/04': Processor.SLC_5_04, 'SLC 5/05': Processor.SLC_5_05,
+    'MicroLogix 1000': Processor.ML1000, 'MicroLogix 1100': Processor.ML1100,
+    'MicroLogix 1200': Processor.ML1200, 'MicroLogix 1400': Processor.ML1400,
+    'MicroLogix 1500': Processor.ML1500}
 
 MODES = {
     0x00: Mode.REMOTE_DOWNLOAD, 0x01: Mode.REMOTE_PROGRAM, 0x03: Mode.REMOTE_SUSPEND,
@@ -80,12 +89,12 @@ def decode(data: bytes) -> Identity | None:
         'testing edits': data[0] & 0x40, 'edits in the processor': data[0] & 0x80,
         'program directory corrupted': data[23] & 0x01})
     return Identity('SLC', model, *release(data[4]), mode, mode_text, faults, remarks, name,
-                    word_at(data, 20), f'{data[22]} K', data[2])
+                    word_at(data, 20), f'{data[22]} K', data[2], processor=_processor(model))
 
 
-def is_micrologix_1000(identity: Identity) -> bool:
-    """Tell whether this is a MicroLogix 1000, whose counters differ from those of others."""
-    return identity.model == _MODELS[_MICROLOGIX_1000]
+def _processor(model: str) -> Processor | None:
+    return next((processor for start, processor in _PROCESSORS.items()
+                 if model.startswith(start)), None)
 
 
 def _model(code: int, name: str) -> tuple[str, tuple[str, ...]]:
