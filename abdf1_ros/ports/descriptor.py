@@ -32,7 +32,9 @@ from typing import Protocol
 
 _INT = struct.Struct('i')
 
-_READ_SIZE = 4096
+READ_SIZE = 512
+"""Bytes that are read at a time, more than a line can have brought while its thread slept."""
+
 _WRITE_TIMEOUT = 2.0
 
 
@@ -74,7 +76,7 @@ class DescriptorPort:
     def _take(self) -> bytes:
         """Read what has come."""
         try:
-            data = os.read(self._descriptor, _READ_SIZE)
+            data = os.read(self._descriptor, READ_SIZE)
         except BlockingIOError:
             return b''
         if not data:

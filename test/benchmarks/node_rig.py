@@ -30,7 +30,9 @@ import sys
 import tempfile
 import time
 
-sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
+_OURS = [*map(str, Path(__file__).resolve().parents[1:3])]
+sys.path[:0] = _OURS
+os.environ['PYTHONPATH'] = os.pathsep.join(_OURS)  # also of the processes that are measured
 
 from abdf1_ros.df1.machine import Machine  # noqa: E402
 from abdf1_ros.settings.map_file import load_mappings  # noqa: E402

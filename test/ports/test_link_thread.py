@@ -29,7 +29,7 @@ from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, 
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
-from abdf1_ros.ports.descriptor import DescriptorPort, Port
+from abdf1_ros.ports.descriptor import DescriptorPort, Port, READ_SIZE
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -365,19 +365,6 @@ def test_bytes_of_a_connection_are_read_as_they_come(
     thread.stop()
 
 
-class Broken:
-    """A machine's procedure that fails as soon as it runs."""
-
-    def __init__(self) -> None:
-        self.machine = Machine(self._run, checksum=Checksum.CRC)
-        self.runs = 0
-
-    def _run(self, machine: Machine) -> Procedure:
-        self.runs += 1
-        raise ZeroDivisionError
-        yield Step(None, None)
-
-
 class _NoLine:
     """A port on which nothing ever happens."""
 
@@ -394,6 +381,74 @@ class _NoLine:
 
     def close(self) -> None:
         """Do nothing."""
+
+
+class Babbler(_NoLine):
+    """A connection with bytes at every read but the last; a look at the clock takes 1 ms."""
+
+    def __init__(self, size: int, reads: int) -> None:
+        self.now = 0.0
+        self._size = size
+        self._reads = reads
+
+    def clock(self) -> float:
+        """Return the time."""
+        self.now += 0.001
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Return so many bytes."""
+        self._reads -= 1
+        if not self._reads:
+            raise OSError('the end')
+        return bytes(self._size)
+
+
+class Restful(Impatient):
+    """A link thread that tells for how long it leaves the port alone."""
+
+    def __init__(self, machine: Machine, opener: Callable[[], Port], most: int,
+                 **options: object) -> None:
+        super().__init__(machine, opener, most, **options)
+        self.rests: list[float] = []
+
+    def _rest(self, seconds: float) -> None:
+        self.rests.append(seconds)
+
+
+def test_connection_that_babbles_leaves_time_to_others() -> None:
+    script, port = Script(Step(b'', None)), Babbler(READ_SIZE, 11)
+    taken: list[int] = []
+    receive = script.machine.receive_data
+    script.machine.receive_data = lambda data, now: (  # type: ignore[method-assign]
+        taken.append(len(data)), receive(data, now))[1]
+    thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
+    thread.run()
+    assert taken == [64] * 10 * 8
+    assert thread.rests == [pytest.approx(0.038)] * 10 * 8  # 19 times as long as it took
+    thread.stop()
+
+
+def test_line_is_not_left_alone_after_a_frame() -> None:
+    script, port = Script(Step(b'', None)), Babbler(READ_SIZE - 1, 11)
+    thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
+    thread.run()
+    assert script.machine.counters.chars_received == 10 * (READ_SIZE - 1)
+    assert not thread.rests
+    thread.stop()
+
+
+class Broken:
+    """A machine's procedure that fails as soon as it runs."""
+
+    def __init__(self) -> None:
+        self.machine = Machine(self._run, checksum=Checksum.CRC)
+        self.runs = 0
+
+    def _run(self, machine: Machine) -> Procedure:
+        self.runs += 1
+        raise ZeroDivisionError
+        yield Step(None, None)
 
 
 def test_three_faults_within_a_minute_end_the_thread() -> None:
