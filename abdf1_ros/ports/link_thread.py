@@ -359,6 +359,8 @@ class LinkThread(threading.Thread):
         """
         self._machine.receive_data(data[:_PORTION], begun)
         self._rest(_OTHERS * (self._clock() - begun))
+        if self._take_wake() and not self._stopping:
+            self._machine.wake(self._clock())
         return data[_PORTION:]
 
     def _rest(self, seconds: float) -> None:

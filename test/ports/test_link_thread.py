@@ -425,7 +425,16 @@ def test_connection_that_babbles_leaves_time_to_others() -> None:
     thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
     thread.run()
     assert taken == [64] * 10 * 8
-    assert thread.rests == [pytest.approx(0.038)] * 10 * 8  # 19 times as long as it took
+    assert thread.rests == [pytest.approx(0.019)] * 10 * 8  # 19 times as long as it took
+    thread.stop()
+
+
+def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:
+    script, port = Script(Step(None, None), Step(b'awake', None)), Babbler(READ_SIZE, 11)
+    thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
+    thread.wake()
+    thread.run()
+    assert script.next() is None
     thread.stop()
 
 
