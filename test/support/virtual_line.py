@@ -97,6 +97,7 @@ class VirtualLine:
         self._random = Random(seed)
         self._free = [0.0] * len(machines)  # when each sender's last byte has left
         self._away = [0.0] * len(machines)  # until when
+        self._calls = [math.inf] * len(machines)  # when each wants to be called next
         self._arrivals: list[tuple[float, int, int, bytes]] = []
         self._count = 0
 
@@ -120,11 +121,14 @@ class VirtualLine:
 
     def pause(self, machine: Machine, seconds: float) -> None:
         """Stop a machine's process; what comes waits for it, as its own deadlines do."""
-        self._away[self._machines.index(machine)] = self.now + seconds
+        sender = self._machines.index(machine)
+        self._away[sender] = self.now + seconds
+        self._look_at(sender)
 
     def run(self, until: Callable[[], bool], limit: float) -> None:
         """Let time pass until ``until()``; fail after ``limit`` seconds, or when all is still."""
         end = self.now + limit
+        self._look_at_all()
         while not until():
             if not self._advance():
                 raise AssertionError(f'nothing will ever happen again, at {self.now}')
@@ -133,20 +137,25 @@ class VirtualLine:
     def run_for(self, seconds: float) -> None:
         """Let ``seconds`` pass."""
         end = self.now + seconds
+        self._look_at_all()
         while self._advance(end):
             pass
         self.now = end
 
+    def _look_at_all(self) -> None:
+        """Take in what a test has changed since time last passed."""
+        for number in range(len(self._machines)):
+            self._look_at(number)
+
+    def _look_at(self, number: int) -> None:
+        moment = self._machines[number].next_call
+        self._calls[number] = math.inf if moment is None else max(moment, self._away[number])
+
     def _advance(self, end: float = math.inf) -> bool:
         """Carry out the next event; return False when there is none up to ``end``."""
         arrival = self._arrivals[0][0] if self._arrivals else math.inf
-        first, deadline = -1, math.inf
-        for index, machine in enumerate(self._machines):
-            if (moment := machine.next_call) is not None:
-                due = max(moment, self._away[index])
-                if due < deadline:
-                    first, deadline = index, due
-        if min(arrival, deadline) > end or first < 0 and not self._arrivals:
+        deadline = min(self._calls)
+        if min(arrival, deadline) > end or math.inf == deadline and not self._arrivals:
             return False
         if arrival <= deadline:
             self.now, number, first, data = heapq.heappop(self._arrivals)
@@ -159,6 +168,7 @@ class VirtualLine:
             self._machines[first].receive_data(data, self.now)
             self._away[first] = self.now + self._machines[first].spare_time
         else:
+            first = self._calls.index(deadline)
             self.now = max(self.now, deadline)
             self._machines[first].handle_timeout(self.now)
         self._take(first)
@@ -172,8 +182,9 @@ class VirtualLine:
         return rest
 
     def _take(self, sender: int) -> None:
-        """Put on the wire what a machine has to send."""
+        """Put on the wire what a machine has to send, and see when it wants to go on."""
         data = self._machines[sender].data_to_send()
+        self._look_at(sender)
         if not data:
             return
         start = max(self.now, self._free[sender])
