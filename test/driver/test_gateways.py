@@ -38,7 +38,9 @@ class Bench(DriverBench):
         self.first = make_mapping('N7:0', station=FIRST, via=GATEWAY, length=2)
         self.second = make_mapping('N7:0', 'ReadWrite', station=SECOND, via=GATEWAY, plc='SLC')
         self.third = make_mapping('N7:0', station=DIRECT)
-        network = Network(baud=115200, timeout=100, cmd_timeout=500, polling=polling)
+        network = Network(
+            baud=115200 if polling == 'Message' else 19200, timeout=100, cmd_timeout=500,
+            polling=polling)
         super().__init__([self.first, self.second, self.third], network=network,
                          settings=DriverSettings(**settings), start=False)  # type: ignore
         self.plcs = [simulated_plc(FIRST, 'PLC5', self.clock, ('N7:0', 10)),
