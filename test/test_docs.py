@@ -37,6 +37,7 @@ from abdf1_ros.settings.network import FIELDS, load_network
 import pytest
 import serial.serialposix
 from support import documents
+from support.cases import for_all
 from support.simulator_process import STATUSES
 
 ROOT = documents.ROOT
@@ -83,7 +84,7 @@ def code(name: str) -> Iterator[str]:
     yield from documents.spans(page)
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_links_lead_somewhere(name: str) -> None:
     page = documents.text(name)
     for target in re.findall(r'\]\(([^)]+)\)', page):
@@ -117,7 +118,7 @@ def test_every_status_is_in_the_reference() -> None:
     assert [name for name in names if f'| `abdf1: {name}` |' not in page] == []
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_rows_of_a_table_have_as_many_cells_as_its_head(name: str) -> None:
     widths: list[int] = []
     for line in documents.without_code(documents.text(name)).splitlines():
@@ -128,7 +129,7 @@ def test_rows_of_a_table_have_as_many_cells_as_its_head(name: str) -> None:
             widths = []
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_commands_and_their_options_exist(name: str) -> None:
     for line in code(name):
         match = OURS.search(line)
@@ -141,21 +142,21 @@ def test_commands_and_their_options_exist(name: str) -> None:
             assert option in help_of(command, *sub), line
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_parameters_exist(name: str) -> None:
     for line in code(name):
         named = set(re.findall(r'(?:-p |^)([a-z_.]+):=', line))
         assert named <= PARAMETERS | LAUNCH_ARGUMENTS, line
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_topics_exist(name: str) -> None:
     for line in code(name):
         named = set(re.findall(r'(?<![\w/.])(?:~|/abdf1)/([a-z_]+)\b(?!\.)', line))
         assert named <= TOPICS | AT_HOME, line
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_make_targets_exist(name: str) -> None:
     for line in code(name):
         for words in re.findall(r'^(?:\S+ )?make ([^#]*)', line):
@@ -164,7 +165,7 @@ def test_make_targets_exist(name: str) -> None:
                 assert variable in (VARIABLES if is_set else TARGETS), line
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_files_exist(name: str) -> None:
     for span in documents.spans(documents.text(name)):
         if re.fullmatch(r'[\w./@*-]+/[\w.@*-]+\.(py|csv|yaml|json|md|rules|service|txt)', span) \
@@ -173,7 +174,7 @@ def test_files_exist(name: str) -> None:
             assert any(list(place.glob(span)) for place in places), span
 
 
-@pytest.mark.parametrize('name', documents.NAMES)
+@for_all('name', documents.NAMES)
 def test_columns_exist(name: str) -> None:
     known = {entry.column for entry in FIELDS.values()} | {
         column.name for column in MAP_COLUMNS}

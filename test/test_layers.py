@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import pytest
+from support.cases import for_all
 
 from tools.rooms import imports, MODULES, PACKAGE, room_of
 
@@ -55,13 +56,13 @@ def violations(module: str, source: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize('module', MODULES)
+@for_all('module', MODULES)
 def test_imports_follow_the_arrows(module: str) -> None:
     source = (PACKAGE / module).read_text(encoding='utf-8')
     assert violations(module, source) == []
 
 
-@pytest.mark.parametrize('module', MODULES)
+@for_all('module', MODULES)
 def test_every_module_has_a_room(module: str) -> None:
     assert room_of(module).contents
 
@@ -70,7 +71,7 @@ def test_every_layer_is_looked_at() -> None:
     assert {'df1', 'pccc', 'errors.py', 'messages.py'} <= {m.split('/')[0] for m in MODULES}
 
 
-@pytest.mark.parametrize(('module', 'source'), [
+@for_all(('module', 'source'), [
     ('df1/master.py', 'from abdf1_ros.pccc import slc'),
     ('df1/master.py', 'from abdf1_ros.driver.points import Point'),
     ('df1/master.py', 'import abdf1_ros.pccc.slc.commands'),

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.messages import Event, Message, Severity
 import pytest
+from support.cases import for_all
 from support.vectors import load_tables
 
 SPECIFIED: list[tuple[int, str, str]] = [
@@ -30,20 +31,20 @@ def test_exactly_the_specified_messages_exist() -> None:
     assert len(SPECIFIED) == 32
 
 
-@pytest.mark.parametrize(('number', 'name', 'text'), SPECIFIED, ids=lambda value: str(value)[:24])
+@for_all(('number', 'name', 'text'), SPECIFIED)
 def test_text_is_that_of_the_specification(number: int, name: str, text: str) -> None:
     message = Message[name]
     assert message.number == number
     assert message.template == text
 
 
-@pytest.mark.parametrize('message', Message, ids=lambda message: message.name)
+@for_all('message', Message)
 def test_severity_follows_the_mnemonic(message: Message) -> None:
     prefix = {Severity.CRITICAL: 'CRT', Severity.ERROR: 'ERR', Severity.NOTICE: 'NTC'}
     assert message.name.startswith(prefix[message.severity] + '_')
 
 
-@pytest.mark.parametrize('message', Message, ids=lambda message: message.name)
+@for_all('message', Message)
 def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None:
     args = tuple(range(message.template.count('%')))
     assert '%' not in message.text(*args)

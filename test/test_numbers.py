@@ -20,6 +20,7 @@ from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 
 
 @pytest.mark.parametrize('text, value', [
@@ -37,7 +38,7 @@ def test_numbers(text: str, value: float) -> None:
     assert decimal_number(text) == value
 
 
-@pytest.mark.parametrize('text', [
+@for_all('text', [
     '', ' 1', '1 ', '1_000', '1_0.5', 'nan', 'inf', '-Infinity', '1e999', '\u0661', '\uff11',
     '1,5', '1e', 'e3', '.', '0x10', '1.2.3', '--1', '1\n'])
 def test_no_numbers(text: str) -> None:

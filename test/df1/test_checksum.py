@@ -20,6 +20,7 @@ from abdf1_ros.df1.checksum import bcc, Checksum, crc16
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import MESSAGES, Vector
 
 
@@ -66,7 +67,7 @@ def test_crc_of_a_master_frame_to_station_zero_covers_it_too() -> None:
     assert Checksum.CRC.of_message(b'abc', 0) != Checksum.CRC.of_message(b'abc')
 
 
-@pytest.mark.parametrize('vector', MESSAGES, ids=lambda vector: vector.name)
+@for_all('vector', MESSAGES)
 def test_check_of_every_vector(vector: Vector) -> None:
     check = vector.checksum.encode(vector.checksum.of_message(vector.link_data, vector.station))
     assert vector.frame.endswith(check) is vector.valid

@@ -41,6 +41,7 @@ from abdf1_ros.df1.frames import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import CAPTURED, Captured, MESSAGES, Vector, vector, VECTORS
 
 HALF, FULL, CRC, BCC = Duplex.HALF, Duplex.FULL, Checksum.CRC, Checksum.BCC
@@ -94,15 +95,14 @@ def expected_symbols(entry: Vector) -> list[Symbol]:
     return [*inside.get(entry.name, []), frame]
 
 
-@pytest.mark.parametrize('chunk', [None, 1, 3])
-@pytest.mark.parametrize('entry', VECTORS, ids=lambda entry: entry.name)
+@for_all('chunk', [None, 1, 3])
+@for_all('entry', VECTORS)
 def test_vector_decodes(entry: Vector, chunk: int | None) -> None:
     assert decode(entry.frame, entry.checksum, entry.duplex, chunk) == expected_symbols(entry)
 
 
-@pytest.mark.parametrize('entry', [
-    entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response],
-    ids=lambda entry: entry.name)
+@for_all('entry', [
+    entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response])
 def test_vector_encodes(entry: Vector) -> None:
     if entry.station is not None:
         assert entry.station is not None
@@ -126,7 +126,7 @@ def test_vectors_cover_every_mode() -> None:
     assert len(VECTORS) == 192
 
 
-@pytest.mark.parametrize('entry', CAPTURED, ids=lambda entry: f'{entry.direction}-{entry.time}')
+@for_all('entry', CAPTURED)
 def test_captured_frame_decodes_and_encodes(entry: Captured) -> None:
     (symbol,) = decode(entry.frame, entry.checksum, FULL, 1)
     if len(entry.frame) == 2:
@@ -255,10 +255,10 @@ def test_longest_message(fill: int) -> None:
     assert (frame.data, frame.fault) == (data, None)
 
 
-@pytest.mark.parametrize('fill', [0x10, 0x55])
-@pytest.mark.parametrize('size', [262, 263, 1000])
-@pytest.mark.parametrize('checksum', Checksum)
-@pytest.mark.parametrize('chunk', [None, 1])
+@for_all('fill', [0x10, 0x55])
+@for_all('size', [262, 263, 1000])
+@for_all('checksum', Checksum)
+@for_all('chunk', [None, 1])
 def test_message_longer_than_the_longest_is_one_up_to_its_end(
         fill: int, size: int, checksum: Checksum, chunk: int | None) -> None:
     good = message_frame(DATA, checksum)

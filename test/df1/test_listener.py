@@ -23,6 +23,7 @@ from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.df1.packet import Packet
 from hypothesis import given, strategies
 import pytest
+from support.cases import for_all
 from support.vectors import MESSAGES, Vector
 
 COMMAND = Packet(1, 5, 0x0F, 0, 0x1234, b'\xa2\x02\x07\x89\x00\x00').encode()
@@ -38,8 +39,8 @@ def frame(checksum: Checksum, tns: int = 0) -> bytes:
     return frames.message_frame(Packet(1, 5, 0x0F, 0, tns, b'\x01').encode(), checksum)
 
 
-@pytest.mark.parametrize('vector', [
-    pytest.param(vector, id=vector.name) for vector in MESSAGES
+@for_all('vector', [
+    vector for vector in MESSAGES
     if vector.valid and not vector.has_embedded_response])
 def test_every_vector_is_read_without_being_told_its_check(vector: Vector) -> None:
     kind = LineKind()

@@ -24,14 +24,14 @@ from abdf1_ros.errors import FormatError
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import MESSAGES, Vector
 
 COMMAND = Packet(dst=17, src=5, cmd=0x0F, sts=0, tns=0x0102, data=b'\xA2')
 
 
-@pytest.mark.parametrize(
-    'vector', [entry for entry in MESSAGES if entry.header is not None],
-    ids=lambda vector: vector.name)
+@for_all(
+    'vector', [entry for entry in MESSAGES if entry.header is not None])
 def test_header_of_every_vector(vector: Vector) -> None:
     packet = vector.packet
     assert (packet.dst, packet.src, packet.cmd, packet.sts, packet.tns) == vector.header

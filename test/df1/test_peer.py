@@ -29,6 +29,7 @@ from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.peers import PeerBench, single_bytes
 from support.vectors import CAPTURED, MESSAGES, Vector, vector
 
@@ -655,9 +656,9 @@ def test_message_lost_behind_its_stx_is_no_old_ack() -> None:
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
 
 
-@pytest.mark.parametrize('begun', [1, 2, 3, 9, -2, -1])
-@pytest.mark.parametrize('pause', [0.05, 5.0])
-@pytest.mark.parametrize('is_working', [False, True])
+@for_all('begun', [1, 2, 3, 9, -2, -1])
+@for_all('pause', [0.05, 5.0])
+@for_all('is_working', [False, True])
 def test_part_of_a_message_is_no_old_ack(begun: int, pause: float, is_working: bool) -> None:
     peer = bench()
     assert peer.hear_packet(REPLY) == ACK
@@ -1025,11 +1026,10 @@ def test_reply_is_sent_again_like_a_command_and_given_up_without_a_failure() -> 
     assert peer.hear_packet(later(THEIRS, 1)) == ACK + peer.frame(later(OUR_REPLY, 1))
 
 
-@pytest.mark.parametrize('entry', [
+@for_all('entry', [
     entry for entry in MESSAGES
-    if entry.duplex is Duplex.FULL and not entry.has_embedded_response],
-    ids=lambda entry: entry.name)
-@pytest.mark.parametrize('chunk', [1, 3, 1000])
+    if entry.duplex is Duplex.FULL and not entry.has_embedded_response])
+@for_all('chunk', [1, 3, 1000])
 def test_messages_of_the_vectors(entry: Vector, chunk: int) -> None:
     peer = bench(entry.checksum)
     parts = [entry.frame[at:at + chunk] for at in range(0, len(entry.frame), chunk)]

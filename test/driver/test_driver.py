@@ -36,6 +36,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
 
@@ -96,8 +97,8 @@ VALUES = [
     ('SLC', 'S:1', 1, None, [7])]
 
 
-@pytest.mark.parametrize('check', ['CRC', 'BCC'])
-@pytest.mark.parametrize('plc, text, length, kind, values', VALUES)
+@for_all('check', ['CRC', 'BCC'])
+@for_all(('plc', 'text', 'length', 'kind', 'values'), VALUES)
 def test_value_of_a_plc_reaches_the_listener(
         check: str, plc: str, text: str, length: int, kind: str | None,
         values: list[float] | str) -> None:
@@ -153,7 +154,7 @@ def test_value_that_publishes_changes_only() -> None:
     assert bench.listener.values(mapping) == [[0], [4]]
 
 
-@pytest.mark.parametrize('plc, text, length, kind, values', [
+@for_all(('plc', 'text', 'length', 'kind', 'values'), [
     case for case in VALUES if case[1] not in ('T4:1', 'I:007', 'I:007/17')])
 def test_write_reaches_the_plc_and_is_confirmed(
         plc: str, text: str, length: int, kind: str | None, values: list[float] | str) -> None:

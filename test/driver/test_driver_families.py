@@ -21,6 +21,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
 
@@ -52,8 +53,8 @@ VALUES: list[tuple[str, str | None, str, int, str | None, list[float] | str]] = 
 FILES = {'PLC2': PLC2_WORDS, 'PLC3': PLC3_FILES, 'PLC5': PLC5_FILES}
 
 
-@pytest.mark.parametrize('check', ['CRC', 'BCC'])
-@pytest.mark.parametrize(('plc', 'access', 'text', 'length', 'kind', 'values'), VALUES)
+@for_all('check', ['CRC', 'BCC'])
+@for_all(('plc', 'access', 'text', 'length', 'kind', 'values'), VALUES)
 def test_value_is_written_and_read_back(
         check: str, plc: str, access: str | None, text: str, length: int, kind: str | None,
         values: list[float] | str) -> None:

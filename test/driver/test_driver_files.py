@@ -26,6 +26,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench, simulated_plc, store, stored
 from support.mappings import make_mapping
 
@@ -51,7 +52,7 @@ READ_ONLY = [
     ('SLC', 'MG11:1/DN', 1, [1]), ('SLC', 'MG11:1.ERR', 1, [23])]
 
 
-@pytest.mark.parametrize('plc, text, length, values', WRITABLE + READ_ONLY)
+@for_all(('plc', 'text', 'length', 'values'), WRITABLE + READ_ONLY)
 def test_value_is_read(plc: str, text: str, length: int, values: list[float] | str) -> None:
     mapping = make_mapping(text, plc=plc, length=length)
     bench = DriverBench([mapping])

@@ -33,6 +33,7 @@ from abdf1_ros.settings.network import Network
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.mappings import load_rows, make_mapping
 from support.vectors import commands
 
@@ -184,8 +185,8 @@ def test_without_rows_only_diagnostics_are_served(plc: str) -> None:
     assert bench.ask(0x06, b'\3') == (0, EmulatedProcessor(PlcType(plc)).encode())
 
 
-@pytest.mark.parametrize('plc', FAMILIES)
-@pytest.mark.parametrize(('cmd', 'data'), [
+@for_all('plc', FAMILIES)
+@for_all(('cmd', 'data'), [
     (0x0F, b''), (0x0F, b'\x80\x06'), (0x0F, b'\x3A\x06'), (0x0F, b'\x03'), (0x07, b'\0\1'),
     (0x03, b'\x11\0\2'), (0x06, b'\x07'), (0x06, b''), (0x2F, b'\xA2'),
     (0x0A, b'racom'), (0x0B, b'racom'), (0x3F, bytes(200))])

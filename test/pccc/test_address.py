@@ -25,14 +25,15 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 BOTH = (PLC5, SLC)
 FAMILIES = st.sampled_from(BOTH)
 
 
-@pytest.mark.parametrize('family', BOTH)
-@pytest.mark.parametrize(('text', 'kind', 'file', 'element', 'word', 'bit'), [
+@for_all('family', BOTH)
+@for_all(('text', 'kind', 'file', 'element', 'word', 'bit'), [
     ('N7:0', 'N', 7, 0, 0, None), ('N:12', 'N', 7, 12, 0, None), ('N9;5', 'N', 9, 5, 0, None),
     ('n7:30/3', 'N', 7, 30, 0, 3), (' N7:1 ', 'N', 7, 1, 0, None), ('#N7:0', 'N', 7, 0, 0, None),
     ('$N10:255', 'N', 10, 255, 0, None), ('B3:1/5', 'B', 3, 1, 0, 5), ('B3/17', 'B', 3, 1, 0, 1),
@@ -77,8 +78,8 @@ def test_long_files_are_of_the_slc_family_only() -> None:
         parse_address('L10:3', PLC5)
 
 
-@pytest.mark.parametrize('family', BOTH)
-@pytest.mark.parametrize('text', [
+@for_all('family', BOTH)
+@for_all('text', [
     '', ' ', 'N', 'N7', 'N7:', ':0', '7:0', 'X7:0', 'NN7:0', 'N7:0:1', 'N7:0/', 'N7:0.', 'N7:-1',
     'N7:0 /1', 'N7:0.1', 'N7:0.ACC', 'N7:0/DN', 'S/3', 'F8/3', 'T4/3', 'B3/DN', 'F8:0/1', 'L:0',
     'ST:0', 'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN',
@@ -109,17 +110,17 @@ def test_digits_are_ascii(text: str, family: PlcType) -> None:
         parse_address(text, family)
 
 
-@pytest.mark.parametrize('text', [
+@for_all('text', [
     'N7:0/16', 'B3:0/16', 'N2:0', 'N7:123456', 'N7:100000',
     'N1000:0', 'N1234567:0', 'N7/16000', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255',
     'ST9:99999'])
-@pytest.mark.parametrize('family', BOTH)
+@for_all('family', BOTH)
 def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
     with pytest.raises(AddressRangeError):
         parse_address(text, family)
 
 
-@pytest.mark.parametrize(('family', 'last', 'beyond'), [
+@for_all(('family', 'last', 'beyond'), [
     (PLC5, 'N999:999', 'N999:1000'), (SLC, 'N255:255', 'N255:256'),
     (SLC, 'N255:0', 'N256:0'), (PLC5, 'S:127', 'S:128'), (PLC5, 'ST9:779', 'ST9:780'),
     (PLC5, 'PD9:398', 'PD9:399'), (PLC5, 'MG9:584', 'MG9:585'),
@@ -219,7 +220,7 @@ def test_every_member_has_its_name_in_text(family: PlcType) -> None:
             assert parse_address(str(address), family) == address
 
 
-@pytest.mark.parametrize(('family', 'text', 'word', 'bit', 'shown'), [
+@for_all(('family', 'text', 'word', 'bit', 'shown'), [
     (PLC5, 'PD12:10.SP', 2, None, 'PD12:10.SP'), (PLC5, 'PD12:10.26', 26, None, 'PD12:10.PV'),
     (PLC5, 'PD10:0.50', 50, None, 'PD10:0.50'), (PLC5, 'PD10:0.81/3', 81, 3, 'PD10:0.81/3'),
     (PLC5, 'PD10:0/MO', 0, 1, 'PD10:0/MO'), (PLC5, 'PD10:0/INI', 1, 12, 'PD10:0/INI'),

@@ -21,11 +21,12 @@ from abdf1_ros.pccc.address_errors import AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
+from support.cases import for_all
 
 SLC, PLC5 = PlcType.SLC, PlcType.PLC5
 
 
-@pytest.mark.parametrize(('text', 'family', 'expected'), [
+@for_all(('text', 'family', 'expected'), [
     ('I:1.0/3', PLC5, 'this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as '
                       'in I:017/12'),
     ('O:2.0', PLC5, 'this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as in '

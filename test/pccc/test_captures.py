@@ -30,6 +30,7 @@ from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.word_range import commands as word_range
 import pytest
 from support.captures import Capture, CAPTURES
+from support.cases import for_all
 
 OURS = [capture for capture in CAPTURES if capture.client == 'ours: node, Mode Peer']
 _READ: dict[tuple[int, int], Callable[[Reader], Any]] = {
@@ -85,7 +86,7 @@ def test_what_they_have_accepted_of_ours_is_what_we_would_send(capture: Capture)
     assert compared
 
 
-@pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)
+@for_all('capture', CAPTURES)
 def test_every_command_has_words(capture: Capture) -> None:
     for exchange in capture.exchanges():
         assert 'unknown' not in describe(exchange.command), exchange.command

@@ -20,6 +20,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.describe import command_name, describe
 from hypothesis import given, strategies
 import pytest
+from support.cases import for_all
 from support.vectors import MESSAGES, Vector
 
 
@@ -27,7 +28,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     return Packet(1, 5, cmd, 0, 0x1234, bytes.fromhex(data))
 
 
-@pytest.mark.parametrize(('data', 'text'), [
+@for_all(('data', 'text'), [
     ('A2 08 07 89 1E 00', 'protected typed logical read N7:30, 4 words'),
     ('A2 02 05 87 02 02', 'protected typed logical read C5:2.ACC, 1 word'),
     ('A2 0C 04 86 01 00', 'protected typed logical read T4:1, 2 elements'),
@@ -159,8 +160,8 @@ def test_command_name() -> None:
     assert command_name(command('')) == '0F'
 
 
-@pytest.mark.parametrize('vector', [
-    pytest.param(vector, id=vector.name) for vector in MESSAGES
+@for_all('vector', [
+    vector for vector in MESSAGES
     if vector.valid and len(vector.link_data) >= 6])
 def test_every_vector_has_a_text_of_one_line(vector: Vector) -> None:
     assert describe(vector.packet).isprintable()

@@ -34,6 +34,7 @@ from abdf1_ros.pccc.processor import Processor
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.tables import replied
 
 # Every family and access that the emulated PLC serves, with places of each kind of file. The
@@ -101,7 +102,7 @@ def test_bits_outside_of_the_mask_do_not_count(place: tuple[PlcType, Access]) ->
         address, 0x0108, 0x0100)
 
 
-@pytest.mark.parametrize('place', [place for place in WORDS if '.' not in place[2]], ids=str)
+@for_all('place', [place for place in WORDS if '.' not in place[2]])
 def test_largest_packets_are_served(place: tuple[PlcType, Access, str]) -> None:
     address, dialect, table = bench(*place, words=150)
     words = dialect.max_write(address.file_type)
@@ -188,8 +189,8 @@ def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], 
     assert table.read(address, words) == read == data
 
 
-@pytest.mark.parametrize('place', [key for key in PLACES if key[1] is not Access.TYPED], ids=str)
-@pytest.mark.parametrize('size', [0, 2, 5, 8])
+@for_all('place', [key for key in PLACES if key[1] is not Access.TYPED])
+@for_all('size', [0, 2, 5, 8])
 def test_reply_of_another_length(place: tuple[PlcType, Access], size: int) -> None:
     address = parse_address(PLACES[place][0], place[0])
     with pytest.raises(FormatError, match=f'^the reply holds {size} bytes, asked were 4$'):

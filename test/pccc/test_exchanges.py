@@ -37,6 +37,7 @@ from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 import pytest
+from support.cases import for_all
 from support.vectors import load_json
 
 _WITH_FUNCTION = (0x06, 0x0F)
@@ -115,7 +116,7 @@ def plc(family: PlcType, files: dict[str, str]) -> tuple[DataTable, Server]:
         words, counters=served_counters(Counters(), family, is_full_duplex=False))
 
 
-@pytest.mark.parametrize('entry', CALLS, ids=lambda entry: entry.name)
+@for_all('entry', CALLS)
 def test_our_end_sends_the_command(entry: Exchange) -> None:
     assert entry.call
     assert entry.call.request() == (entry.command.cmd, entry.command.data)
@@ -135,12 +136,12 @@ def test_our_end_takes_the_words_off_the_reply_and_nothing_else(entry: Exchange)
             dialect.read_data(address, words, wrong)
 
 
-@pytest.mark.parametrize('entry', EXCHANGES, ids=lambda entry: entry.name)
+@for_all('entry', EXCHANGES)
 def test_the_command_is_understood(entry: Exchange) -> None:
     assert describe(entry.command) == entry.meaning
 
 
-@pytest.mark.parametrize('entry', EXCHANGES, ids=lambda entry: entry.name)
+@for_all('entry', EXCHANGES)
 def test_the_other_end_executes_the_command_and_replies(entry: Exchange) -> None:
     words, server = plc(entry.family, entry.before)
     assert server.serve(entry.command) == entry.reply

@@ -29,6 +29,7 @@ from abdf1_ros.pccc.server import Server
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import pair
 
 REFUSED = 0x10
@@ -108,8 +109,8 @@ def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None
     assert answer(PlcType.SLC, ReadCounters(0, 4).encode(), served) == reply(b'\0\0\5\0')
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
-@pytest.mark.parametrize('data', [
+@for_all('plc_type', PlcType)
+@for_all('data', [
     b'', b'\x01\0\0\x10', b'\x03\x01', b'\x07', b'\x08\x80\0', b'\x09\0\0\x01', b'\xFF'])
 def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
     assert answer(plc_type, data) == reply(sts=REFUSED)
@@ -122,8 +123,8 @@ def test_nobody_sets_up_our_link_from_the_line(plc_type: PlcType, name: str) -> 
     assert Server(DataTable(plc_type)).serve(command) == command.reply(sts=REFUSED)
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
-@pytest.mark.parametrize(('cmd', 'data'), [
+@for_all('plc_type', PlcType)
+@for_all(('cmd', 'data'), [
     (0x0F, b'\x3A\0'), (0x0F, b'\x3A\x02'), (0x0F, b'\x80\x01'), (0x0F, b'\x80\x06'),
     (0x0F, b'\x41'), (0x0F, b'\x11'), (0x0F, b'\x07'), (0x07, b'\0'), (0x07, b'\x03')])
 def test_nobody_changes_the_mode(plc_type: PlcType, cmd: int, data: bytes) -> None:

@@ -26,6 +26,7 @@ from abdf1_ros.pccc.server import Refusal, Server
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 from support.vectors import pair
 
@@ -34,7 +35,7 @@ TEN = '64 00 FF FF 00 00 FF 7F 00 80 10 00 10 10 05 00 06 00 07 00'
 HELLO = '05 00 45 48 4C 4C 00 4F' + ' 00' * 76
 
 
-@pytest.mark.parametrize(('name', 'words'), [
+@for_all(('name', 'words'), [
     ('plc5_typed_read_N7_0x10', table(PLC5, N7_0=TEN)),
     ('plc5_typed_read_N7_30_1_short', table(PLC5, N7_30='D2 04')),
     ('plc5_typed_read_F8', table(PLC5, F8_0='00 00 7A 44 00 00 C0 BF')),
@@ -54,7 +55,7 @@ HELLO = '05 00 45 48 4C 4C 00 4F' + ' 00' * 76
     ('slc_AA_T4_PRE', table(SLC, T4_0='00 00 00 00 00 00')),
     ('slc_AB', table(SLC, B3_4='08 00')),
     ('slc_err_address', table(SLC, N7_0='00 00')),
-], ids=lambda value: value if isinstance(value, str) else '')
+])
 def test_reply_of_the_vectors(name: str, words: DataTable) -> None:
     command, reply = pair(name)
     assert Server(words).serve(command) == reply
@@ -97,8 +98,8 @@ def test_refused_write_of_the_vectors_changes_nothing() -> None:
     assert words_at(words, 'F8:5', 2) == '00 00 00 00'
 
 
-@pytest.mark.parametrize('family', [PLC5, SLC])
-@pytest.mark.parametrize(('cmd', 'data'), [
+@for_all('family', [PLC5, SLC])
+@for_all(('cmd', 'data'), [
     (0x0F, ''), (0x0F, '00'), (0x0F, 'FF'), (0x06, '02'), (0x03, ''), (0x4F, '68'),
     (0x0F, '68'), (0x0F, '67 00'), (0x0F, '26'), (0x0F, 'A2'), (0x0F, 'AA 02'), (0x0F, 'AB')])
 def test_what_is_no_command_of_the_family(family: PlcType, cmd: int, data: str) -> None:

@@ -29,6 +29,7 @@ from abdf1_ros.pccc.status import (
     USUAL_MEANINGS,
 )
 import pytest
+from support.cases import for_all
 from support.vectors import pair
 
 
@@ -72,7 +73,7 @@ def test_failure_in_words(sts: int, data: bytes, ext_sts: int | None, text: str)
     assert (error.sts, error.ext_sts, str(error)) == (sts, ext_sts, text)
 
 
-@pytest.mark.parametrize('sts', range(1, 256))
+@for_all('sts', range(1, 256))
 def test_every_other_status_is_a_failure(sts: int) -> None:
     assert str(failure(sts)) == status_text(sts)
     assert failure(sts).sts == sts

@@ -21,6 +21,7 @@ from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import pair, vector, VECTORS
 
 TYPED_READS = sorted({entry.pair for entry in VECTORS
@@ -69,7 +70,7 @@ def test_padding_behind_an_array_is_passed_over() -> None:
     assert TypedData.decode(bytes.fromhex('93 09 42 D2 04 00 00')) == TypedData(4, 2, b'\xD2\x04')
 
 
-@pytest.mark.parametrize('encoded', [
+@for_all('encoded', [
     '', '93', '93 09', '93 09 42 D2', '99 09', '99 09 05 42 D2 04', '9A 09 03', '42 D2',
     '42 D2 04 00', '40 D2', '90 09 42', '94 09 42 D2 04 00', '91 09 40', '9F 09 01', 'FF',
     '93 09 40 D2 04', '93 09 42 D2 04 00 01', '93 09 42 D2 04 FF'])

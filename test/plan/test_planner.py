@@ -33,6 +33,7 @@ from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.groupings import groupings
 from support.mappings import make_mapping
 
@@ -175,8 +176,8 @@ def _frames_time(example: Mapping, first: int, words: int,
     return characters * CHARACTER
 
 
-@pytest.mark.parametrize('checksum', list(Checksum))
-@pytest.mark.parametrize('plc, text, length', [
+@for_all('checksum', list(Checksum))
+@for_all(('plc', 'text', 'length'), [
     ('PLC5', 'N7:0', 1), ('PLC5', 'N7:0', 110), ('PLC5', 'N7:3', 4), ('PLC5', 'F8:0', 58),
     ('PLC5', 'F8:2', 1), ('PLC5', 'T4:0', 3), ('PLC5', 'T4:2.ACC', 1), ('PLC5', 'T4:0', 69),
     ('PLC5', 'PD9:0.PV', 1), ('PLC5', 'MG9:0', 112),

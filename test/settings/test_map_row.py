@@ -28,6 +28,7 @@ from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.values import ValueType, WordOrder
 import pytest
+from support.cases import for_all
 from support.mappings import fault, faults, load_rows, one, row, slc
 
 
@@ -57,7 +58,7 @@ def test_command(text: str, reads: bool, writes: bool) -> None:
     assert (mapping.reads, mapping.writes) == (reads, writes)
 
 
-@pytest.mark.parametrize('address, plc, kind', [
+@for_all(('address', 'plc', 'kind'), [
     ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:001', 'PLC5', 'uint16'),
     ('O:000', 'PLC5', 'uint16'), ('S:1', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'uint16'),
     ('A9:0', 'SLC', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L10:0', 'SLC', 'int32'),
@@ -89,7 +90,7 @@ def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
     assert fault(Address=address, Type=kind) == f'2:7 (Type): Item: 1, {right}'
 
 
-@pytest.mark.parametrize('column, text, expected', [
+@for_all(('column', 'text', 'expected'), [
     ('Station', '255',
      '2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (255) must be less '
      'than 255; Station = "255" should be a whole number from 0 to 254'),

@@ -22,12 +22,13 @@ from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 
 # What rcl accepts as a relative name (ROS.md 4.4).
 _LEGAL = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*')
 
 
-@pytest.mark.parametrize('text, name', [
+@for_all(('text', 'name'), [
     ('line_speed', 'line_speed'),
     ('N7:0', 'N7_0'),
     ('B3/12', 'B3/t12'),

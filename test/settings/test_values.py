@@ -28,6 +28,7 @@ from abdf1_ros.settings.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 
 _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.BOOL: st.integers(0, 1),
@@ -149,7 +150,7 @@ def test_string_that_cannot_be_written(codec: Codec, error: str) -> None:
     assert str(caught.value) == error
 
 
-@pytest.mark.parametrize('kind, values, error', [
+@for_all(('kind', 'values', 'error'), [
     (ValueType.INT16, [1], '1 values, the mapping has 2'),
     (ValueType.INT16, [1, 2, 3], '3 values, the mapping has 2'),
     (ValueType.INT16, [], '0 values, the mapping has 2'),
@@ -215,7 +216,7 @@ def test_bits_across_words() -> None:
         ('B3:0', 0xC000, 0x4000), ('B3:1', 0x0003, 0x0002)]
 
 
-@pytest.mark.parametrize('text, family, natural', [
+@for_all(('text', 'family', 'natural'), [
     ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:000', 'PLC5', 'uint16'),
     ('O:000', 'PLC5', 'uint16'), ('S:0', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'uint16'),
     ('A9:0', 'PLC5', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L9:0', 'SLC', 'int32'),

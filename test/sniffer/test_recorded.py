@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from abdf1_ros.sniffer.entries import Kind
 from abdf1_ros.sniffer.traffic import TrafficDecoder
-import pytest
 from support.captures import Capture, CAPTURES, FOLDER
+from support.cases import for_all
 
 _BAD = (Kind.DAMAGED, Kind.UNKNOWN, Kind.NOISE)
 
 
-@pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)
+@for_all('capture', CAPTURES)
 def test_everything_is_understood_and_the_check_is_found(capture: Capture) -> None:
     session = TrafficDecoder()
     entries = [entry for chunk in capture.chunks for entry in session.feed(chunk)]

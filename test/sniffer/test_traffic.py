@@ -29,6 +29,7 @@ from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from hypothesis import given, strategies
 import pytest
+from support.cases import for_all
 from support.multidrop import MasterBench
 from support.vectors import CAPTURED, Vector, VECTORS
 from support.virtual_line import Noise, QUIET
@@ -208,8 +209,8 @@ def test_master_resets_the_line() -> None:
     assert (entries[-1].text, entries[-1].direction) == ('resets all slaves', OUT)
 
 
-@pytest.mark.parametrize('vector', [
-    pytest.param(vector, id=vector.name) for vector in VECTORS if vector.frame])
+@for_all('vector', [
+    vector for vector in VECTORS if vector.frame])
 def test_vectors(vector: Vector) -> None:
     entries = [entry for entry in decode([(UNKNOWN, vector.frame)],
                                          TrafficDecoder(vector.checksum, vector.duplex))

@@ -20,6 +20,7 @@ from abdf1_ros.pccc.families import file_types_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.values import types_of
 import pytest
+from support.cases import for_all
 
 from tools import tables
 
@@ -37,7 +38,7 @@ def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
     assert shown == set(file_types_of(plc_type))
 
 
-@pytest.mark.parametrize(('label', 'examples'), tables.PLACES)
+@for_all(('label', 'examples'), tables.PLACES)
 def test_places_of_one_row_have_the_same_types(label: str,
                                                examples: dict[PlcType, str]) -> None:
     kinds = {types_of(parse_address(text, plc_type)) for plc_type, text in examples.items()}

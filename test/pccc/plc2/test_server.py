@@ -20,6 +20,7 @@ from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 from support.vectors import pair, vector
 
@@ -71,7 +72,7 @@ def test_largest_packets() -> None:
     assert ask(memory, '00 00' + ' 00 00 01 00' * 60 + ' 00', 0x05)[0] == 0x10
 
 
-@pytest.mark.parametrize(('cmd', 'data', 'sts'), [
+@for_all(('cmd', 'data', 'sts'), [
     (0x01, '00 00 00', 0x10), (0x01, '00 00 03', 0x10), (0x01, '00 00 F6', 0x10),
     (0x01, '01 00 02', 0x10), (0x01, '20 00 02', 0x50), (0x01, '1E 00 04', 0x50),
     (0x01, '00 00', 0x10), (0x08, '00 00', 0x10), (0x08, '00 00 01', 0x10),

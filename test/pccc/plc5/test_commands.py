@@ -33,6 +33,7 @@ from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import commands, Vector, without_area
 
 COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {
@@ -60,7 +61,7 @@ def test_address_in_logical_binary(address: SystemAddress, encoded: str) -> None
     assert SystemAddress.read(parameters(encoded)) == address
 
 
-@pytest.mark.parametrize(('encoded', 'address'), [
+@for_all(('encoded', 'address'), [
     ('07 00 07 1E', SystemAddress(7, 30)), ('07 00 03 FF 2C 01', SystemAddress(3, 300)),
     ('0F 00 04 02 02', SystemAddress(4, 2, 2)), ('02 07', SystemAddress(7, 0)),
     ('07 FF 00 00 FF 07 00 FF 1E 00', SystemAddress(7, 30)),

@@ -24,6 +24,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
 import pytest
+from support.cases import for_all
 from support.tables import replied
 from support.vectors import pair, without_area
 
@@ -93,7 +94,7 @@ FILES = ['N7:0', 'N900:900', 'B3:0', 'F8:0', 'F900:800', 'T4:0', 'C5:0', 'R6:0',
          'I:000', 'O:000', 'A10:0', 'D11:0', 'PD9:300', 'MG9:300', 'BT999:900', 'SC900:900']
 
 
-@pytest.mark.parametrize('text', FILES)
+@for_all('text', FILES)
 def test_largest_read_of_a_plc5_fits_its_packets(text: str) -> None:
     address = at(text)
     words = DIALECT.max_read(address.file_type)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 
 PLC5 = PlcType.PLC5
@@ -85,7 +86,7 @@ def test_plc5_offset_counts_elements() -> None:
     assert words_at(words, 'N7:2', 3) == '02 00 FF 00 04 00'
 
 
-@pytest.mark.parametrize(('data', 'ext_sts'), [
+@for_all(('data', 'ext_sts'), [
     ('68 00 00 01 00 07 00 09 00 01 00', '06'), ('68 00 00 01 00 07 00 07 04 01 00', '07'),
     ('68 00 00 05 00 07 00 07 00 05 00', '07'), ('68 00 00 01 00 07 00 07 00 02 00', '01'),
     ('68 01 00 01 00 07 00 07 00 01 00', '01'), ('68 00 00 00 00 07 00 07 00 00 00', '01'),

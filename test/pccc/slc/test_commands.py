@@ -35,6 +35,7 @@ from abdf1_ros.pccc.slc.files import BY_CODE
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import commands, Vector
 
 Command = LogicalRead | LogicalWrite | MaskedWrite
@@ -69,7 +70,7 @@ def test_encode_and_read(command: Command, encoded: str) -> None:
     assert reader.is_empty
 
 
-@pytest.mark.parametrize('entry', commands(*READERS), ids=lambda entry: entry.name)
+@for_all('entry', commands(*READERS))
 def test_command_of_every_vector(entry: Vector) -> None:
     data = entry.packet.data
     reader = Reader(data[1:])

@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 from support.vectors import pair
 
 SLC = PlcType.SLC
 
 
-@pytest.mark.parametrize(('data', 'sts'), [
+@for_all(('data', 'sts'), [
     ('A2 02 09 89 00 00', 0x10), ('A2 02 07 85 00 00', 0x10), ('A2 02 07 7F 00 00', 0x10),
     ('A2 02 07 89 04 00', 0x50), ('A2 0A 07 89 00 00', 0x50), ('A2 00 07 89 00 00', 0x10),
     ('A2 03 07 89 00 00', 0x10), ('A2 EE 07 89 00 00', 0x10), ('AA 00 07 89 00 00', 0x10),

@@ -1,0 +1,58 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Many cases of plain data in one test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+import functools
+import inspect
+from typing import Any
+
+
+def for_all(names: str | Sequence[str], items: Iterable[Any],
+            ) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """
+    Call a test with each of ``items``; what fails is named.
+
+    As ``parametrize``, for hundreds of vectors or lines of a table: a test for each would cost
+    pytest many times what the test itself does.
+    """
+    names = (names,) if isinstance(names, str) else names
+    cases = [dict(zip(names, (item,) if len(names) == 1 else item, strict=True))
+             for item in items]
+    assert cases
+
+    def decorate(test: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(test)
+        def run(**arguments: Any) -> None:
+            for case in cases:
+                try:
+                    test(**arguments, **case)
+                except Exception as error:
+                    error.add_note(f'case: {_shown(case)}')
+                    raise
+
+        signature = inspect.signature(test)
+        run.__signature__ = signature.replace(parameters=[  # type: ignore[attr-defined]
+            parameter for name, parameter in signature.parameters.items() if name not in names])
+        return run
+
+    return decorate
+
+
+def _shown(case: dict[str, Any]) -> str:
+    return ', '.join(f'{name} = {getattr(value, "name", None) or repr(value)}'
+                     for name, value in case.items())

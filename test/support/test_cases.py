@@ -1,0 +1,49 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What fails among many cases is named, and nothing is left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from support.cases import for_all
+
+taken: list[tuple[int, str]] = []
+
+
+@for_all('number', [1, 2])
+@for_all(('text', 'size'), [('a', 1), ('bc', 2)])
+def test_every_case_is_taken_with_the_fixtures(tmp_path: Path, number: int, text: str,
+                                               size: int) -> None:
+    assert tmp_path.is_dir() and len(text) == size
+    taken.append((number, text))
+
+
+def test_all_of_them() -> None:
+    assert taken == [(1, 'a'), (1, 'bc'), (2, 'a'), (2, 'bc')]
+
+
+def test_failure_is_named() -> None:
+    @for_all('path', [Path('good.csv'), Path('bad.csv')])
+    @for_all('number', [7])
+    def check(path: Path, number: int) -> None:
+        assert path.name == 'good.csv'
+
+    with pytest.raises(AssertionError) as caught:
+        check()
+    assert caught.value.__notes__ == ['case: number = 7', 'case: path = bad.csv']
+    with pytest.raises(AssertionError):  # a table that was renamed would test nothing
+        for_all('path', [])
