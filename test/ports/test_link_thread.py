@@ -431,8 +431,8 @@ def test_connection_that_babbles_leaves_time_to_others() -> None:
 
 def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:
     script, port = Script(Step(None, None), Step(b'awake', None)), Babbler(READ_SIZE, 11)
-    thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
-    thread.wake()
+    thread = Restful(script.machine, lambda: port, 1, clock=port.clock,
+                     on_state=lambda state: thread.wake())  # as soon as the port is open
     thread.run()
     assert script.next() is None
     thread.stop()
