@@ -21,7 +21,8 @@ from pathlib import Path
 import signal
 
 import pytest
-from support.ros import Process
+from std_srvs.srv import Trigger
+from support.ros import Observer, Process, write_csv
 from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files
 
@@ -29,11 +30,11 @@ EXAMPLE = SOURCE / 'examples' / 'interlock_consumer.py'
 PATIENCE_ARGUMENTS = ('--patience', '1.5')
 
 PERMITTED = 'PERMITTED: the PLC permits'
+WAITING = 'not permitted: the PLC permits; waiting for a reset'
 REFUSED = 'not permitted: the PLC does not permit'
 STARTING = 'not permitted: no value yet'
 SILENT = 'not permitted: nothing heard since the start'
-LATE = 'not permitted: no value within the deadline'
-GONE = 'not permitted: the bridge or its PLC is gone'
+STOPPED = 'not permitted: values have stopped'
 
 
 @pytest.fixture
@@ -47,25 +48,38 @@ def simulator(files: Files) -> Iterator[Process]:
         yield simulator
 
 
-def consumer(topic: str, bit: int) -> Process:
-    return Process(EXAMPLE, '--topic', topic, '--bit', str(bit), *PATIENCE_ARGUMENTS)
+def consumer(topic: str, bit: int, name: str = 'cell', *more: str) -> Process:
+    return Process(EXAMPLE, '--topic', topic, '--bit', str(bit), *PATIENCE_ARGUMENTS,
+                   '--ros-args', '-r', f'__node:={name}', *more)
 
 
-def test_nothing_is_permitted_while_there_is_no_bridge() -> None:
-    with consumer('/nobody/read/bits', 0) as cell:
+def reset(observer: Observer, name: str = 'cell') -> tuple[bool, str]:
+    answer = observer.call(Trigger, f'/{name}/reset', Trigger.Request())
+    return answer.success, answer.message
+
+
+# A simulation's clock that does not run holds up nothing.
+@pytest.mark.parametrize('more', [(), ('-p', 'use_sim_time:=true')])
+def test_nothing_is_permitted_while_there_is_no_bridge(more: tuple[str, ...]) -> None:
+    with Observer() as observer, consumer('/nobody/read/bits', 0, 'cell', *more) as cell:
         cell.wait_for(SILENT)
+        assert reset(observer) == (False, 'not reset: nothing heard since the start')
         cell.end(signal.SIGTERM)
     assert cell.lines == [STARTING, SILENT]
 
 
 def test_bit_of_the_plc_decides(files: Files, simulator: Process) -> None:
-    with Process('node', *files.args(), '-r', '__node:=deciding') as node, \
-            consumer('/deciding/read/bits', 0) as set_bit, \
-            consumer('/deciding/read/bits', 1) as clear_bit, \
-            consumer('/deciding/read/bits', 6) as beyond:
-        set_bit.wait_for(PERMITTED)
+    with Observer() as observer, \
+            Process('node', *files.args(), '-r', '__node:=deciding') as node, \
+            consumer('/deciding/read/bits', 0, 'set') as set_bit, \
+            consumer('/deciding/read/bits', 1, 'clear') as clear_bit, \
+            consumer('/deciding/read/bits', 6, 'beyond') as beyond:
+        set_bit.wait_for(WAITING)
         clear_bit.wait_for(REFUSED)
-        beyond.wait_for(REFUSED)
+        beyond.wait_for('not permitted: the message has no bit 6; is its Length right?')
+        for name in ('set', 'clear', 'beyond'):
+            assert reset(observer, name) == (True, '')
+        set_bit.wait_for(PERMITTED)
         for cell in (set_bit, clear_bit, beyond):
             cell.end()
             assert cell.lines[0] == STARTING
@@ -73,49 +87,56 @@ def test_bit_of_the_plc_decides(files: Files, simulator: Process) -> None:
     assert PERMITTED not in clear_bit.lines + beyond.lines
 
 
-def test_loss_of_the_plc_takes_the_permit_and_its_return_gives_it_back(
-        files: Files, simulator: Process) -> None:
-    with Process('node', *files.args(), '-r', '__node:=losing') as node, \
+# A guarded topic is silent while the program is stopped.
+@pytest.mark.parametrize('loss, cure', [('silent 1', 'normal 1'), ('program 1', 'run 1')])
+def test_loss_of_the_plc_takes_the_permit_until_a_person_resets(
+        files: Files, simulator: Process, loss: str, cure: str) -> None:
+    write_csv(files.map, 'Tag,Command,Address,Station,PLC_Type,Length,Publish_While',
+              ['bits,Read,B3:0/2,1,PLC5,6,RUN'])
+    with Observer() as observer, \
+            Process('node', *files.args(), '-r', '__node:=losing') as node, \
             consumer('/losing/read/bits', 0) as cell:
+        cell.wait_for(WAITING)
+        assert reset(observer) == (True, '')
         cell.wait_for(PERMITTED)
         after = len(cell.lines)
-        simulator.say('silent 1')
-        cell.wait_for('not permitted', after=after)
-        # The deadline and the lease end at the same time; either may be told first.
-        assert cell.lines[after] in (LATE, GONE)
-        assert PERMITTED not in cell.lines[after:]
-        after = len(cell.lines)
-        simulator.say('normal 1')
-        cell.wait_for(PERMITTED, after=after)
+        simulator.say(loss)
+        assert cell.wait_for('not permitted', after=after) == STOPPED
+        assert reset(observer) == (False, 'not reset: values have stopped')
+        simulator.say(cure)
+        cell.wait_for(WAITING, after=after)
+        assert cell.lines[after:] == [STOPPED, WAITING]
         cell.end()
         node.end()
 
 
-@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
 def test_end_of_the_bridge_takes_the_permit(
         files: Files, simulator: Process, number: signal.Signals) -> None:
-    with Process('node', *files.args(), '-r', '__node:=dying') as node, \
+    with Observer() as observer, Process('node', *files.args(), '-r', '__node:=dying') as node, \
             consumer('/dying/read/bits', 0) as cell:
+        cell.wait_for(WAITING)
+        reset(observer)
         cell.wait_for(PERMITTED)
         after = len(cell.lines)
         node.send(number)
-        cell.wait_for('not permitted', after=after)
-        assert cell.lines[after] in (LATE, GONE)
-        assert PERMITTED not in cell.lines[after:]
+        assert cell.wait_for('not permitted', after=after) == STOPPED
         cell.end()
+    assert cell.lines[after:] == [STOPPED]
 
 
-def test_restart_of_the_bridge_gives_the_permit_back(files: Files, simulator: Process) -> None:
+def test_restart_of_the_bridge_gives_no_permit_back(files: Files, simulator: Process) -> None:
     arguments = (*files.args(), '-r', '__node:=restarted')
-    with consumer('/restarted/read/bits', 0) as cell:
+    with Observer() as observer, consumer('/restarted/read/bits', 0) as cell:
         with Process('node', *arguments) as node:
+            cell.wait_for(WAITING)
+            reset(observer)
             cell.wait_for(PERMITTED)
-            after = len(cell.lines)
             node.end()
-            cell.wait_for('not permitted', after=after)
+            cell.wait_for(STOPPED)
         after = len(cell.lines)
         with Process('node', *arguments) as node:
-            cell.wait_for(PERMITTED, after=after)
+            assert cell.wait_for('', after=after) == WAITING
             node.end()
         cell.end()
 
@@ -124,10 +145,9 @@ def test_bridge_that_does_not_promise_enough_permits_nothing(
         files: Files, simulator: Process) -> None:
     with Process('node', *files.args('stale_after:=30'), '-r', '__node:=slow') as node, \
             consumer('/slow/read/bits', 0) as cell:
-        reason = cell.wait_for('not permitted: the bridge does not promise values that often')
+        reason = cell.wait_for('not permitted: the bridge does not promise a value every 1.5 s')
         cell.end()
         node.end()
-    assert PERMITTED not in cell.lines
     assert cell.lines[-1] == reason  # silence is no news then
 
 
