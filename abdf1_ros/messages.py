@@ -111,7 +111,7 @@ class Message(Enum):
         return self.template.replace('%d', '%s') % args
 
     def line(self, *args: Any) -> str:
-        """Return the text behind its number and mnemonic, as logs and diagnostics show it."""
+        """Return number, mnemonic and text, as logs and diagnostics show them."""
         return f'{self.number} {self.name}: {self.text(*args)}'
 
 
@@ -120,7 +120,7 @@ class Event:
     """
     One occurrence of a numbered message while the driver runs.
 
-    ``station`` is the station (0-254) it concerns, or None where that cannot be told.
+    ``station`` is the station (0-254) that it is about, None where that is not known.
     """
 
     message: Message

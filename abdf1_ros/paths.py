@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the files of this package lie, and which version of it they are."""
+"""Where the files of this package are, and their version."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@
 Check a net CSV and a map CSV before anything is connected.
 
 Every fault of both files is shown with file, line and column. Then comes what the node will do
-with them: which tags are read together, how long that takes on the line, and what is odd.
+with them: which tags are read together, how long that takes on the line, and remarks.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ examples:
 
 @dataclass(slots=True)
 class Findings:
-    """What there is to say of both files; no network where the net file has faults."""
+    """The contents and faults of both files; no network where the net file has faults."""
 
     network: Network | None = None
     mappings: list[Mapping] = field(default_factory=list)
@@ -123,7 +123,7 @@ def _complain(text: str) -> None:
 
 
 def _pair(options: argparse.Namespace) -> tuple[str, bool]:
-    """Return all there is to say of two files, and whether they have no error."""
+    """Return the output for two files, and whether they have no error."""
     found = examine(options.net, options.map, options.default_period / 1000)
     report = _report(found, options)
     return _json(found, report) if options.json else _text(found, report), not found.problems
@@ -209,7 +209,7 @@ def _duration(text: str) -> float:
 
 
 def _text(found: Findings, report: Report | None) -> str:
-    """Return everything for people."""
+    """Return the output for people."""
     parts = [colour(f'error: {problem}', RED, sys.stdout) for problem in found.problems]
     if report is None:
         return '\n'.join([*parts, 'no plan without a good net file'])
@@ -237,7 +237,7 @@ def _line_text(report: Report) -> str:
 
 
 def _rows_text(report: Report) -> str:
-    """Return what becomes of each row as a table: what a ROS user gets."""
+    """Return a table of the rows, with topic and message type of each."""
     head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms'
     rows = []
     for entry in _rows(report.mappings, report):
@@ -255,7 +255,7 @@ def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, 
 
 def _row(mapping: Mapping, stale: float | None) -> dict[str, Any]:
     """
-    Return what there is to say of a row; a heartbeat has no topic.
+    Return the cells of a row; a heartbeat has no topic.
 
     ``stale`` is what its topic promises as deadline (s), None for nothing.
     """
@@ -295,7 +295,7 @@ def _cell(value: object) -> str:
 
 
 def _entry(report: Report, block: Block) -> dict[str, Any]:
-    """Return what there is to say about a block, times in ms."""
+    """Return the facts of a block by name, times in ms."""
     last = last_address(block.start, block.span.end - 1)
     return {
         'station': block.station, 'plc_type': block.mappings[0].plc_type.value,
@@ -314,12 +314,12 @@ def _times_text(report: Report) -> str:
 
 
 def _json(found: Findings, report: Report | None) -> str:
-    """Return the same for programs."""
+    """Return the output for programs."""
     return json.dumps(_content(found, report), indent=2)
 
 
 def _content(found: Findings, report: Report | None) -> dict[str, Any]:
-    """Return what there is to say; every key is always there, times are in ms."""
+    """Return the content for JSON; every key is always there, times are in ms."""
     content: dict[str, Any] = {
         'errors': [_problem(problem) for problem in found.problems],
         'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-The command ``conform``: plays one end of a line against the rules of the manual.
+The command ``conform``: plays one end of a line and checks the other against the manual.
 
-What stands at the other end is a slave or a master of a half-duplex line, or a node of a
-full-duplex one that answers commands (peer) or sends them (client). Every case is a rule: what is
-sent, what must come back and within what time, with document and page.
+The other end is a slave or a master of a half-duplex line, or a node of a full-duplex one that
+answers commands (peer) or sends them (client). Every case is a rule: what is sent, what must come
+back and within what time, with document and page.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class _PortLine:
         self._never, self._keep = os.pipe()
 
     def read(self, timeout: float) -> bytes:
-        """Return what has come after at most ``timeout`` s."""
+        """Return the bytes that come within ``timeout`` s."""
         return self._port.read(timeout, self._never)
 
     def write(self, data: bytes) -> None:
@@ -194,7 +194,7 @@ def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
 
 def _end_maker(options: argparse.Namespace, target: Target, wire: Wire,
                network: Network) -> Callable[[], Any]:
-    """Return what makes the end that is played, anew for each case."""
+    """Return a function that makes the end that we play, for each case a new one."""
     numbering = Numbering(random.randrange(0x10000))
     words = _words(options)
     if target is Target.SLAVE:
@@ -220,7 +220,7 @@ def _integer_words(text: str) -> tuple[int, int]:
 
 
 def _server(options: argparse.Namespace, network: Network) -> Callable[[bytes], bytes]:
-    """Return what executes commands: the data table of a simulated PLC."""
+    """Return a function that executes commands on the data table of a simulated PLC."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum[network.error_code], time.monotonic)
     plc = next((plc for plc in plcs if plc.station == options.station), None)
@@ -231,7 +231,7 @@ def _server(options: argparse.Namespace, network: Network) -> Callable[[bytes], 
 
 
 def _open(options: argparse.Namespace, network: Network) -> _PortLine:
-    """Open the line; a line of our own waits until somebody is at its other end."""
+    """Open the line; one that we have made waits for a client at its other end."""
     line: Endpoint
     if options.tcp is not None:
         host, _, port = options.tcp.rpartition(':')
@@ -244,7 +244,7 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
     while True:
         try:
             return _PortLine(line.open())
-        except OSError:  # nobody yet; Ctrl-C ends it
+        except OSError:  # no client yet; Ctrl-C ends it
             time.sleep(0.05)
 
 

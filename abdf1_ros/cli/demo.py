@@ -62,8 +62,8 @@ class Scene:
     """
     What is shown: files, the simulated line, and who plays which part.
 
-    ``guarded`` is a row that is published only while the program of its PLC runs: such a PLC has a
-    ladder, which watches over ROS.
+    ``guarded`` is a row that is published only while the program of its PLC runs. That PLC has a
+    ladder program, which supervises the bridge.
     """
 
     title: str
@@ -158,7 +158,7 @@ class Speed:
 
 
 class Demo:
-    """Tell the story; every step waits for what it shows to have happened."""
+    """Show the scenes; every step waits until it has happened."""
 
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
@@ -224,7 +224,7 @@ class Demo:
         return self._children[-1]
 
     def _relay(self) -> None:
-        """Print what the simulator tells, and remember which lamps of its PLC are on."""
+        """Print the output of the simulator, and remember which lamps of its PLC are on."""
         assert self._simulator.stdout is not None
         with suppress(BlockingIOError):
             data = os.read(self._simulator.stdout.fileno(), 65536)

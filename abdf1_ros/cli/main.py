@@ -15,9 +15,9 @@
 """
 The commands by their names, for the executables and for ``python3 -m abdf1_ros``.
 
-Importing what a command needs takes a while. Until its ``main`` handles signals, Ctrl-C and
-SIGTERM end it as they do later: at once, with the same status and without a traceback. There is
-nothing yet that wants to be closed.
+The imports of a command take a while. Until its ``main`` handles signals, Ctrl-C and SIGTERM end
+it with the same status as later, at once and without a traceback. Nothing has to be closed at that
+time.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ import sys
 from types import FrameType
 
 _NOT_INSTALLED = 2
-_INTERRUPTED = 130  # of the commands whose status tells whether they have done what they should
+_INTERRUPTED = 130  # of the commands whose exit status tells success or failure
 
 COMMANDS = {
     'node': 'abdf1_ros.ros.node',
@@ -122,7 +122,7 @@ def _ending_quietly(status: int = 0) -> Iterator[None]:
 
 
 def _ended(status: int) -> int:
-    """Return the status, which a second Ctrl-C while Python ends is not to change."""
+    """Return the status; a second Ctrl-C while Python ends must not change it."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     return status

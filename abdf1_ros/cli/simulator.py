@@ -80,14 +80,14 @@ examples:
 """
 
 
-# What is told of a ladder; the others blink.
+# The lamps of a ladder that are reported; the others blink.
 _LAMPS = {Lamp.ALIVE: 'ROS alive', Lamp.IN_CONTROL: 'ROS in control',
           Lamp.STOPPED: 'ROS stopped (heartbeat 0)',
           Lamp.LOST: 'ROS lost (heartbeat stands still)'}
 
 
 class _FaultyPort:
-    """The port of the one PLC on a full-duplex line, as good as its faults allow."""
+    """The port of the one PLC on a full-duplex line, with the effects of its faults."""
 
     def __init__(self, port: Port, plc: SimulatedPlc, checksum: Checksum) -> None:
         self._port = port
@@ -95,7 +95,7 @@ class _FaultyPort:
         self._decoder = FrameDecoder(checksum, Duplex.FULL)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes; a silent PLC hears none, a full one only that there are messages."""
+        """Wait for bytes; a silent PLC ignores all, a full one answers messages with NAK."""
         data = self._port.read(timeout, wake)
         if self._plc.faults.full:
             self._refuse(data)
@@ -137,7 +137,7 @@ def main(args: Sequence[str] | None = None) -> int:
     with interruptible():
         try:
             return _run(options)
-        except KeyboardInterrupt:  # so early that there was nothing to end yet
+        except KeyboardInterrupt:  # so early that nothing has to be ended
             return 0
 
 
@@ -151,7 +151,7 @@ def _run(options: argparse.Namespace) -> int:
     except (CommandError, ConfigurationError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return EXIT_CONFIGURATION
-    except OSError as error:  # of the line; what is wrong with a file is a ConfigurationError
+    except OSError as error:  # of the line; a fault of a file is a ConfigurationError
         print(f'simulator: {error}', file=sys.stderr)
         return EXIT_FAULT
     try:
@@ -201,7 +201,7 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
 
 
 def _run_ladder(station: str, plcs: Sequence[SimulatedPlc]) -> None:
-    """Let the program of a station run; its lamps are told when they change."""
+    """Run the ladder program of a station; changes of its lamps are printed."""
     plc = next((plc for plc in plcs if station == str(plc.station)), None)
     if plc is None:
         known = ', '.join(str(plc.station) for plc in plcs)
@@ -225,7 +225,7 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
     machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
     open_line: Callable[[], Port] = line.open
     if options.full_duplex is not None:
-        # Only a port has a speed of its own, for which the timers have to wait.
+        # Only a serial port has a real speed, which the timers have to take into account.
         timing = Network(baud=options.baud).timing if options.port else LineTiming()
         machine = _full_duplex(plcs[0], checksum, timing)
 
@@ -238,13 +238,13 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
 
 
 class _Announcer:
-    """Say what has become of the line, each state once."""
+    """Print the states of the line, each once."""
 
     def __init__(self) -> None:
         self._last = ''
 
     def announce(self, state: PortState) -> None:
-        """Say it, unless it is what was said last or what is normal."""
+        """Print a state, unless it is the last one or the normal one."""
         is_news = state.text != self._last and not state.is_open
         self._last = state.text
         if is_news and WAITING not in state.text:
@@ -349,7 +349,7 @@ def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThr
     ended = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: ended.set())
     signal.signal(signal.SIGTERM, lambda *_: ended.set())
-    signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # in the background input is nothing to stop for
+    signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # or a background process is stopped
     begin = time.monotonic()
     inputs = [sys.stdin.fileno()] if sys.stdin else []
     rest = b''
@@ -362,7 +362,7 @@ def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThr
             data = _input(inputs[0])
             *lines, rest = (rest + data).split(b'\n')
             if not data:
-                lines, inputs = [rest], []  # closed; signals and --seconds still end us
+                lines, inputs = [rest], []  # input is closed; signals and --seconds still end us
             for line in lines:
                 carry_out(line.decode(errors='replace'))
 
@@ -378,7 +378,7 @@ def _input(descriptor: int) -> bytes:
 def _say(text: str) -> None:
     try:
         print(f'simulator: {text}', flush=True)
-    except OSError:  # nobody reads it any more; the PLCs go on
+    except OSError:  # the reader has left; the PLCs go on
         drop_output()
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Tell what is said on a DF1 line, live or from a recording.
+Decode the traffic on a DF1 line, live or from a recording.
 
 Live: --port listens on a port that is wired to the line, without sending; --tap stands between
 two ports and passes everything on at once. A file is a capture (of --save, or of the node's
@@ -88,7 +88,7 @@ examples:
 
 
 class _Output:
-    """Decode chunks and print what they say."""
+    """Decode chunks and print the entries."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self._options = options
@@ -103,13 +103,13 @@ class _Output:
         self._next_progress = time.monotonic() + _PROGRESS_PERIOD
 
     def begin(self, settings: dict[str, str]) -> TrafficDecoder:
-        """Return the session; what options leave open is taken from a capture's head."""
+        """Return the decoder; settings that no option gives are taken from a capture's head."""
         if self._session is None:
             options, baud = self._options, settings.get('baud', '')
             check, duplex = (
                 settings.get(name, '').lower() if chosen == _AUTO else chosen
                 for name, chosen in (('check', options.check), ('duplex', options.duplex)))
-            # What the head of a capture says was a setting, and may have been the fault.
+            # The head of a capture has the settings of the node, of which one may be wrong.
             self._session = TrafficDecoder(_CHECKS.get(check), _DUPLEX.get(duplex),
                                     is_certain=options.check != _AUTO)
             speed = whole_number(baud)
@@ -118,7 +118,7 @@ class _Output:
         return self._session
 
     def take(self, chunk: Chunk, settings: dict[str, str]) -> None:
-        """Print what a chunk says."""
+        """Print the entries of a chunk."""
         session = self.begin(settings)
         if self._packets:
             self._packets.begin(settings.get('begun', ''))
@@ -132,7 +132,7 @@ class _Output:
         return not self._summary.bytes.total()
 
     def show_progress(self, done: str) -> None:
-        """Tell every two seconds how far it is, where a terminal shows nothing else."""
+        """Tell the progress every two seconds, where a terminal shows nothing else."""
         if self._shows_progress and time.monotonic() >= self._next_progress:
             self._next_progress = time.monotonic() + _PROGRESS_PERIOD
             _say(f'{done}, {self._summary.bytes.total()} bytes so far')
@@ -148,7 +148,7 @@ class _Output:
             self._write_bundle(self._bundle)
 
     def _write_bundle(self, bundle: ReportBundle) -> None:
-        """Write what a report needs."""
+        """Write the bundle of --report."""
         path = self._options.report
         try:
             bundle.write(path, self._summary, self.begin({}).kind)
@@ -267,7 +267,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
 
 
 class _Unreadable(Exception):
-    """A file that the system does not give us; the text says which and why."""
+    """A file that cannot be read; the text says which and why."""
 
 
 def _decode_files(options: argparse.Namespace, output: _Output) -> int:
@@ -356,7 +356,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
 
 
 def _raise_broken_pipe(error: Exception) -> None:
-    """Raise the one that is no fault of port or file: whoever reads us has seen enough."""
+    """Raise a broken pipe again: it is not a fault of port or file."""
     if isinstance(error, BrokenPipeError):
         raise error
 

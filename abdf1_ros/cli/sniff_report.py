@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The bundle of ``sniff --report``: what a report about a line needs, in one ZIP file.
+The bundle of ``sniff --report``: all that a report about a line needs, in one ZIP file.
 
-It holds no names of users or hosts. With ``is_anonymous`` it also leaves out what was in the data
+It holds no names of users or hosts. With ``is_anonymous`` it also leaves out the contents of data
 tables: the data of messages, and the names of tags and topics.
 """
 
@@ -42,7 +42,8 @@ from abdf1_ros.sniffer.summary import Summary
 
 _STATUS_REQUEST = 0x06, b'\x03'  # CMD, and FNC as the first byte of its data
 
-# A bundle is to be mailed: of a long recording the first entries are told, the capture has all.
+# A bundle has to be small enough for mail: of a long recording it has the first entries as text;
+# the capture has all.
 _MOST_ENTRIES = 100_000
 
 _PRIVATE = re.compile('tag|topic', re.IGNORECASE)
@@ -147,7 +148,7 @@ def _versions() -> dict[str, str]:
 
 
 def _without_data(entry: Entry) -> Entry:
-    """Return an entry without the data of its message, and without words that quote them."""
+    """Return an entry without the data of its message, also not quoted in its text."""
     packet = entry.packet
     if packet is None:
         return replace(entry, text='')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the commands for people show: tables, colours and progress, as a stream takes them."""
+"""The output of the commands for people: tables, colours, progress, and its failures."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ _ADVICE = {
                   'again',
     errno.ENOENT: '"plc ports" lists the ports that there are'}
 
-_PROGRESS_DELAY = 2.0  # what is done sooner needs none
+_PROGRESS_DELAY = 2.0  # shorter work shows no progress
 
 
 def is_terminal(stream: TextIO) -> bool:
-    """Tell whether people look at ``stream``, so that it may move the cursor."""
+    """Tell whether ``stream`` is a terminal, so that output may move the cursor."""
     return stream.isatty() and os.environ.get('TERM') != 'dumb'
 
 
@@ -57,9 +57,10 @@ def colour(text: str, code: int, stream: TextIO) -> str:
 
 def prepare_output() -> None:
     """
-    Make printing fit for any output, once at the start of a command.
+    Prepare printing for any kind of output, once at the start of a command.
 
-    A closed one is replaced by none at all, and a character that it cannot show by its escape.
+    A closed stream is replaced by the null device, a character that a stream cannot show by its
+    escape.
     """
     for name in ('stdout', 'stderr'):
         if getattr(sys, name) is None:
@@ -74,8 +75,8 @@ def interruptible() -> Iterator[None]:
     """
     Let the first SIGINT or SIGTERM in the block raise KeyboardInterrupt.
 
-    Further ones do nothing, after the block too: whoever is impatient, or signals a whole group of
-    processes, spoils neither what is being ended nor the exit status.
+    Further ones do nothing, after the block too: a second Ctrl-C, or a signal to a group of
+    processes, disturbs neither the end nor the exit status.
     """
     for number in _ENDING:
         signal.signal(number, _interrupt)
@@ -91,18 +92,18 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def ignore_further() -> None:
-    """Let nothing interrupt what is done from now on: it is the end."""
+    """Ignore further signals while the process ends."""
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
 
 
 def drop_output() -> None:
-    """Send what is still to be printed nowhere: whoever reads us has seen enough."""
+    """Drop all further output: its reader has left, or it cannot be written."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
-    """Tell whether printing has failed because of that; ``tell`` any other, as a full disk."""
+    """Tell whether that made printing fail; otherwise ``tell`` the error, as of a full disk."""
     drop_output()
     if isinstance(error, BrokenPipeError):
         return True
@@ -111,14 +112,14 @@ def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
 
 
 def reason_of(name: str, error: OSError) -> str:
-    """Return why ``name`` cannot be used, and what to do where we know; it is named once."""
+    """Return why ``name`` cannot be used, and advice where there is any; it is named once."""
     text = error.strerror or str(error)
     advice = advice_for(error.errno) if name.startswith('/dev/') else ''
     return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
 
 
 def advice_for(number: int | None) -> str:
-    """Return what helps against an error of the operating system with a serial port."""
+    """Return advice for an error of the operating system with a serial port, or empty."""
     return _ADVICE.get(number or 0, '')
 
 
@@ -136,7 +137,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[in
 
 def command_parser(name: str, description: str | None,
                    epilog: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of a command: its texts keep their lines, and it knows --version."""
+    """Return the parser of a command: its texts keep their line ends; it has --version."""
     parser = argparse.ArgumentParser(
         prog=name, description=description, epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -145,13 +146,13 @@ def command_parser(name: str, description: str | None,
 
 
 def cut(line: str, width: int) -> str:
-    """Return ``line`` in ``width`` characters; where it is longer its end says so."""
+    """Return ``line`` in at most ``width`` characters; a longer one ends with "..."."""
     return line if len(line) <= width else line[:max(width - 3, 0)] + '...'[:width]
 
 
 class Progress:
     """
-    Tell on standard error how far something is that takes more than two seconds.
+    Tell the progress of work of more than two seconds on standard error.
 
     A terminal shows one line that changes; elsewhere a new line comes every two seconds.
     """
@@ -174,14 +175,14 @@ class Progress:
             self._next = now + _PROGRESS_DELAY
 
     def clear(self) -> None:
-        """Take the line away, so that something else can be printed."""
+        """Remove the progress line, so that something else can be printed."""
         if self._is_shown:
             print('\r\x1b[K', end='', file=sys.stderr, flush=True)
             self._is_shown = False
 
 
 def seconds_option(text: str) -> float:
-    """Return what an option of seconds says: above 0; for argparse."""
+    """Return the seconds of an option, above 0; for argparse."""
     value = decimal_number(text)
     if value is None or value <= 0:
         raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
@@ -189,7 +190,7 @@ def seconds_option(text: str) -> float:
 
 
 def whole_option(text: str) -> int:
-    """Return the whole number that an option says; for argparse."""
+    """Return the whole number of an option; for argparse."""
     value = whole_number(text)
     if value is None:
         raise argparse.ArgumentTypeError(f'"{text}" should be a whole number')

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-The conformance kit: one end of a line, played by script against whatever stands at the other.
+The conformance kit: it plays one end of a line and checks the other end.
 
-``codec`` makes and reads bytes, ``wire`` sends and hears them, ``case`` says what a case is and
-runs it, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer`` and ``client`` hold
-the cases, named after what stands at the other end; ``data`` and ``asking`` hold those of
-the commands, which both disciplines carry. ``report`` tells.
+``codec`` makes and reads bytes, ``wire`` sends and receives them, ``case`` defines and runs a
+case, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer`` and ``client`` hold the
+cases, named after the other end; ``data`` and ``asking`` hold those of the commands, which are the
+same in half and full duplex. ``report`` writes the results.
 
-The codec is a second one on purpose, written from the manual and not from ``df1``: a rule that
-both ends of our own link broke alike would pass otherwise. Pages are cited as in ``df1``.
+The codec is a second one on purpose, written from the manual and not from ``df1``: with the same
+code at both ends a wrong rule would pass. Pages are cited as in ``df1``.
 """

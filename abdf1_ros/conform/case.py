@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A case: one rule of the manual, what is done to try it, and what came of it."""
+"""A case: one rule of the manual, how it is tried, and the result."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from abdf1_ros.conform.wire import Failed, Sent, Skipped, Wire
 
 
 class Target(Enum):
-    """What stands at the other end."""
+    """The kind of the other end."""
 
     SLAVE = 'slave'
     MASTER = 'master'
@@ -39,7 +39,7 @@ class Target(Enum):
 
 
 class Permission(Enum):
-    """What has to be allowed before a case may run, with the option that allows it."""
+    """The permission that a case needs, with the option that gives it."""
 
     NOTHING = ''
     RESET = '--yes: every slave on the line drops what it holds'
@@ -47,7 +47,7 @@ class Permission(Enum):
 
 
 class Verdict(Enum):
-    """What came of a case."""
+    """The verdict of a case."""
 
     PASS = 'PASS'
     FAIL = 'FAIL'
@@ -59,8 +59,8 @@ class Case:
     """
     One rule.
 
-    ``name`` is unique, ``rule`` what the manual wants of the other end, ``source`` where it
-    stands. ``run`` raises Failed or Skipped; it gets the end that the target is talked to with.
+    ``name`` is unique, ``rule`` is what the manual requires of the other end, ``source`` is its
+    page. ``run`` raises Failed or Skipped; its argument is the end that we play.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """How a case ended; ``seconds`` it took, ``transcript`` says what passed on the line."""
+    """The result of a case; ``seconds`` it took, ``transcript`` has the bytes of the line."""
 
     case: Case
     verdict: Verdict
@@ -92,7 +92,7 @@ CaseScript = Callable[[Any], None]
 
 def case(name: str, rule: str, source: str, *targets: Target,
          permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], CaseScript]:
-    """Enter a function among the cases of ``targets``."""
+    """Register a function as a case of ``targets``."""
     def enter(run: CaseScript) -> CaseScript:
         if any(other.name == name and set(other.targets) & set(targets) for other in CASES):
             raise ValueError(f'there is a case {name} already')
@@ -106,8 +106,8 @@ def run_cases(cases: Iterable[Case], wire: Wire, make_end: Callable[[], Any],
     """
     Yield the result of each case, one after the other.
 
-    Every case gets an end of its own from ``make_end``, and a line on which all has been heard
-    out. OSError of the line is the caller's.
+    Every case gets an end of its own from ``make_end``, and a quiet line. The caller handles
+    OSError of the line.
     """
     for entry in cases:
         if entry.permission not in allowed:

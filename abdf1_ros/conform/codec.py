@@ -40,7 +40,7 @@ class BlockCheck(Enum):
 
 
 class SymbolKind(Enum):
-    """What was heard, in words for people."""
+    """The kind of a received symbol, in words for people."""
 
     ACK = 'DLE ACK'
     NAK = 'DLE NAK'

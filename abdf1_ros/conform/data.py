@@ -36,7 +36,7 @@ _EXTENDED = 0xF0  # STS: an EXT STS follows (M 8-3)
 # Bytes of an echo that every product takes: SLC 5/01 and 5/02 end at 95, a PLC-5 at 243.
 _ECHO_SIZES = (0, 1, 2, 64, 95)
 
-# All values of a byte that mean something to the line, and their neighbours.
+# All byte values with a meaning on the line, and their neighbours.
 _NASTY = bytes.fromhex('10 10 03 10 02 10 05 10 06 10 15 03 02 01 00 FF 10')
 
 

@@ -30,7 +30,7 @@ REPLY_BIT = 0x40
 # Between two polls of a station that answers DLE EOT (s), so that it can finish.
 POLL_PAUSE = 0.02
 
-# How long (s) a target that sends by itself may take to send something.
+# A target that sends by itself may take so long (s) to send something.
 PATIENCE = 30.0
 
 _MOST_TRIES = 3
@@ -131,7 +131,7 @@ class MasterEnd(_AskingEnd):
     """A half-duplex master that talks to one slave, ``station``; ``own`` is its own address."""
 
     def settle(self) -> None:
-        """Take all that the slave still holds, so that a case begins with an empty one."""
+        """Fetch all messages that the slave still holds, so that a case begins without any."""
         self.wire.drain()
         for _ in range(16):
             self.wire.send(codec.poll(self.station))
@@ -179,7 +179,7 @@ class PeerEnd(_AskingEnd):
     """A full-duplex node that sends commands to another, ``station``."""
 
     def settle(self) -> None:
-        """Acknowledge what the other still wants to be rid of."""
+        """Acknowledge messages that the other end still sends."""
         end = self.wire.now + 10 * self.wire.answer_time
         while self.wire.now < end and (symbol := self.wire.hear()) is not None:
             if symbol.kind in (SymbolKind.MESSAGE, SymbolKind.ENQ):
@@ -222,7 +222,7 @@ def _settle(end: Answering) -> None:
     for _ in range(_MOST_TRIES):
         try:
             end.finish(end.next_command())
-        except Failed:  # the case will tell; here it may still be busy with the one before it
+        except Failed:  # the case will show it; the target may still be busy
             continue
         return
 
@@ -236,7 +236,7 @@ class SlaveEnd:
         self.serve = serve
 
     def settle(self) -> None:
-        """See one command through, so that no case begins with a master that believes us dead."""
+        """Answer one command, so that no case begins with a master that counts us as inactive."""
         _settle(self)
 
     def next_command(self, what: str = 'a command for our station') -> HeardSymbol:
@@ -282,7 +282,7 @@ class ServerEnd:
         self.serve = serve
 
     def settle(self) -> None:
-        """See one command through, so that no case begins with a node that believes us dead."""
+        """Answer one command, so that no case begins with a node that counts us as inactive."""
         _settle(self)
 
     def next_command(self, what: str = 'a command') -> HeardSymbol:

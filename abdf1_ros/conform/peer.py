@@ -24,7 +24,7 @@ from abdf1_ros.conform.wire import Failed, Skipped
 
 _PEER = Target.PEER
 
-# A limit of repetitions or enquiries that is larger is not waited for.
+# A case does not wait for more repetitions or enquiries than this.
 _MOST_REPETITIONS = 12
 
 # How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a run has shown: for people, as JSON, as JUnit XML, and as text for an issue."""
+"""The results of a run: for people, as JSON, as JUnit XML, and as text for an issue."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from xml.etree import ElementTree
 from abdf1_ros.conform.case import CaseResult, Verdict
 
 RunFacts = Mapping[str, str]
-"""What was tried, and how: target, port, check, station, version."""
+"""The facts of a run: target, port, check, station, version."""
 
 
 def line_of(result: CaseResult) -> str:
@@ -41,7 +41,7 @@ def line_of(result: CaseResult) -> str:
 
 
 def summary_of(results: Sequence[CaseResult]) -> str:
-    """Return how many cases ended how."""
+    """Return the number of cases by verdict."""
     counts = Counter(result.verdict for result in results)
     return ', '.join(f'{counts[verdict]} {word}' for verdict, word in (
         (Verdict.PASS, 'passed'), (Verdict.FAIL, 'failed'), (Verdict.SKIP, 'skipped')))

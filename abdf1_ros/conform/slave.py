@@ -28,7 +28,7 @@ from abdf1_ros.conform.wire import Failed, Skipped
 
 _SLAVE = Target.SLAVE
 
-# A limit of repetitions that is larger is not waited for.
+# A case does not wait for more repetitions than this.
 _MOST_REPETITIONS = 12
 
 # Commands that are sent without a poll in between, to fill a slave's buffers.

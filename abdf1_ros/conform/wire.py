@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The line as a script uses it: send these bytes, expect that symbol, within so long."""
+"""The line as a case uses it: send bytes, expect a symbol within a time."""
 
 from __future__ import annotations
 
@@ -24,18 +24,17 @@ from typing import Protocol
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import BlockCheck, HeardSymbol, SymbolKind
 
-# A symbol that has begun may take as long as a slow line needs for the longest frame, and is not
-# waited for without end.
+# A symbol that has begun may take as long as the longest frame on a slow line, but not for ever.
 _FRAME_TIME = 3.0
 
 _MOST_UNREAD = 65536
 
 
 class RawLine(Protocol):
-    """What bytes come from and go to."""
+    """The source and target of bytes."""
 
     def read(self, timeout: float) -> bytes:
-        """Return what has come after at most ``timeout`` s; nothing if nothing has."""
+        """Return the bytes that come within ``timeout`` s, empty for none."""
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
@@ -43,14 +42,14 @@ class RawLine(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """What we have sent, and when (s)."""
+    """Bytes that we have sent, and when (s)."""
 
     at: float
     raw: bytes
 
 
 class Failed(Exception):
-    """The other end did not do what the rule says."""
+    """The other end has broken the rule."""
 
     def __init__(self, expected: str, got: str) -> None:
         super().__init__(f'expected {expected}, got {got}')
@@ -66,9 +65,8 @@ class Wire:
     """
     One end of a line.
 
-    ``answer_time`` is how long (s) an answer may take, and how long silence has to last to be
-    silence. ``transcript`` keeps all that passed, in order; ``has_heard`` tells whether any byte
-    came.
+    ``answer_time`` is how long (s) an answer may take; after so long without bytes there is
+    silence. ``transcript`` keeps all bytes in order; ``has_heard`` tells whether any byte came.
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -100,7 +98,7 @@ class Wire:
             symbol = codec.next_symbol(self._buffer, self.check, self.is_half_duplex)
             if symbol is not None:
                 return self._take(symbol)
-            # What has begun may end; it must not go on for ever.
+            # A symbol that has begun may end; it must not go on for ever.
             limit = max(end, begun + _FRAME_TIME) if self._buffer else end
             left = limit - self._clock()
             if left <= 0:
@@ -130,7 +128,7 @@ class Wire:
         return symbol
 
     def expect_silence(self, what: str, within: float | None = None) -> None:
-        """Take silence for the answer; raises Failed for anything else."""
+        """Expect silence; raises Failed for anything else."""
         symbol = self.hear(within)
         if symbol is not None:
             raise Failed(f'silence: {what}', str(symbol))

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Ports with a file descriptor, whatever is behind it.
+Ports with a file descriptor: serial device, pseudo-terminal, or network connection.
 
 They are read with poll(2) and read(2), which costs a half to a tenth of pyserial's own read.
 """
@@ -48,7 +48,7 @@ class Port(Protocol):
         """Hand all of ``data`` to the operating system."""
 
     def unsent(self) -> int:
-        """Return how many bytes of what was written have still to leave, 0 where nobody knows."""
+        """Return how many written bytes have not been sent yet, 0 where that is not known."""
 
     def close(self) -> None:
         """Give the line back."""
@@ -66,7 +66,7 @@ class DescriptorPort:
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
-        self._poll.register(wake, select.POLLIN)  # changes nothing from the second time on
+        self._poll.register(wake, select.POLLIN)  # has no effect from the second call on
         milliseconds = None if timeout is None else math.ceil(timeout * 1000)
         for descriptor, _ in self._poll.poll(milliseconds):
             if descriptor == self._descriptor:

@@ -15,9 +15,9 @@
 """
 Serial ports of device servers, over TCP: plain, and with RFC 2217.
 
-RFC 2217 sets speed and character of the far port by telnet options (RFC 854, 856 and 858). What
-is here is the client, for one connection. A server can make it keep no more than a suboption of
-some bytes.
+RFC 2217 sets speed and character format of the far port by telnet options (RFC 854, 856 and 858).
+This is a client for one connection. It keeps a suboption of some bytes at most, whatever the
+server sends.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from abdf1_ros.ports.settings import PortSettings
 _CONNECT_TIMEOUT = 5.0
 _NEGOTIATION_TIMEOUT = 3.0
 
-# After so long (s) without an answer from the far host a TCP connection is lost. The system's
-# own limit is a quarter of an hour, in which it asks less and less often.
+# After so many seconds without an answer from the far host a TCP connection counts as lost. The
+# limit of the operating system is a quarter of an hour.
 _SILENCE_LIMIT = 5
 
 
@@ -81,7 +81,7 @@ _PURGE_BOTH = 3
 _IAC = bytes([_Telnet.IAC])
 _NEGOTIATIONS = (_Telnet.WILL, _Telnet.WONT, _Telnet.DO, _Telnet.DONT)
 
-# Of a suboption; RFC 2217 itself has no more than 6, a signature apart.
+# Bytes of a suboption; RFC 2217 has at most 6, except for a signature.
 _MOST_SUBOPTION = 300
 
 
@@ -110,8 +110,9 @@ def _connect(url: str) -> socket.socket:
             (parts.hostname or '', parts.port or 0), timeout=_CONNECT_TIMEOUT)
     except UnicodeError:
         raise OSError(f'{parts.hostname} is not the name of a host') from None
-    # Without the first an ACK waits for the one before it. The last is for what we send, the
-    # others for a line on which we only listen.
+    # Without the first option a short frame waits until the one before it has been acknowledged
+    # by TCP. The last one is for bytes that we send, the others are for a line on which we only
+    # listen.
     for option, value in (
             (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
             (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
@@ -129,7 +130,7 @@ class Rfc2217Port(DescriptorPort):
         self._asked = set(self._offered)
         self._is_accepted = False
         self._answers: dict[int, bytes] = {}
-        self._left = b''  # a command of which not all has come
+        self._left = b''  # the beginning of an incomplete command
 
     def negotiate(self, settings: PortSettings) -> None:
         """Set speed and character; OSError where the server does not do it within 3 s each."""
@@ -160,7 +161,7 @@ class Rfc2217Port(DescriptorPort):
                               f'{int.from_bytes(self._answers[command], "big")}')
 
     def _wait(self, condition: Callable[[], bool], failure: str) -> None:
-        """Take what the server says until ``condition``; data are from before and are dropped."""
+        """Take commands of the server until ``condition``; data before that are dropped."""
         give_up = time.monotonic() + _NEGOTIATION_TIMEOUT
         while not condition():
             left = give_up - time.monotonic()
@@ -176,7 +177,7 @@ class Rfc2217Port(DescriptorPort):
         return self._without_commands(self._left + data)
 
     def _without_commands(self, data: bytes) -> bytes:
-        """Carry out the commands among ``data``; return the rest, IAC IAC being a 255."""
+        """Carry out the commands among ``data``; return the rest, with 255 for IAC IAC."""
         rest = bytearray()
         at = 0
         while (start := data.find(_IAC, at)) >= 0:
@@ -207,7 +208,7 @@ class Rfc2217Port(DescriptorPort):
             self._agree(kind, command[2])
 
     def _agree(self, kind: int, option: int) -> None:
-        """Answer an offer or a wish, unless it is itself the answer to one of ours."""
+        """Answer an offer or a request, unless it is itself the answer to one of ours."""
         self._is_accepted |= option == _Option.COM_PORT and kind in (_Telnet.DO, _Telnet.WILL)
         if kind == _Telnet.DO and option not in self._offered:
             self._send(_Telnet.WONT, option)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lines that we make or open ourselves: pseudo-terminal, listening TCP port, serial port."""
+"""Ends of lines that we make or open: pseudo-terminal, listening TCP port, serial port."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ _PTYS = '/dev/pts/'
 
 class Endpoint(Protocol):
     """
-    What a link opens as its port, and opens again when it was lost.
+    The end of a line that a link opens as its port, and opens again when it was lost.
 
-    ``name`` is what others call it. Making one raises OSError where it cannot be had.
+    ``name`` is the name for others. The constructor raises OSError where it is not available.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Endpoint(Protocol):
         """Return the port; OSError while there is none."""
 
     def close(self) -> None:
-        """Take the line away; what ``open`` has returned is the caller's to close."""
+        """Remove the endpoint; the caller closes the port that ``open`` has returned."""
 
 
 class PtyEndpoint:
@@ -58,10 +58,10 @@ class PtyEndpoint:
     def __init__(self, link: str | None) -> None:
         self._link = Path(link) if link else None
         if self._link:
-            # Before we have a terminal: it may get the number that an old link leads to.
+            # Before we make a terminal: it may get the number that an old link points to.
             _remove_left_over(self._link)
         self._ours, self._theirs = os.openpty()
-        # Open at both ends all the time, or a read fails whenever nobody is connected.
+        # Both ends stay open, or a read fails whenever no client is connected.
         tty.setraw(self._theirs)
         self._target = os.ttyname(self._theirs)
         self.name = link or self._target
@@ -80,7 +80,7 @@ class PtyEndpoint:
         return DescriptorPort(descriptor, lambda: os.close(descriptor))
 
     def close(self) -> None:
-        """Take the line and its name away."""
+        """Remove the pseudo-terminal and its name."""
         if self._link and _target_of(self._link) == self._target:
             self._link.unlink()
         os.close(self._ours)
@@ -108,7 +108,7 @@ def _make_link(link: Path, target: str) -> None:
 
 
 def _target_of(link: Path) -> str:
-    """Return where a symbolic link leads, empty where there is none."""
+    """Return the target of a symbolic link, empty where there is none."""
     try:
         return os.readlink(link)
     except OSError:
@@ -158,11 +158,11 @@ class SerialEndpoint:
     def __init__(self, settings: PortSettings) -> None:
         self.name = settings.name
         self._settings = settings
-        # At once: a port that is lost is waited for, one that was never there is a mistake.
+        # Opened at once: a port that is lost is waited for, one that never existed is a mistake.
         self._first: Port | None = open_port(settings)
 
     def open(self) -> Port:  # noqa: A003
-        """Return the port; from the second time on it is opened anew."""
+        """Return the port; from the second call on it is opened again."""
         port, self._first = self._first, None
         return port or open_port(self._settings)
 

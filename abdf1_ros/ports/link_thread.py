@@ -30,7 +30,7 @@ from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import DescriptorPort, Port, READ_SIZE
 
-# Between attempts to open a port (s). They cost next to nothing, and whoever has plugged a
+# Between attempts to open a port (s). They cost almost nothing, and a person who has plugged the
 # cable in again is waiting.
 _RETRY_PERIOD = 0.5
 
@@ -47,7 +47,7 @@ _OTHERS = 19
 
 @dataclass(frozen=True, slots=True)
 class PortState:
-    """Whether the port is open, and what there is to say about it."""
+    """Whether the port is open, with a text for people."""
 
     is_open: bool
     text: str
@@ -55,14 +55,14 @@ class PortState:
 
 RELEASED = 'the port is left to others: polling is off'
 
-# What ends whatever is under way when files are read again.
+# The error for all that is under way when files are read again.
 _READ_AGAIN = 'the files have been read again'
 _EXCHANGE_LIMIT = 5.0
 _GLANCE = 0.1
 
 
 class _Exchange:
-    """A machine to go on with; ``is_done`` is set when it is on the line."""
+    """The next machine; ``is_done`` is set when it is on the line."""
 
     def __init__(self, machine: Machine, while_sending: Callable[[], None], reopen: bool) -> None:
         self.machine = machine
@@ -72,13 +72,13 @@ class _Exchange:
         self._claim = threading.Lock()
 
     def claim(self) -> bool:
-        """Tell the first who asks that it is his: to do it, or to withdraw it."""
+        """Return True to the first caller only: that one does the exchange, or withdraws it."""
         return self._claim.acquire(blocking=False)
 
 
 class _Attempt(threading.Thread):
     """
-    Open a port, in a thread that nobody has to wait for: names may take minutes to be resolved.
+    Open a port in a thread of its own: resolving a name may take minutes.
 
     ``wake`` is called at the end, unless ``abandon`` was.
     """
@@ -126,8 +126,8 @@ class LinkThread(threading.Thread):
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
     attempts to open it are ``retry_period`` seconds apart. ``while_sending`` is called whenever
-    all there is to send has been handed to the port: nobody on the line waits for what it does.
-    ``on_fault`` is called with an exception that is a bug; the machine starts afresh after it.
+    all bytes to send have been given to the port: work done then delays nothing on the line.
+    ``on_fault`` is called with an exception that is a bug; the machine starts again after it.
     Three within a minute end the thread, and ``has_failed`` tells so.
 
     ``release`` closes the port for others until ``take``. ``exchange`` puts another machine on
@@ -179,14 +179,14 @@ class LinkThread(threading.Thread):
         self.ask_to_stop()
         if self.is_alive():
             self.join()
-        with self._closing:  # or a wake of another thread would go to another file
+        with self._closing:  # or a wake of another thread might write to another file
             if not self._is_closed:
                 self._is_closed = True
                 os.close(self._wake_reader)
                 os.close(self._wake_writer)
 
     def release(self) -> bool:
-        """Close the port, and leave it closed until ``take``; tell whether it is so within 5 s."""
+        """Close the port until ``take``; return whether it is closed within 5 s."""
         self._is_free.clear()
         self.is_released = True
         self.wake()
@@ -200,10 +200,10 @@ class LinkThread(threading.Thread):
     def exchange(self, machine: Machine, while_sending: Callable[[], None],
                  reopen: bool) -> bool:
         """
-        Go on with another machine, on the same port or one that is opened anew.
+        Go on with another machine, on the same port or on one that is opened for it.
 
-        Return whether that was so within 5 s; if not, it will not be so later. Called from one
-        thread only.
+        Return whether that has happened within 5 s; otherwise it will not happen any more. Called
+        from one thread only.
         """
         exchange = _Exchange(machine, while_sending, reopen)
         self._next = exchange
@@ -222,14 +222,14 @@ class LinkThread(threading.Thread):
         """Keep the port open and the machine running."""
         try:
             self._keep_open()
-        except Exception as error:  # a bug outside of the machine; nobody else would see it
+        except Exception as error:  # a bug outside of the machine
             self.has_failed = True
             self.state = PortState(False, f'internal error: {error!r}')
             self._on_fault(error)
 
     @property
     def _is_interrupted(self) -> bool:
-        """Tell whether the port is not wanted, or not as it is."""
+        """Tell whether the port has to be closed, or another one opened."""
         return self._stopping or self.is_released or (
             self._next is not None and self._next.reopen)
 
@@ -266,7 +266,7 @@ class LinkThread(threading.Thread):
         if self._is_interrupted:
             attempt.abandon()
             return None
-        attempt.join()  # it has nothing left to do but to wake us
+        attempt.join()  # it only has to wake us
         self._take_wake()
         if attempt.error is not None:
             raise attempt.error
@@ -293,20 +293,20 @@ class LinkThread(threading.Thread):
             end = _reason(error)
             self._is_lost = True
             self._set_state(False, f'the port was lost: {end}')
-        except Exception as error:  # a bug must not end the bridge at its first appearance
+        except Exception as error:  # a bug must not end the bridge when it happens first
             end = 'internal error, see the log'
             self._is_lost = True
             self._take_fault(error)
         finally:
             self._machine.stop(PortLost(end))
             port.close()
-            self._while_sending()  # what was put off until the next frame, which never came
+            self._while_sending()  # work that waited for the next frame, which did not come
 
     def _serve(self, port: Port) -> None:
         """Run the machine until something else is wanted."""
         machine, clock = self._machine, self._clock
         machine.send_at_once, machine.unsent = port.write, port.unsent
-        # Only there do bytes come at the speed of the line; others may be faster than it is set.
+        # Only on a UART do bytes come at the speed of the line; other ports may be faster.
         is_terminal = isinstance(port, DescriptorPort) and os.isatty(port.fileno())
         machine.start(clock())
         left = b''
@@ -322,8 +322,8 @@ class LinkThread(threading.Thread):
             data = left or self._read(port, timeout)
             now = clock()
             if deadline is not None and now >= deadline:
-                # First: after a pause of this process the answer that lies in the buffer came too
-                # late, or nobody can tell that it did not.
+                # The deadline first: after a pause of this process nobody can tell whether an
+                # answer in the buffer came in time.
                 machine.handle_timeout(now)
             if left or len(data) == READ_SIZE:
                 left = self._take_portion(data, now)
@@ -371,7 +371,7 @@ class LinkThread(threading.Thread):
         select.select([self._wake_reader], [], [], seconds)
 
     def _pause(self, seconds: float) -> None:
-        """Wait, but not when the port is not wanted any more, or not as it is."""
+        """Wait, but not when the port has to be closed or another one opened."""
         end = self._clock() + seconds
         while not self._is_interrupted and (left := end - self._clock()) > 0:
             select.select([self._wake_reader], [], [], left)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which serial ports this machine has, and what is plugged in there."""
+"""The serial ports of this machine, and the adapters plugged in."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ class SerialPortInfo:
     """
     A serial port.
 
-    ``stable`` is a name that stays when adapters change places, empty where there is none;
-    ``adapter`` is what the adapter says of itself. ``may_open`` tells whether this user may.
+    ``stable`` is a name that stays the same when adapters change places, empty where there is
+    none. ``adapter`` is the description that the adapter gives. ``may_open`` tells whether this
+    user may open the port.
     """
 
     device: str
@@ -54,7 +55,7 @@ def serial_ports() -> list[SerialPortInfo]:
 
 
 def _stable_names() -> dict[str, str]:
-    """Return the names that udev has made, by the device they lead to."""
+    """Return the names that udev has made, by the device that they point to."""
     if not _BY_ID.is_dir():
         return {}
     return {os.path.realpath(link): str(link) for link in sorted(_BY_ID.iterdir())}

@@ -28,7 +28,7 @@ def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text:
     """
     Open a port, a serial device exclusively.
 
-    ``tell`` is called with what the port cannot do of what is asked, which is no error. Raises
+    ``tell`` is called with settings that the port does not support, which is not an error. Raises
     OSError.
     """
     scheme, separator, _ = settings.name.partition('://')

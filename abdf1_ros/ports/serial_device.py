@@ -15,7 +15,7 @@
 """
 Serial devices of this machine.
 
-What adapters can do, and what it is worth, is in docs/adapters.md.
+The properties of adapters are in docs/adapters.md.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from abdf1_ros.ports.settings import PortSettings
 import serial
 import serial.rs485
 
-# In words of ours, where those of the operating system tell too little.
+# Our own words, where those of the operating system tell too little.
 _BUSY = 'another program has it open'
 _REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is no serial port'}
 
@@ -47,7 +47,7 @@ _TIOCGICOUNT = 0x545D
 _ICOUNTER = struct.Struct('20i')
 _FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
 
-# How long (s) a close waits for the last bytes, and how often it looks.
+# How long (s) a close waits for the last bytes, and in which steps.
 _LAST_BYTES = 1.0
 _LOOK = 0.005
 
@@ -59,7 +59,8 @@ def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDe
     """
     Open a device exclusively.
 
-    ``tell`` is called with what the port cannot do, which is no error. Raises OSError.
+    ``tell`` is called with settings that the port does not support, which is not an error. Raises
+    OSError.
     """
     try:
         port = serial.Serial(
@@ -76,7 +77,7 @@ def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDe
 
 
 def _plain(error: Exception) -> tuple[Any, ...]:
-    """Return what the operating system has said, without the words that pyserial puts around."""
+    """Return the text of the operating system, without the words that pyserial adds."""
     said = error.__context__ if isinstance(error, serial.SerialException) else error
     args = said.args if isinstance(said, OSError | termios.error) else error.args
     return (args[0], _REASONS.get(args[0], args[1])) if len(args) > 1 else args
@@ -84,7 +85,7 @@ def _plain(error: Exception) -> tuple[Any, ...]:
 
 def _set_options(port: serial.Serial, settings: PortSettings,
                  tell: Callable[[str], None]) -> None:
-    """Ask the driver of a device for what goes beyond speed and character."""
+    """Set options of a device besides speed and character format."""
     if settings.low_latency:
         try:
             port.set_low_latency_mode(True)
@@ -102,7 +103,7 @@ def mark_damage(descriptor: int) -> None:
     """
     Let the system check parity, and mark characters whose parity or stop bit is wrong.
 
-    pyserial asks for parity to be sent, but not for it to be checked.
+    pyserial has parity sent, but not checked.
     """
     attributes = termios.tcgetattr(descriptor)
     attributes[0] |= termios.INPCK | termios.PARMRK
@@ -121,7 +122,7 @@ class SerialDevice(DescriptorPort):
                  is_marked: bool = False) -> None:
         super().__init__(descriptor, close)
         self._is_marked = is_marked
-        self._held = b''  # a mark of which not all has come
+        self._held = b''  # the beginning of an incomplete mark
         self._pieces: deque[bytes] = deque()
         self._origin = self._counts()
 
@@ -164,7 +165,7 @@ class SerialDevice(DescriptorPort):
             self._pieces.append(piece)
 
     def errors(self) -> dict[str, int]:
-        """Return what the UART has counted since the port was opened; empty: it counts nothing."""
+        """Return the UART's counts since the port was opened; empty if it does not count."""
         return {name: count - self._origin.get(name, 0) for name, count in self._counts().items()}
 
     def _counts(self) -> dict[str, int]:
@@ -177,15 +178,15 @@ class SerialDevice(DescriptorPort):
                 'overruns': counts[_OVERRUN] + counts[_BUFFER_OVERRUN]}
 
     def close(self) -> None:
-        """Give the line back; what cannot leave within a second, as without CTS, is dropped."""
+        """Close the device; bytes that cannot be sent within a second are dropped (no CTS)."""
         give_up = time.monotonic() + _LAST_BYTES
         with suppress(OSError, termios.error):  # the device is gone
             while self.unsent() and time.monotonic() < give_up:
                 time.sleep(_LOOK)
-            if self.unsent():  # the system would wait for that up to 30 s
+            if self.unsent():  # the system would wait for these bytes up to 30 s
                 termios.tcflush(self._descriptor, termios.TCOFLUSH)
                 attributes = termios.tcgetattr(self._descriptor)
-                attributes[2] &= ~termios.CRTSCTS  # for drivers that cannot drop what they have
+                attributes[2] &= ~termios.CRTSCTS  # for drivers that cannot drop their bytes
                 termios.tcsetattr(self._descriptor, termios.TCSANOW, attributes)
         self._descriptor = -1
         super().close()

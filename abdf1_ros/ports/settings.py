@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a port is asked for: its name and, where it has these, speed and character."""
+"""The settings of a port: its name and, for a serial one, speed and character format."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ class PortSettings:
     """
     How to open the port ``name``: a device path, ``socket://host:port`` or ``rfc2217://...``.
 
-    Columns of the net CSV, as far as they are about the port. ``low_latency`` hands on bytes as
-    they come, where USB adapters gather them for up to 16 ms; ``rs485`` switches the transmitter
-    of an RS-485 port on and off with RTS. A port that can do neither is opened all the same.
+    These are the columns of the net CSV about the port. With ``low_latency`` a USB adapter passes
+    bytes on at once, instead of collecting them for up to 16 ms. ``rs485`` switches the
+    transmitter of an RS-485 port on and off with RTS. A port that supports neither is opened all
+    the same.
     """
 
     name: str

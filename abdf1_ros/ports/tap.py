@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Listen on a port, or stand between two and pass everything on."""
+"""Listen on a port, or stand between two ports and pass all bytes on."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ class _TapReader(threading.Thread):
             while not self.stopping:
                 data = self._port.read(None, self._wake)
                 if data:
-                    # Queued first, or an answer might get into the queue before it.
+                    # Queued first, or an answer could be queued before it.
                     self._heard.put(Chunk(time.monotonic(), self._direction, data))
                     if self._onward is not None:
                         self._onward.write(data)
         except OSError as error:
-            # Not as it is: a broken pipe would be taken for that of standard output.
+            # As another error: a broken pipe would be taken for that of standard output.
             self._heard.put(OSError(error.strerror or str(error)))
 
 
@@ -72,8 +72,7 @@ class Tap:
     One port to listen on, or two to stand between; open while the ``with`` block runs.
 
     A name is that of a port with these ``settings``, or "pty" or "pty:NAME" for a new
-    pseudo-terminal; ``names`` is what others call the ports. Raises OSError when one cannot be
-    opened.
+    pseudo-terminal; ``names`` are the names for others. Raises OSError when one cannot be opened.
     """
 
     def __init__(self, names: Sequence[str], settings: PortSettings) -> None:
@@ -101,7 +100,7 @@ class Tap:
         """End all threads, then close the ports."""
         for reader in self._readers:
             reader.stopping = True
-        os.write(self._wake_writer, b'w')  # left in the pipe for all to see
+        os.write(self._wake_writer, b'w')  # left in the pipe, so that every reader wakes up
         for reader in self._readers:
             reader.join()
         os.close(self._wake_reader)
@@ -114,7 +113,7 @@ class Tap:
 
     def chunks(self, seconds: float, period: float, idle: Callable[[], None]) -> Iterator[Chunk]:
         """
-        Yield what is heard, with the seconds since the ports were opened.
+        Yield the bytes that are received, with the seconds since the ports were opened.
 
         It ends after ``seconds`` or ``stop``. ``idle`` is called every ``period`` seconds in
         which nothing is heard. Raises OSError when a port is lost.
@@ -130,7 +129,7 @@ class Tap:
                 return
             if isinstance(item, OSError):
                 raise item
-            # In microseconds, as a capture has it: live and saved traffic read the same.
+            # In microseconds, as in a capture, so that live and saved traffic look the same.
             yield item._replace(time=round((item.time or 0.0) - self._begun, 6))
 
     def _open(self, name: str, stack: ExitStack) -> Port:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Record what passes a port, for the node's parameter ``trace_file`` and for ``sniff``."""
+"""Record the bytes of a port, for the node's parameter ``trace_file`` and for ``sniff``."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def begun_now() -> str:
 
 class Trace:
     """
-    A capture that ends by itself when it cannot be written, and tells ``on_error`` so, once.
+    A capture that ends when it cannot be written; then ``on_error`` is called once.
 
     ``limit`` is the most bytes on the disk. Raises OSError when it cannot be begun.
     """
@@ -99,10 +99,10 @@ class TracedPort:
 
 class PortOpener:
     """
-    Open a port, as often as it takes.
+    Open a port, again after each loss.
 
-    ``tell`` is that of ``open_port``. After ``trace`` all that passes the port goes into a
-    capture. What goes wrong with that is told to ``on_error`` and has no effect on the port.
+    ``tell`` is that of ``open_port``. After ``trace`` all bytes of the port go into a capture. An
+    error of that is given to ``on_error`` and has no effect on the port.
     """
 
     def __init__(self, settings: PortSettings,
@@ -124,7 +124,7 @@ class PortOpener:
 
     def trace(self, path: str, limit: float, head: dict[str, str],
               on_error: Callable[[str], None]) -> None:
-        """Begin a capture of at most ``limit`` bytes; ``head`` is what it says of the line."""
+        """Begin a capture of at most ``limit`` bytes; ``head`` has the settings of the line."""
         settings = {'begun': begun_now(), 'port': self._settings.name,
                     'baud': str(self._settings.baud), **head}
         self._begun = time.monotonic()

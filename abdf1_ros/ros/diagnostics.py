@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the node says of itself on /diagnostics, readable without any tool but an echo."""
+"""The statuses of the node on /diagnostics, readable with a plain ``ros2 topic echo``."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR'}
 # How long a failed write keeps its status at WARN, in seconds.
 _WRITE_MEMORY = 10.0
 
-# A master that has not polled us for so long (s) is worth a warning.
+# After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
 
-# A node that was killed is seen for up to 20 s more, the lease of its DDS participant. In so many
-# looks in a row, a second apart, another node of our name is no earlier run of this one.
+# A node that was killed stays visible for up to 20 s, the lease of its DDS participant. A node of
+# our name that is seen in so many looks in a row, a second apart, is not an earlier run of ours.
 _LOOKS_FOR_DUPLICATES = 30
 
 # So many faults of rows that were left out are repeated with every status; check has them all.
@@ -81,9 +81,9 @@ class Diagnostics:
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
     faults of the rows that the map was read without, ``map_name`` is what the file is called.
-    ``writes`` is what has become of writes so far. ``changed_files`` are the names of files that
-    are not any more as they were read. ``crowded`` are topics with a Fallback that more than one
-    publisher feeds.
+    ``writes`` counts the results of writes. ``changed_files`` are the names of files that have
+    changed since they were read. ``crowded`` are topics with a Fallback and more than one
+    publisher.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
@@ -139,7 +139,7 @@ class Diagnostics:
         return values
 
     def attach(self, link: LinkThread, port_errors: Callable[[], dict[str, int]]) -> None:
-        """Name the thread whose port is reported on, and what tells the errors of its UART."""
+        """Set the thread whose port is reported, and the function for the errors of its UART."""
         self._link = link
         self._port_errors = port_errors
 
@@ -147,7 +147,7 @@ class Diagnostics:
         """Remember the last numbered error, and the last thing unusual at each station."""
         if event.message is Message.NTC_REPLY_MSG_RCVD:
             return
-        # That a station is inactive has its own keys; what it has become so by does not.
+        # Inactive stations have keys of their own, but the reason is only in the event.
         if event.message is not Message.ERR_INACTIVE_STATION:
             self._last_events[event.station] = event, now
         if event.message.severity is not Severity.NOTICE:
@@ -299,8 +299,8 @@ class Diagnostics:
                 f'of {sum(found.values())} mappings {", ".join(sorted(states))}')
 
     def _freshness(self, now: float) -> dict[Freshness, int]:
-        """Return how many mappings there are of each state."""
-        # Asked for ten times a second: to count in a list takes a third of what Counter takes.
+        """Return the number of mappings in each state."""
+        # Called ten times a second: counting in a list takes a third of the time of a Counter.
         states = [point.freshness(now) for point in self._driver.points.values()]
         return {state: states.count(state) for state in Freshness if state in states}
 
@@ -330,7 +330,7 @@ def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mappin
 
 
 def changed_text(names: Sequence[str]) -> str:
-    """Return what there is to say of files that have changed, empty where none has."""
+    """Return a text about files that have changed, empty where none has."""
     return f'{", ".join(names)} changed since read; ~/reload takes it' if names else ''
 
 
@@ -339,7 +339,7 @@ _Moment = tuple[Event | str, float]
 
 
 def _with_age(moment: _Moment | None, now: float) -> str:
-    """Return what has happened last, and how long ago."""
+    """Return the last event, and how long ago it was."""
     return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
 
 
@@ -367,7 +367,7 @@ class DuplicateNameWatch:
 
 
 def is_usual_fallback(result: WriteResult) -> bool:
-    """Tell whether a fallback value was written as at every start and every end."""
+    """Tell whether a fallback value was written for a start or an end, as always."""
     return result.outcome is Outcome.FALLBACK and \
         result.detail in (FallbackCause.START.value, FallbackCause.END.value)
 
@@ -376,8 +376,8 @@ class WriteLog:
     """
     Counts of writes by how they ended.
 
-    Refusals are counted in the thread of the requests, all else in that of the link: no count
-    has two writers. Messages that never came are counted in the former.
+    Refusals and lost messages are counted in the thread of the requests, all others in that of
+    the link, so no count has two writers.
     """
 
     def __init__(self) -> None:
@@ -399,11 +399,11 @@ class WriteLog:
         self._last_loss = f'{count} to ~/write/{topic}', now
 
     def _messages(self) -> int:
-        """Return how many results were those of messages; a fallback value answers none."""
+        """Return the number of results of messages; fallback values do not count."""
         return self._counts.total() - self._counts[Outcome.FALLBACK]
 
     def judge(self, now: float) -> Judgement:
-        """Return WARN for a while after a write that was not confirmed, or never came."""
+        """Return WARN for a while after a write that was not confirmed, or a lost message."""
         total = self._messages()
         summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
         if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
@@ -454,7 +454,7 @@ class _Rate:
 
 
 def _periods(points: Iterable[ReadPoint]) -> dict[str, str]:
-    """Return how far the reads of each period fall behind; what others write does not count."""
+    """Return how late the reads of each period are; Serve rows do not count."""
     found: defaultdict[float, list[float]] = defaultdict(list)
     for point in points:
         if point.mapping.polls:
@@ -471,12 +471,12 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
 
 
 def _rounded(rate: float) -> int:
-    """Return two digits of a rate; the rest of it means nothing."""
+    """Return a rate rounded to two digits."""
     return int(float(f'{rate:.1e}'))
 
 
 def speed_seen(driver: Driver) -> str:
-    """Return what the line has shown of its speed."""
+    """Return the measured speed of the line."""
     seen = driver.machine.rate.seen
     if seen is None:
         return 'nothing speaks against the set one'

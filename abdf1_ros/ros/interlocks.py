@@ -31,7 +31,7 @@ from rclpy.node import Node
 END_LIMIT = 2.0
 """How long (s) an orderly end may take until all is confirmed (rule 5)."""
 
-# How often (s) the executor says that it runs: well within the shortest period of a heartbeat.
+# How often (s) the executor tells that it runs: well within the shortest period of a heartbeat.
 _LIFE_SIGN = 0.1
 
 # How often (s) publishers to topics with a Fallback are counted.
@@ -44,7 +44,7 @@ class InterlockWatch:
     """
     Watches over the heartbeats and fallbacks of ``node``; ``use`` names the driver.
 
-    The timer that tells the link of the executor exists only while there are heartbeats.
+    The timer by which the link knows of the executor exists only while there are heartbeats.
     """
 
     def __init__(self, node: Node) -> None:
@@ -59,12 +59,12 @@ class InterlockWatch:
         self._driver = driver
         self._tell()
         if driver.interlocks.heartbeats and self._timer is None:
-            # Not the node's clock: that may be a simulation's, which need not run.
+            # Not the node's clock, which may be a simulated one that stands still.
             self._timer = self._node.create_timer(
                 _LIFE_SIGN, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _tell(self) -> None:
-        """Say that the executor runs (rule 3 c)."""
+        """Tell the driver that the executor runs (rule 3 c)."""
         if self._driver is not None:
             self._driver.interlocks.executor_ran(line_time())
 

@@ -81,7 +81,7 @@ _RESTART_AFTER = 2.0
 
 _STATUS_PERIOD = 1.0
 
-# A service that nobody uses, for memory and time to start: 13 MiB of 264 with a hundred nodes.
+# Without this service, which is not needed, a hundred nodes take 13 MiB of 264 less.
 _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
 
 # Of the end (s): until when writes that have come are waited for, counted from its beginning; how

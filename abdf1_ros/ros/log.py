@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-What the node writes to the ROS log: every line visible as it is, and never a flood of them.
+The entries of the node in the ROS log: all characters visible, and a limited number of entries.
 
-Numbered events are logged once a cause, their repetitions counted; while a cause lasts, or a
-station comes and goes with it, there is a line now and then. Of all else there are a few
-lines a minute about one thing, so that neither a PLC nor whoever publishes to the node can fill
-the disk.
+A numbered event is logged once for each cause, and its repetitions are counted. While a cause
+lasts, or a station comes and goes with it, there is an entry now and then. Other entries are
+limited to a few a minute about one subject, so that neither a PLC nor a publisher can fill the
+disk.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from abdf1_ros.text import printable
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
-# A cause that has been quiet for so long (s) is news again.
+# A cause is logged again at once when it comes back after so many seconds.
 _QUIET = 60.0
 
-# A cause that lasts is logged again after so long (s): who looks at today's log has to see it.
+# A lasting cause is logged again after so many seconds, so that each day's log shows it.
 _REMINDER = 600.0
 
-# Causes remembered at a time, which is some for each of 254 stations. Only messages with forged
-# senders make more; those are not logged while all of these are recent.
+# Causes remembered at a time, which is several for each of 254 stations. Only messages with wrong
+# senders can cause more; those are not logged while all remembered ones are recent.
 MOST_CAUSES = 1000
 
-# Lines about one thing in a minute.
+# Entries about one subject in a minute.
 MOST_LINES = 10
 _MINUTE = 60.0
 
-# What every transaction brings, and what goes with an event that is logged itself.
+# Events of every transaction, and those that come with another event that is logged.
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
@@ -54,13 +54,13 @@ _ROUTINE = (
 
 @dataclass(slots=True)
 class _Subject:
-    """What lines are about: when (s) the latest of them were written, and how many were not."""
+    """A subject: when (s) its latest entries were written, and how many were left out."""
 
     written: deque[float] = field(default_factory=lambda: deque(maxlen=MOST_LINES))
     left_out: int = 0
 
     def has_enough(self, now: float) -> bool:
-        """Tell whether this minute has had all the lines it may have."""
+        """Tell whether this minute has had all its entries."""
         return len(self.written) == MOST_LINES and now - self.written[0] < _MINUTE
 
 
@@ -124,12 +124,12 @@ class EventLog:
             self._logger.info(text)
 
     def forget_all(self) -> None:
-        """Log everything anew: the files have been read again."""
+        """Log all causes again: the files have been read again."""
         for cause in self._causes.values():
             cause.is_news = True
 
     def forget(self, station: int) -> None:
-        """Log the next events of a station anew: its state has changed."""
+        """Log the next events of a station again: its state has changed."""
         for (_, number), cause in self._causes.items():
             if number == station:
                 cause.is_news = True
@@ -137,9 +137,9 @@ class EventLog:
 
 class LineLog:
     """
-    Write lines to ``logger``, at most ``MOST_LINES`` a minute about one thing.
+    Write entries to ``logger``, at most ``MOST_LINES`` a minute about one subject.
 
-    ``about`` names the thing; there have to be no more names than the configuration has.
+    ``about`` names the subject; use only names of the configuration, whose number is limited.
     ``clock`` gives seconds.
     """
 
@@ -149,7 +149,7 @@ class LineLog:
         self._subjects: dict[str, _Subject] = {}
 
     def info(self, about: str, text: str) -> None:
-        """Log what is well."""
+        """Log something normal."""
         if self._may_write(about):
             self._logger.info(self._line(about, text))
 
@@ -159,7 +159,7 @@ class LineLog:
             self._logger.warning(self._line(about, text))
 
     def error(self, about: str, text: str) -> None:
-        """Log what does not work."""
+        """Log a failure."""
         if self._may_write(about):
             self._logger.error(self._line(about, text))
 

@@ -34,9 +34,9 @@ MESSAGES: dict[ValueType, Any] = {kind: getattr(std_msgs, kind.message) for kind
 
 ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
     label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])
-"""The layout of ~/active_stations, so that a bare echo says what it shows."""
+"""The layout of ~/active_stations, which explains the words to readers of an echo."""
 
-# Pulses are written one by one, so a burst of them has to fit; it costs no memory before.
+# Bits are written one by one, so a burst of them has to fit; unused places take no memory.
 _WRITE_DEPTH = 1000
 
 
@@ -44,8 +44,8 @@ def new_message(mapping: Mapping) -> Any:
     """
     Return a message for the values of ``mapping``, its layout filled in.
 
-    Characters of a string go to the topic as they are, except that it ends at the first NUL:
-    ROS passes strings on as C does.
+    Characters of a string are published unchanged, but the string ends at the first NUL, as ROS
+    passes strings on like C.
     """
     message = MESSAGES[mapping.message_type]()
     if mapping.message_type is not ValueType.STRING:
@@ -57,10 +57,10 @@ def new_message(mapping: Mapping) -> Any:
 
 def encoder(mapping: Mapping) -> Callable[[Values], Any]:
     """
-    Return what makes values of ``mapping`` into what its publisher takes.
+    Return a function that encodes values of ``mapping`` for its publisher.
 
-    Only the numbers of an array ever change, and they stand last: all before them is encoded
-    once. That spares a fifth of what publishing costs (test/benchmarks/node_cpu.py).
+    Only the numbers of an array change, and they come last. So all bytes before them are encoded
+    once, which saves a fifth of the processor time of publishing (test/benchmarks/node_cpu.py).
     """
     message = new_message(mapping)
     if mapping.message_type is ValueType.STRING:
@@ -84,9 +84,9 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
     """
     Return the QoS of a read topic.
 
-    A late subscriber gets the last value, but never one older than ``stale_time`` seconds; one
-    that asks for deadline or liveliness is told after that time that values have stopped. A
-    topic that is published on change only, or when a PLC chooses to write, cannot promise this.
+    A late subscriber gets the last value, but never one older than ``stale_time`` seconds. A
+    subscriber with deadline or liveliness QoS is told after that time that values have stopped.
+    A topic that is published on change only, or when a PLC writes, cannot promise this.
     """
     profile = QoSProfile(
         depth=1, reliability=ReliabilityPolicy.RELIABLE,
@@ -99,7 +99,7 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
 
 
 def write_qos() -> QoSProfile:
-    """Return the QoS of write topics: nothing sent before we are there is ever executed."""
+    """Return the QoS of write topics: no message from before our start is executed."""
     return QoSProfile(
         depth=_WRITE_DEPTH, reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE)

@@ -15,9 +15,9 @@
 """
 The ROS node: mapped reads as topics, writes as subscriptions, state as diagnostics.
 
-Values and results are published from the link thread itself, which spares the way through the
-executor; publishers may be used from any thread. Everything is created before that thread
-starts and destroyed after it has ended.
+Values and results are published from the link thread itself, without the executor in between;
+publishers may be used from any thread. Everything is created before that thread starts and
+destroyed after it has ended.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ _RESULT_LEVELS = {
 
 @dataclass(frozen=True, slots=True)
 class _NodeListener:
-    """What a driver calls; values go to the topics that were made for its map."""
+    """The listener of one driver; its values go to the topics of its map."""
 
     read: Callable[[Mapping, Values], None]
     unreadable: Callable[[Mapping, str], None]
@@ -147,7 +147,7 @@ class BridgeNode(Node):
         parameters, network = configuration.parameters, configuration.network
         self._configuration = configuration
         self._wrong_types: list[str] = []
-        # Every node has this service, and nobody gives it another name.
+        # Every node has this service under this name.
         service = f'{self.get_fully_qualified_name()}/get_parameters'
         self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
         self._next_diagnostics = self._next_look = 0.0
@@ -174,7 +174,7 @@ class BridgeNode(Node):
         self._link_counters = LinkCounterService(self.driver, self.link, self._wake_executor)
         self._create_services()
         if has_timer:
-            # Not the node's clock: that may be a simulation's, which need not run.
+            # Not the node's clock, which may be a simulated one that stands still.
             self.create_timer(LEVEL_CHECK_PERIOD, self.check,
                               clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -221,7 +221,7 @@ class BridgeNode(Node):
                             callback_group=MutuallyExclusiveCallbackGroup())
 
     def _tell(self, configuration: Configuration) -> None:
-        """Log what both files come to."""
+        """Log a summary of both files."""
         self.get_logger().info(str(configuration))
         for problem in configuration.map_problems:
             self.get_logger().error(f'{problem} (row left out)')
@@ -282,7 +282,7 @@ class BridgeNode(Node):
         self.link.stop()
         self._opener.close()
         self._publish_diagnostics(line_time())
-        # Without a publisher, what is still under way would not arrive.
+        # Messages that are still under way would be lost with their publisher.
         self._diagnostics_publisher.wait_for_all_acked(patience)
 
     def _lost(self, topic: str, count: int) -> None:
@@ -292,7 +292,7 @@ class BridgeNode(Node):
                             'they can be taken')
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Log why a station that answers gives no value."""
+        """Log why a read of a station that answers has no value."""
         self._lines.error(mapping.tag, f'{mapping.tag} ({mapping.address} at station '
                                        f'{mapping.station}): {reason}')
 
@@ -331,13 +331,13 @@ class BridgeNode(Node):
             self._lines.error(about, Message.ERR_INACTIVE_STATION.line(station.number))
 
     def _publish_active(self) -> None:
-        """Publish the Active Node Table; nobody is active behind a closed port."""
+        """Publish the Active Node Table; with a closed port no station is active."""
         words = self.driver.stations.words() if self.link.state.is_open else [0] * 16
         self._active.publish(UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
 
     def _port_changed(self, state: PortState) -> None:
         if state.text == self._port_text:
-            return  # one more attempt that failed as the one before it
+            return  # an attempt that failed like the one before
         self._port_text = state.text
         self._publish_active()
         is_meant = state.is_open or self.link.is_released
@@ -368,7 +368,7 @@ class BridgeNode(Node):
             self._publish_diagnostics(now)
 
     def _look_at_files(self, now: float) -> None:
-        """Tell once that a file is not any more as it was read."""
+        """Log once that a file has changed since it was read."""
         if now < self._next_look:
             return
         self._next_look = now + _FILE_PERIOD
@@ -410,14 +410,14 @@ class BridgeNode(Node):
     def _publish_diagnostics(self, now: float) -> None:
         self._next_diagnostics = now + self._configuration.parameters.diagnostics_period
         message = DiagnosticArray(status=self._diagnostics.statuses(now))
-        # Time that is simulated may not have begun; 0 would sort before everything.
+        # Simulated time may still be 0, which would sort before all other messages.
         now_ros = self.get_clock().now()
         stamped = now_ros if now_ros.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
         self._diagnostics_publisher.publish(message)
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Go on with the files as they are now, or as before where these have faults."""
+        """Use the files as they are now, or go on as before where these have faults."""
         try:
             configuration = read_again(self, self._configuration.parameters)
         except ConfigurationError as error:
@@ -434,9 +434,9 @@ class BridgeNode(Node):
         return response
 
     def _go_on_with(self, configuration: Configuration) -> bool:
-        """Put new files to work; return False where the link does not take them."""
+        """Use the new files; return False where the link does not take them."""
         before, old_reads, old = self.driver, self._reads, self._configuration
-        # For heartbeats and fallbacks new files are a new start.
+        # For heartbeats and fallbacks new files count as a start.
         self.begin_end()
         self.finish_end(time.monotonic() + END_LIMIT, 'goes on with new files')
         self._configuration = configuration

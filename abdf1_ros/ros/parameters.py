@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node's parameters: one table, their declaration, and what they come to."""
+"""The node's parameters: one table, their declaration, and the configuration made of them."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ Cell = tuple[str, str, str]
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
 
-# Shown as resolved paths, or nobody could tell which file it is.
+# Shown as resolved paths, because a relative one does not tell which file it is.
 _PATHS = ('net_file', 'map_file')
 
 
@@ -118,7 +118,7 @@ class Configuration:
     """
     All that the node needs to know.
 
-    ``map_problems`` are those of rows left out, ``ignored`` names overrides without an effect.
+    ``map_problems`` are those of rows left out, ``ignored`` are names of overrides without effect.
     """
 
     parameters: Parameters
@@ -168,8 +168,8 @@ def read_again(node: Node, parameters: Parameters) -> Configuration:
     """
     Read both files again; ``declare_again`` shows what comes from them.
 
-    Raises ConfigurationError with every fault, those of single rows among them: what runs is not
-    given up for a slip.
+    Raises ConfigurationError with every fault, also of single rows: a running node is not stopped
+    for a mistake in a file.
     """
     return _from_files(node, parameters, [], _overridden_network, is_strict=True)
 
@@ -220,7 +220,7 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
 
 
 def _forget(node: Node, prefix: str) -> None:
-    """Undeclare parameters; rclpy itself has no way for those that are read-only."""
+    """Undeclare parameters; rclpy itself cannot do it for those that are read-only."""
     for name in [name for name in node._parameters if name.startswith(prefix)]:
         del node._parameters[name], node._descriptors[name]
 
@@ -307,8 +307,8 @@ def _declare(node: Node, name: str, default: Any, description: str, low: float |
     """
     Declare a parameter and return its value, whatever the user has given.
 
-    Types and ranges are shown to the user by rclpy and checked by us, who can say more. A path
-    is shown resolved and returned as it was given.
+    rclpy shows types and ranges to the user, but we check them, with better messages. A path is
+    shown resolved and returned as it was given.
     """
     given = _overrides(node).get(name)
     if name in _PATHS and given is not None and isinstance(given.value, str):
@@ -361,7 +361,7 @@ def _declare_network(node: Node, network: Network) -> Network:
         if entry.choices:
             description += f' ({", ".join(map(str, entry.choices))})'
         value = _declare(node, entry.parameter, default, description, entry.low, entry.high)
-        if _text(value) != str(default):  # 5.0 equals 5, but is no station
+        if _text(value) != str(default):  # 5.0 equals 5, but is not a station
             given[name] = _text(value), f'parameter {entry.parameter}'
     return make_network(given, network)
 

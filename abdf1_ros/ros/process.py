@@ -15,7 +15,7 @@
 """
 The process of a node: signals, arguments, a ROS context, and the exit status.
 
-What is said here holds for ``node`` and for ``lines``.
+It serves ``node`` and ``lines``.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ from rclpy.utilities import remove_ros_args
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
 
-# Nothing that came before the end is still waiting when nothing comes for so long (s), and a
-# publisher that never rests is not waited for any longer than the other.
+# QUIET: when no callback comes for so long (s), no message from before the end waits any more.
+# LAST_WRITES: a publisher that never pauses is not waited for longer than this (s).
 QUIET = 0.05
 LAST_WRITES = 1.5
 
-# What rclpy's errors about the directory of the logs begin with.
+# The beginnings of rclpy's errors about the log directory.
 _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
 
-# What they hold that are about arguments.
+# Words in rclpy's errors about arguments.
 _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
 
 
 def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
-    """Return what helps and tells the version; a node takes nothing but ROS arguments."""
+    """Return the parser for --help and --version; a node has only ROS arguments."""
     parser = argparse.ArgumentParser(
         prog=usage.split()[0], usage=usage, description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -104,7 +104,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
 
 
 def _check_log_directory() -> None:
-    """Raise ConfigurationError where rclpy would not find one, and say so in three errors."""
+    """Raise ConfigurationError where rclpy would find none; its own errors are unclear."""
     if not any(os.environ.get(name) for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')):
         raise ConfigurationError([Problem('environment', (
             'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to one that '
@@ -115,8 +115,8 @@ def _refusal(error: Exception) -> tuple[int, str]:
     """
     Return exit status and text for what rclpy does not take.
 
-    What the user has given stays wrong. All else may pass, such as a disk or a network that is
-    not there yet while the machine starts: whoever supervises the node is to try again.
+    Wrong arguments stay wrong. Other reasons may pass, such as a disk or a network that is not
+    ready yet while the machine starts: then a supervisor should try again.
     """
     text = printable(' '.join(str(error).split()))
     if _LOG_FAILURES.match(text):

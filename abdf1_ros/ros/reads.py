@@ -31,11 +31,11 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
 # So many values of a reply are published while its ACK is on the line (two characters), the
-# others together with the next command: a hundred would keep the line waiting for 3 ms.
+# others while the next command is sent: publishing a hundred would delay the line by 3 ms.
 _VALUES_AT_ONCE = 4
 
-# What a publisher has promised may be so much shorter than the time that values are late by now:
-# a late joiner and a deadline are to notice nothing, and half as long is no false alarm yet.
+# A publisher is kept while the new time is at most so many times the one that it has promised: a
+# deadline that is a little short gives no false alarm.
 _MARGIN = 1.5
 
 
@@ -60,7 +60,7 @@ class _ReadTopic:
 
 class ReadTopics:
     """
-    Publish values, in the thread of the link; made and ended in that of the executor.
+    Publish values in the link thread; made and ended in the thread of the executor.
 
     ``open`` has to come before the driver runs; what ``before`` has is used again where it fits.
     ``end`` closes the rest of that.
@@ -84,7 +84,7 @@ class ReadTopics:
         promise = point.stale_time if mapping.publish is Publish.ALWAYS else math.inf
         if old is not None and old.is_fit_for(shape, promise):
             return old
-        # The default callbacks make every publisher a burden on every turn of the executor.
+        # The default callbacks would cost time for every publisher at every turn of the executor.
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self._node.create_publisher(
             MESSAGES[mapping.message_type], f'~/read/{mapping.topic}',
@@ -101,7 +101,7 @@ class ReadTopics:
             self._later.append((topic.publisher, topic.encode(values)))
 
     def publish_later_values(self) -> None:
-        """Publish what has been put off; the line is busy."""
+        """Publish the values that were put off; the line is busy now."""
         self._at_once = _VALUES_AT_ONCE
         while self._later:
             publisher, values = self._later.popleft()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the PLCs say of themselves, for /diagnostics and for the service ~/read_link_counters."""
+"""Mode, faults and counters of the PLCs, for /diagnostics and ~/read_link_counters."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _PATIENCE = 5.0
 
 
 def trouble(identity: Identity | None) -> str | None:
-    """Return why a processor that answers does not do its work, None when nothing is known."""
+    """Return the fault of a processor that answers but does not run, None where none is known."""
     if identity is None:
         return None
     if identity.faults:
@@ -101,7 +101,7 @@ class LinkCounterService:
 
     async def answer(self, request: Trigger.Request,
                      response: Trigger.Response) -> Trigger.Response:
-        """Ask, wait, and tell."""
+        """Request the counters, wait, and fill in the response."""
         self._asked = [station.number for station in self._driver.stations if station.active]
         if not self._driver.is_online or not self._asked:
             what = 'no station is active' if self._driver.is_online else 'the port is not open'

@@ -16,8 +16,8 @@
 Write topics: from a message to the driver, and what DDS has dropped before it came to us.
 
 Messages are numbered by their publisher (Fast DDS does it, others may not). Where a number is
-left out, a message was dropped: the executor was slower than the publisher, and the history of
-either end was full. Nobody else tells: Fast DDS 2.14 has no message-lost event for it.
+missing, a message was dropped: the executor was slower than the publisher, and the history of
+either end was full. There is no other sign: Fast DDS 2.14 has no message-lost event for it.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class LossCounter:
     """
     Tell how many messages of a topic never came.
 
-    rclpy does not say whose number it is. So a number continues that of the publisher which it
-    follows, or belongs to one that is new as long as ``count_publishers`` gives more than are
-    known, or else comes after a loss.
+    rclpy does not tell the publisher of a number. A number that follows the last one of a known
+    publisher belongs to that publisher. Otherwise it belongs to a new one, as long as
+    ``count_publishers`` gives more than are known. Otherwise messages before it were lost.
     """
 
     def __init__(self, count_publishers: Callable[[], int]) -> None:
@@ -57,7 +57,7 @@ class LossCounter:
         self._latest: list[int] = []  # number of the latest message of each publisher
 
     def lost_before(self, number: int | None) -> int:
-        """Take the number of a message, None where it has none; return how many are missing."""
+        """Take the number of a message, None where it has none; return the number of lost ones."""
         if number is None:
             return 0
         latest = self._latest
@@ -77,10 +77,10 @@ class LossCounter:
 
 def _request(message: Any, info: Any) -> str:
     """
-    Return what tells a message from all others of its topic, for its result.
+    Return the name of a message for its result, different from all others of its topic.
 
-    That is the label which its publisher has put into the layout, or else when it was published
-    (ns): rclpy does not tell who has published it.
+    That is the label which its publisher has put into the layout, or else the time when it was
+    published (ns): rclpy does not tell the publisher.
     """
     if not isinstance(message, String) and message.layout.dim and message.layout.dim[0].label:
         return printable(message.layout.dim[0].label[:_LONGEST_LABEL])
@@ -115,7 +115,7 @@ class WriteTopic:
         """Write a message to every mapping of the topic."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
             self._on_loss(self._topic, lost)
-        # It may have waited, while this process was paused or the network was down.
+        # It may have waited while this process was paused or the network was down.
         now = time.time_ns()
         stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
         waited = max(0.0, (now - min(stamps, default=now)) / 1e9)

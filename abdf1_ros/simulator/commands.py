@@ -66,15 +66,15 @@ _ACTIONS: dict[str, Callable[[SimulatedPlc], None]] = {
 
 
 class CommandError(Exception):
-    """A line that is no command; the text says what would be right."""
+    """A text that is not a command; the error says what would be right."""
 
 
 def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False,
             report: Callable[[str], None] = lambda text: None) -> str:
     """
-    Carry out a command line, all but "quit"; return what has been done, or raise CommandError.
+    Carry out a command, all but "quit"; return a text about it, or raise CommandError.
 
-    ``report`` is told later what has become of a message.
+    ``report`` is called later with the result of a message.
     """
     verb, *words = line.split()
     plc, arguments = _station(words, plcs)

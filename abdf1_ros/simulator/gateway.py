@@ -28,7 +28,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 
 _NOT_DELIVERED = 0x02  # STS: the node does not acknowledge (M 8-2)
 
-# What it says of itself, as pccc/gateways.py reads it: a module with its name.
+# Its identity, as pccc/gateways.py reads it: a module with its name.
 _IDENTITY = (bytes((0x00, 0xFE, 0x2C, 0x00, 0x00)) + b'1770-KF3'.ljust(11)).ljust(24, b'\0')
 
 
@@ -36,8 +36,8 @@ class SimulatedGateway:
     """
     A 1770-KF3 and the ``plcs`` behind it.
 
-    It answers to its own station on the line, and hands a command on by DST (M 3-7); the reply
-    of the PLC waits with it for a poll. For a PLC that is not there or silent it replies itself.
+    It answers as its own station on the line, and passes a command on by DST (M 3-7); it keeps the
+    reply of the PLC until a poll. For a PLC that is missing or silent it replies itself.
     """
 
     def __init__(self, station: int, plcs: Sequence[SimulatedPlc], checksum: Checksum) -> None:
@@ -59,7 +59,7 @@ class SimulatedGateway:
 
 
 def _answer_for_itself(command: Packet) -> Packet:
-    """Return what the module says that is asked itself: an echo, or what it is."""
+    """Return the reply to a command for the module itself: an echo, or its identity."""
     function = (command.cmd, command.data[0]) if command.data else None
     if function == (CMD, ECHO):
         return command.reply(command.data[1:])
@@ -69,7 +69,7 @@ def _answer_for_itself(command: Packet) -> Packet:
 
 
 def stations_of(plcs: Sequence[SimulatedPlc], checksum: Checksum) -> list[Responder]:
-    """Return the stations of a line: PLCs, and a gateway for those that are behind one."""
+    """Return the stations of a line: PLCs, and the gateways of those behind one."""
     gateways = dict.fromkeys(plc.via for plc in plcs if plc.via is not None)
     return [*(plc for plc in plcs if plc.via is None),
             *(SimulatedGateway(via, [plc for plc in plcs if plc.via == via], checksum)

@@ -44,8 +44,8 @@ _STABLE = 300
 _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
 
-# More than this is not caught up with after a pause of the simulator: the program ran on, and only
-# its last seconds still show.
+# After a pause of the simulator only so many seconds of scans are made up for: earlier ones would
+# not change the result.
 _MOST_SCANS = 6000
 
 _DONE, _TIMING, _ENABLED = 1 << 13, 1 << 14, 1 << 15
@@ -105,7 +105,7 @@ class Ladder:
         self._clock = _Timer(_PLC_HEARTBEAT)
         self._lamps = 0
         self._button = False  # is pressed
-        self._button_before = True  # OSR: a button that is stuck gives no edge
+        self._button_before = True  # OSR: a button that stays pressed gives no edge
         self._is_first_pass = True
         self._next_scan: float | None = None
         for kind, file, words in ((FileType.INTEGER, 10, 2), (FileType.INTEGER, 11, 4),
@@ -184,7 +184,7 @@ class Ladder:
         place = Address(self._addressing, FileType.STATUS, 2, 1)
         try:
             self._table.write_bits(place, _FIRST_PASS, _FIRST_PASS * self._is_first_pass)
-        except (NoSuchFile, OutOfRange):  # a table need not have a status file
+        except (NoSuchFile, OutOfRange):  # a data table may lack the status file
             return
 
     def _get(self, file: int, element: int) -> int:

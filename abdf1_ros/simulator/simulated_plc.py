@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A PLC to try the bridge against: data tables that move, and faults to switch on."""
+"""A simulated PLC to try the bridge with: changing values, and faults to switch on."""
 
 from __future__ import annotations
 
@@ -88,10 +88,10 @@ class _Mover:
 @dataclass(slots=True)
 class InjectedFaults:
     """
-    What is wrong with a station at the moment.
+    The faults that a station has at the moment.
 
-    ``silent``: it does not answer. ``full``: it has no room for commands, so it passes them
-    over (half duplex) or answers NAK (full duplex). ``slow``: so many polls get EOT before each
+    ``silent``: it does not answer. ``full``: it has no room for commands, so it ignores them
+    (half duplex) or answers NAK (full duplex). ``slow``: so many polls get EOT before each
     reply. ``delay``: polls get EOT until so many seconds after the command. ``noise``: the share
     of its characters that is damaged. ``status``: STS and EXT STS of every reply.
     """
@@ -134,7 +134,7 @@ class SimulatedPlc:
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
                  clock: Callable[[], float], seed: int = 0) -> None:
         self.station = station
-        self.via: int | None = None  # the gateway that it is behind
+        self.via: int | None = None  # the gateway to it
         self.table = table
         self.faults = InjectedFaults()
         self.processor = EmulatedProcessor(table.plc_type)
@@ -146,7 +146,7 @@ class SimulatedPlc:
         self._movers: list[_Mover] = []
         self._random = random.Random(seed + station)
         self.ladder: Ladder | None = None
-        # Taken while the program runs on, where more than one thread lets it.
+        # Held while the program advances, which more than one thread may cause.
         self.lock: AbstractContextManager[object] = nullcontext()
         self._saved: DataTable | None = None
         self._polls_to_refuse = 0
@@ -158,7 +158,7 @@ class SimulatedPlc:
         return self.slave.counters
 
     def be_full_duplex(self) -> None:
-        """Say from now on that the port is a full-duplex one."""
+        """Answer from now on as a PLC with a full-duplex port."""
         self.processor.is_full_duplex = True
         self._server = self._make_server()
 
@@ -168,7 +168,7 @@ class SimulatedPlc:
             self.counters, processor.plc_type, is_full_duplex=processor.is_full_duplex))
 
     def handle(self, symbol: Symbol) -> bytes:
-        """Answer a symbol, as well as the faults allow."""
+        """Answer a symbol, with the effects of the faults."""
         if self.faults.silent or (self.faults.full and isinstance(symbol, Frame)):
             return b''
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
@@ -183,7 +183,7 @@ class SimulatedPlc:
         return bool(self.processor.mode.is_running) and not self.processor.is_faulted
 
     def run_ladder(self, ladder: Ladder) -> None:
-        """Let a program run from now on; what is in the tables now is what a download restores."""
+        """Run a program from now on; a download restores the present words of the tables."""
         self.ladder = ladder
         self._saved = copy.deepcopy(self.table)
         self._set_ladder()
@@ -197,13 +197,13 @@ class SimulatedPlc:
             self._set_ladder()
 
     def download(self) -> None:
-        """Take a program: its saved words come back, and it stands in PROGRAM."""
+        """Download the program: its saved words come back, and the mode is PROGRAM."""
         self.set_mode(Setting.PROGRAM)
         if self._saved is not None:
             self.table.restore(self._saved)
 
     def cycle_power(self) -> None:
-        """Lose power and come back: words stay, what is held for the line does not."""
+        """Switch power off and on: words stay, waiting messages are lost."""
         self.advance()
         self.slave.reset()
         self._set_ladder()
@@ -220,7 +220,7 @@ class SimulatedPlc:
             self.ladder.stand_still()
 
     def advance(self) -> None:
-        """Let happen what is due by now, while the program runs."""
+        """Make all changes that are due by now, while the program runs."""
         if not self.is_running:
             return
         with self.lock:
@@ -231,7 +231,7 @@ class SimulatedPlc:
                 self.ladder.advance(now)
 
     def move(self, mover: _Mover) -> None:
-        """Let values change from now on."""
+        """Change values from now on."""
         mover.next_time = self._clock() + mover.period
         self._movers.append(mover)
 
@@ -262,14 +262,14 @@ class SimulatedPlc:
         return self.outbox.popleft() if is_free else None
 
     def next_due(self) -> float | None:
-        """Return None: we send when we are told to, not by the clock."""
+        """Return None: messages are sent on command only."""
         return None
 
     def expire(self, now: float) -> None:
-        """Do nothing: what is to be sent waits for ever."""
+        """Do nothing: messages wait for ever."""
 
     def damaged(self, data: bytes) -> bytes:
-        """Return what arrives of ``data`` at the other end."""
+        """Return ``data`` as they arrive at the other end."""
         if not self.faults.noise:
             return data
         return bytes(byte ^ 1 << self._random.randrange(8)

@@ -15,8 +15,8 @@
 """
 Show what a running bridge does, from its topics alone.
 
-That is: values and their ages, stations, the load of the line, writes and counters. On a
-terminal the picture is renewed in place, and its last line names the keys. Elsewhere, or with
+It shows values and their ages, stations, the load of the line, writes and counters. On a terminal
+the picture is renewed in place, and its last line names the keys. Elsewhere, or with
 --once, plain text is printed.
 
 A value is fresh, or STALE when it is older than its topic promises; topics that are published on
@@ -55,7 +55,7 @@ _COMPLETION = 3.0
 
 _PROGRESS_PERIOD = 2.0
 
-# What draws everything anew on a terminal, as when something else has written there.
+# This key draws the whole picture again, for when another program has written to the terminal.
 _CONTROL_L = 12
 
 _SECTION_KEYS = {ord('l'): 'link', ord('s'): 'stations', ord('v'): 'values',
@@ -89,7 +89,7 @@ class _Ending:
         return self._signalled or time.monotonic() >= self._end
 
     def limit(self, seconds: float) -> None:
-        """Let the time be up in so many seconds."""
+        """End after so many seconds."""
         self._end = time.monotonic() + seconds
 
     def _signal(self, number: int, frame: FrameType | None) -> None:
@@ -109,7 +109,7 @@ class _Screen:
         window.nodelay(True)
         try:
             curses.curs_set(0)
-        except curses.error:  # a terminal that cannot hide it
+        except curses.error:  # a terminal that cannot hide the cursor
             pass
         if curses.has_colors() and 'NO_COLOR' not in os.environ:
             curses.use_default_colors()
@@ -126,7 +126,7 @@ class _Screen:
         return self._window.getmaxyx()[1] - 1  # writing into the last corner is an error
 
     def show(self, lines: Sequence[TextLine]) -> None:
-        """Show what fits, from the line that has been scrolled to, and the keys below it."""
+        """Show as many lines as fit, from the first one after scrolling, and the keys below."""
         height = self._window.getmaxyx()[0] - 1
         self._sections = {line.section: row for row, line in enumerate(lines) if line.section}
         self._top = max(0, min(self._top, len(lines) - height))
@@ -286,7 +286,7 @@ def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
 
 
 def _toggle(screen: _Screen, watch: NodeWatch) -> None:
-    """Ask for a bit and for a yes; then write its other value."""
+    """Ask for a bit and for a confirmation; then write its other value."""
     topic = screen.ask('toggle which topic (one bit)? ')
     if not topic:
         return
@@ -301,7 +301,7 @@ def _toggle(screen: _Screen, watch: NodeWatch) -> None:
 
 
 def _complete(watch: NodeWatch, has_ended: _Ending) -> None:
-    """Give the values that have been promised some time to come."""
+    """Wait some time for the values that topics have promised."""
     _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the monitor hears: a ROS node that subscribes to all that a bridge publishes."""
+"""The node of the monitor, which subscribes to all topics of a bridge."""
 
 from __future__ import annotations
 
@@ -76,14 +76,13 @@ class NodeWatch:
     """
     Listen to the node with the full name ``name`` until it is closed.
 
-    Nothing is asked of the publishers beyond what every bridge offers, no service is called, and
-    nothing is published unless ``may_write``: the bridge does not notice. Ages of topics that
-    promise nothing count from the publisher's time stamp, so for them the clocks of the hosts
-    have to agree.
+    The bridge is not affected: subscriptions ask for no more than every bridge offers, no service
+    is called, and nothing is published unless ``may_write``. Ages of topics without a promised
+    time count from the publisher's time stamp, so for them the clocks of the hosts have to agree.
     """
 
     def __init__(self, name: str, ros_arguments: list[str], may_write: bool = False) -> None:
-        # Signals are for whoever shows the picture; rclpy's handlers would end us in between.
+        # The caller handles signals; rclpy's handlers would end this node too early.
         rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
         self.name = name
         self.may_write = may_write

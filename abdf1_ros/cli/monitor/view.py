@@ -15,8 +15,8 @@
 """
 What is known of a running bridge, and the lines of text that show it.
 
-Nothing here knows ROS or a terminal: ``monitor_node`` fills a ``Snapshot``, ``monitor`` prints
-the lines. Everything that comes from topics is made printable here, at the last door.
+This module knows neither ROS nor a terminal: ``monitor.node`` fills a ``Snapshot``, and
+``monitor.command`` prints the lines. All text from topics is made printable here.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ import textwrap
 
 from abdf1_ros.text import printable, value_text
 
-# Seconds without diagnostics from which on this is said; by default they come every second.
+# After so many seconds without diagnostics the picture says so; by default they come every second.
 _SILENCE = 3.0
 
-# Columns that names and addresses get at most; the values have what is left of the line.
+# Characters that names and addresses get at most; the values have the rest of the line.
 _NAME_WIDTH = 30
 _ADDRESS_WIDTH = 12
 _STATE_WIDTH = 16
@@ -81,7 +81,7 @@ class Reading:
     promised: float | None = None
 
     def state(self, now: float) -> tuple[str, Style]:
-        """Return in a word what the values are worth at the clock value ``now`` (s)."""
+        """Return the state of the values in a word, at the clock value ``now`` (s)."""
         if self.values is None:
             return 'no value', Style.BAD
         if self.promised is None:
@@ -188,7 +188,7 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
     longest = min(_NAME_WIDTH, width // 3)
     names = [_cut(printable(reading.topic), longest) for reading in snapshot.readings]
     name_width = max(map(len, ['topic', *names]))
-    # The value goes last: on a narrow terminal the address leaves first, then the state is short.
+    # The value is kept longest: a narrow terminal first drops the address, then cuts the state.
     left = width - name_width - _AGE_WIDTH - 6
     state_width = _STATE_WIDTH if left - _STATE_WIDTH - 2 >= _GOOD_VALUE_WIDTH else _SHORT_STATE
     left -= state_width + 2

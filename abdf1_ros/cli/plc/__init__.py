@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What ``plc`` does: single questions to the PLCs of a line, asked by people.
+The command ``plc``: single reads, writes and questions to the PLCs of a line.
 
 ``options`` are those of the command line and ``line`` makes settings of them; ``session`` is an
 open line, ``data`` reads and writes, ``presence`` asks who is there, ``detect`` finds out

@@ -15,8 +15,8 @@
 """
 Read, write and look for PLCs on a DF1 line from the command line.
 
-It is for commissioning: it has the port for itself, so stop the node first, and on a
-half-duplex line it is the master, so there must be no other. It needs no ROS.
+It is for commissioning. No other program may have the port, so stop the node first. On a
+half-duplex line it is the master, so there must be no other master. It needs no ROS.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _mappings(options: argparse.Namespace, session: Session, command: Command,
               addresses: Sequence[str], length: int | str) -> list[Mapping]:
-    """Return the mappings of addresses, after asking the PLC what it is where need be."""
+    """Return the mappings of addresses; where needed, ask the PLC for its type first."""
     kind = {'PLC_Type': options.plc_type} if options.plc_type \
         else data.ask_kind(session, options.station)
     given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
@@ -112,7 +112,7 @@ def _mappings(options: argparse.Namespace, session: Session, command: Command,
 
 def _failed(session: Session, station: int, error: Abdf1Error,
             plc_type: str | None = None) -> int:
-    """Say why a station has not done what it should; return the exit status."""
+    """Tell why a request to a station has failed; return the exit status."""
     if isinstance(error, ConfigurationError | PortLost):
         raise error
     _complain(f'station {station}: {error}')
@@ -136,7 +136,7 @@ def _read(options: argparse.Namespace) -> int:
                 values = data.read(session, mapping)
             except Abdf1Error as error:
                 status = _failed(session, mapping.station, error, plc_type)
-                plc_type = None  # told once is enough
+                plc_type = None  # once is enough
             else:
                 _print_values(mapping, values)
     return status
@@ -175,7 +175,7 @@ def _write(options: argparse.Namespace) -> int:
 
 
 def _is_confirmed(session: Session, writing: data.Writing) -> bool:
-    """Show what would happen; ask, where there is somebody to answer."""
+    """Show what will be written; ask for a confirmation where there is a terminal."""
     mapping = writing.mapping
     try:
         print('now:')
@@ -253,7 +253,7 @@ def _ping(options: argparse.Namespace) -> int:
                 else:
                     print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
         except KeyboardInterrupt:
-            pass  # the one that was under way does not count
+            pass  # the one under way does not count
     text = f'{failures + len(times)} sent, {len(times)} answered'
     if times:
         text += (f'; shortest {min(times) * 1000:.1f}, mean '
@@ -293,7 +293,7 @@ def _detect(options: argparse.Namespace) -> int:
 
 
 def _found(options: argparse.Namespace, network: Network) -> detect.Found | None:
-    """Return the settings that work, after saying what was heard where none does."""
+    """Return the settings that work; where none do, tell what was received."""
     progress = Progress()
     bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
         else detect.BAUD_RATES
@@ -338,7 +338,7 @@ def _init(options: argparse.Namespace) -> int:
 
 
 def _only_port() -> str:
-    """Return the port where there is just one; raises ConfigurationError."""
+    """Return the only port; ConfigurationError where there is none or more than one."""
     ports = serial_ports()
     if len(ports) == 1:
         print(f'port: {ports[0].device} {ports[0].adapter}'.rstrip())

@@ -39,7 +39,7 @@ from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.text import value_text
 
-# What stands on the command line for a column of a map CSV.
+# The argument of the command line for each column of a map CSV.
 _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
               'Word_Order': '--word-order', 'Access': '--access', 'Processor': '--processor',
               'Via': '--via'}
@@ -71,7 +71,7 @@ def _in_arguments(fault: CellFault, row: Row) -> Problem:
     if fault.is_superfluous:
         text += f'; leave {argument} out'
     if fault.column == 'Length':
-        if fault.message is not None:  # the numbered text alone says what is too long
+        if fault.message is not None:  # the numbered text does not name the argument
             text = f'{row.get("Length")} elements do not fit at {row.get("Address")}; {text}'
         if row.get('Command') != Command.READ.value:  # there it is how many values are given
             argument = 'VALUE'
@@ -148,7 +148,7 @@ class Writing:
 
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
-    """Return what texts stand for, whole numbers also as 0x and 0b; FormatError for others."""
+    """Return the values of texts, whole numbers also as 0x and 0b; FormatError for others."""
     if mapping.type is ValueType.STRING:
         if len(texts) != 1:
             raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Find out the settings of a line by trying them until something answers."""
+"""Find the settings of a line by trying them until a station answers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CHECKS = tuple(check.value for check in (Checksum.CRC, Checksum.BCC))
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """Settings that may be those of the line."""
+    """Settings to try on a line."""
 
     baud: int
     mode: str
@@ -63,8 +63,8 @@ class Search:
     """
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
-    ``show`` is told what is being tried. What was heard without being understood is in
-    ``traces``.
+    ``show`` gets a text about the settings being tried. ``traces`` has texts about bytes that came
+    without an answer.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
@@ -85,8 +85,8 @@ class Search:
         return None
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
-        """Try one speed and discipline; where nobody is heard, the check does not matter."""
-        # Most full-duplex ports take whatever they get; one that compares is mostly 0 or 1.
+        """Try one speed and duplex; without any answer the second check is not tried."""
+        # Most full-duplex ports take messages to any station; of the others most have 0 or 1.
         stations = self._stations[:2] if mode == MODES['full'] else self._stations
         for check in checks:
             heard = []
@@ -103,7 +103,7 @@ class Search:
 
     def _look(self, settings: LineSettings, stations: Sequence[int],
               is_first: bool) -> Iterator[Presence]:
-        """Yield what each station is; one that only seems to take commands does not."""
+        """Yield the presence of each station; ignore one that only seems to take commands."""
         network = replace(self._network, baud=settings.baud, mode=settings.mode,
                           error_code=settings.check)
         # One that is not absent is asked with ENQ when it is silent, which any full-duplex port

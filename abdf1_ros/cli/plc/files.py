@@ -44,7 +44,7 @@ _FIRST_OF_ANY_TYPE = 3
 # Slots of an SLC that are tried for inputs and outputs: slot 0 is the processor's own.
 _SLOTS_TRIED = 8
 
-# Of the rows that are drafted (ms): all files of a PLC at once are much for a slow line.
+# Period of the proposed rows (ms): reading all files of a PLC is a lot for a slow line.
 _DRAFT_PERIOD = 5000
 
 _MOST_ELEMENTS = {PlcType.PLC5: 1000, PlcType.SLC: 256}
@@ -57,8 +57,8 @@ class DataFile:
     """
     A file with its elements.
 
-    There are 0 of them in the images of inputs and outputs, which are addressed by rack or slot
-    and cannot be counted up.
+    The number is 0 for the images of inputs and outputs, which are addressed by rack or slot and
+    cannot be counted.
     """
 
     type: FileType  # noqa: A003
@@ -73,9 +73,9 @@ class DataFile:
 def find_files(session: Session, station: int, plc_type: PlcType, numbers: Sequence[int],
                show: Callable[[str], None] = lambda text: None) -> Iterator[DataFile]:
     """
-    Yield the files among ``numbers``; ``show`` is told what is being asked.
+    Yield the files among ``numbers``; ``show`` gets a text about the file being asked for.
 
-    Raises LinkError where nobody answers any more.
+    Raises LinkError where the station does not answer any more.
     """
     for number in numbers:
         show(f'file {number}')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The first net.csv and map.csv of a line, made from what its PLCs say of themselves."""
+"""The first net.csv and map.csv of a line, made from the replies of its PLCs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.errors import Problem
 from abdf1_ros.settings.network import Network
 
-_TIMEOUT = 300  # ms; the default of a net CSV is long for a line where somebody waits
+_TIMEOUT = 300  # ms; the default of a net CSV is long for a person who waits
 
 _HEAD = """\
 # One row a mapping: a PLC address that becomes a topic. A row that begins with # is not used:
@@ -78,7 +78,7 @@ def net_csv(network: Network, found: Found) -> str:
 
 
 def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
-    """Yield a row that works and some that only have to be uncommented, for each station."""
+    """Yield a row that works and some rows as comments, for each station."""
     for presence in stations:
         number, identity = presence.station, presence.identity
         family = identity.plc_type if identity else None
@@ -88,7 +88,7 @@ def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
                   f'# words_{number},Read,N7:0,{number},SLC,,10,1000\n'
             continue
         tail = f'{number},{family.value},{processor_of(identity)}'
-        # The status file is there in every processor of these families; N7 need not be.
+        # Every processor of these families has the status file; N7 may be missing.
         yield f'status_{number},Read,S:0,{tail},4,1000\n'
         yield f'# words_{number},Read,N7:0,{tail},10,1000\n'
         yield f'# interlocks_{number},Read,B3:0/0,{tail},8,250\n'

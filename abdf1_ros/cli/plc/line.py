@@ -23,7 +23,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.settings.network import load_network, make_network, Network
 
-# Somebody waits in front of the screen: a Timeout of 1000 ms, the default of a net CSV, is long.
+# A Timeout of 1000 ms, the default of a net CSV, is long for a person who waits.
 DEFAULTS = Network(timeout=300)
 
 MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer'}

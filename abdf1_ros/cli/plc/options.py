@@ -35,7 +35,7 @@ DEFAULT_STATION = 1
 
 @dataclass(frozen=True, slots=True)
 class LineDefaults:
-    """What a command does about its line where no option says it, in words."""
+    """The defaults of a command about its line, in words for --help."""
 
     baud: str = str(DEFAULTS.baud)
     check: str = DEFAULTS.error_code
@@ -49,7 +49,7 @@ RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'bin': Radix.BINARY}
 _TRIED = 'all are tried'
 _DETECT_DEFAULTS = LineDefaults(
     baud=f'{_TRIED}, but none at a URL', check=_TRIED, duplex=_TRIED,
-    timeout='200',  # most of what is tried does not answer
+    timeout='200',  # most attempts get no answer
     net='port, parity and own station')
 
 
@@ -166,7 +166,7 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
 
 def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
                      duplex: bool = True) -> None:
-    """Add what says how to reach the line; without ``duplex`` the command knows that itself."""
+    """Add the options of the line; ``duplex`` is left out where the command knows it."""
     group = parser.add_argument_group('line')
     group.add_argument('--port', metavar='NAME',
                        help='serial port, or URL such as socket://192.168.0.9:4001')

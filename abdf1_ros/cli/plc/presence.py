@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Who is there: diagnostic status, echo, and a scan of many stations."""
+"""Which stations are there: diagnostic status, echo, and a scan of many stations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from abdf1_ros.settings.network import Network
 
 _ECHO = bytes(range(1, 17))
 
-# A half-duplex station says nothing at all when it is not asked rightly; so these come first.
+# A half-duplex station does not answer at all when a setting is wrong; so these come first.
 SILENCE = ('not one character came: station (a PLC-5 shows its own in octal), check or duplex '
            'wrong? Then cable, port, power.')
 
@@ -37,10 +37,10 @@ SILENCE = ('not one character came: station (a PLC-5 shows its own in octal), ch
 @dataclass(frozen=True, slots=True)
 class Presence:
     """
-    What a station has said of itself, and after how many seconds.
+    The identity of a station, and the seconds until its reply.
 
-    Without an ``identity`` ``error`` says why; ``is_there`` tells whether it has been heard at
-    all, ``takes_commands`` whether it understands our frames.
+    Without an ``identity`` ``error`` says why; ``is_there`` tells whether the station has sent
+    anything, ``takes_commands`` whether it understands our frames.
     """
 
     station: int
@@ -56,7 +56,7 @@ class Presence:
 
 
 def look_at(session: Session, station: int) -> Presence:
-    """Ask a station who it is; raises PortLost."""
+    """Ask a station for its identity; raises PortLost."""
     started = time.monotonic()
     identity, error = None, None
     try:
@@ -85,7 +85,8 @@ def understands(session: Session, station: int) -> bool:
     """
     Tell whether a station sends random data back, or refuses to; raises PortLost.
 
-    Nothing else is proof: an echo, or somebody who acknowledges whatever comes, does not do it.
+    Nothing else proves it: an echo of the line, or a device that acknowledges everything, cannot
+    do this.
     """
     try:
         session.ask(station, echo(os.urandom(len(_ECHO))))
@@ -106,7 +107,7 @@ def ping(session: Session, station: int) -> float:
 
 
 def describe(presence: Presence) -> list[str]:
-    """Return all that a station has said, line by line."""
+    """Return all about a station, line by line."""
     identity = presence.identity
     if identity is None:
         return [f'station {presence.station} {presence}']
@@ -132,7 +133,7 @@ def hint(session: Session, error: Abdf1Error) -> str:
 
 
 def type_hint(session: Session, station: int, error: Abdf1Error, plc_type: str | None) -> str:
-    """Return what a PLC is that refuses commands of the type that was given, and is another."""
+    """Return the type of a PLC that refuses commands because another type was given."""
     if plc_type is None or not isinstance(error, RemoteError):
         return ''
     try:

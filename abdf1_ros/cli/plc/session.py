@@ -34,7 +34,7 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 
-# So often (s) a wait looks whether there still is a port.
+# While waiting, check so often (s) that the port is still open.
 _GLANCE = 0.2
 
 _Result = TypeVar('_Result')
@@ -42,9 +42,9 @@ _Result = TypeVar('_Result')
 
 def opened(network: Network) -> Callable[[], Port]:
     """
-    Open the port of ``network`` and return what hands it out; after that, it opens it again.
+    Open the port of ``network``; return a function that returns it, and later opens it again.
 
-    So a port that is not there is an OSError here, not a state of a thread.
+    So a port that does not exist is an OSError here, not a state of a thread.
     """
     settings = PortSettings.of(network)
     try:

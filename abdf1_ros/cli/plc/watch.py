@@ -39,10 +39,10 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.text import printable
 
-# So often (s) what is shown is made anew where nothing has come: ages and errors.
+# Ages and errors are shown again so often (s), also without new values.
 _GLANCE = 0.25
 
-# Values that came faster than they could be shown; the older ones are dropped.
+# Values that wait to be shown; when more come, the older ones are dropped.
 _MAX_NEWS = 1000
 
 # So long (s) a value that has changed is marked.
@@ -97,7 +97,7 @@ class Watch:
         except KeyboardInterrupt:
             pass
         finally:
-            # What the end of the line does to the points is not to be shown.
+            # The errors that the end of the line causes are not shown.
             failed = sum(self._driver.points[mapping].error is not None
                          for mapping in self._mappings)
             self._link.stop()
@@ -110,13 +110,13 @@ class Watch:
         self._has_news.set()
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Do nothing: the reason is looked up with the point."""
+        """Do nothing: the point has the reason."""
 
     def written(self, result: WriteResult) -> None:
         """Do nothing: nothing is written."""
 
     def happened(self, event: Event) -> None:
-        """Do nothing: what matters is in the reason of a failed read."""
+        """Do nothing: the reason of a failed read tells enough."""
 
     def station_changed(self, station: Station) -> None:
         """Show the news at once."""
@@ -145,7 +145,7 @@ class Watch:
             self._print(changed)
 
     def _print(self, changed: Sequence[tuple[Mapping, str]]) -> None:
-        """Print a line for everything that is not what was printed last."""
+        """Print a line for each mapping that has changed since the last one."""
         for mapping, text in changed:
             if self._shown.get(mapping) != text:
                 self._shown[mapping] = text
@@ -153,7 +153,7 @@ class Watch:
                 print(f'{time}  {mapping.address}  {text}', flush=True)
 
     def _note_changes(self, news: Sequence[tuple[Mapping, str]]) -> None:
-        """Keep what is to be shown, and since when it is another value than before."""
+        """Keep the text to show, and the time of its last change."""
         for mapping, text in news:
             if self._shown.get(mapping, text) != text:
                 self._changed[mapping] = self._driver.machine.now
