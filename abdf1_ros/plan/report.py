@@ -142,13 +142,41 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
     return Report(network, mappings, tuple(blocks), default_period, response_time)
 
 
-def setting_remarks(network: Network, mappings: Iterable[Mapping]) -> Iterator[Remark]:
+def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[Remark]:
     """Find valid, but unusual settings in both files."""
     for text in network_remarks(network):
         yield Remark(RemarkKind.SETTING, text)
     for mapping in mappings:
         for text in mapping.remarks:
             yield Remark(RemarkKind.SETTING, text, mapping.station)
+    yield from _overlap_remarks(mappings)
+
+
+def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
+    """Find Write rows over what Read rows map: a message sets what the PLC is to tell."""
+    read: defaultdict[tuple[object, ...], list[Mapping]] = defaultdict(list)
+    for mapping in mappings:
+        if mapping.command is Command.READ:
+            for place in _places(mapping):
+                read[place].append(mapping)
+    for mapping in mappings:
+        if mapping.command is not Command.WRITE:
+            continue
+        others = {id(other): other for place in _places(mapping) for other in read[place]
+                  if mapping.shares_words(other)}
+        if others:
+            yield Remark(RemarkKind.SETTING, (
+                f'line {mapping.line} of the map: {mapping.tag} writes {mapping.address}, which '
+                f'{_tags(tuple(others.values()))} reads, so a message sets what the PLC is to '
+                'tell; ReadWrite in one row if that is meant, otherwise another address'),
+                mapping.station)
+
+
+def _places(mapping: Mapping) -> Iterator[tuple[object, ...]]:
+    """Yield the words of a mapping, each with station and area."""
+    address = mapping.address
+    for number in range(mapping.codec.words):
+        yield mapping.station, address.area, address.offset + number
 
 
 def _row_order(block: Block) -> tuple[int, int]:

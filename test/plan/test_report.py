@@ -49,6 +49,21 @@ def test_settings_that_are_odd_come_first_with_their_stations() -> None:
         Remark(RemarkKind.SETTING, 'map.csv:2:8 (Max): too much', 3)]
 
 
+def test_write_over_what_another_row_reads_is_odd() -> None:
+    bits = make_mapping('B3:2/0', tag='il', length=3)
+    odd = report_of(
+        bits, make_mapping('B3:2/2', 'Write', tag='rip', item=4)).remarks()
+    assert odd == [Remark(RemarkKind.SETTING, (
+        'line 5 of the map: rip writes B3:2/2, which il reads, so a message sets what the PLC is '
+        'to tell; ReadWrite in one row if that is meant, otherwise another address'), 1)]
+    assert report_of(bits, make_mapping('B3:1', 'Write', length=2)).remarks()
+    # Other bits, other stations and all of them, and rows that say that they do both.
+    for address, command, station in (
+            ('B3:2/3', 'Write', 1), ('B3:3', 'Write', 1), ('B3:2/0', 'ReadWrite', 1),
+            ('B3:2/0', 'Write', 2), ('B3:2/0', 'Write', 255)):
+        assert report_of(bits, make_mapping(address, command, station=station)).remarks() == []
+
+
 def texts(report: Report, kind: RemarkKind) -> list[str]:
     return [remark.text for remark in report.remarks() if remark.kind is kind]
 
