@@ -38,6 +38,15 @@ from abdf1_ros.settings.mapping import Mapping
 # A stopped executor does not wake the link, so the link looks by itself every so many seconds.
 _GLANCE = 0.1
 
+# So often in a row a PLC has not answered that is taken as out of reach, though its station is
+# active: that of a gateway is.
+_FAILURES = 2
+
+# Then it is left alone for so long (s) at least; others on the line of a gateway have that for so
+# many times as long as the last attempt took: an eighth is left to the silent.
+_LEAST_PAUSE = 1.0
+_SHARE_OF_OTHERS = 7
+
 
 class Urgency(Enum):
     """What goes before all messages, in this order (rule 11)."""
@@ -66,6 +75,19 @@ class OwnWrite:
         return self.write.mapping.station
 
 
+@dataclass(slots=True)
+class _Reach:
+    """How often in a row a PLC has not answered, and until when it is left alone (clock, s)."""
+
+    failures: int = 0
+    pause_end: float = -math.inf
+
+    @property
+    def is_lost(self) -> bool:
+        """Tell whether it is out of reach."""
+        return self.failures >= _FAILURES
+
+
 class Interlocks:
     """
     All heartbeats and fallbacks of a line.
@@ -90,6 +112,7 @@ class Interlocks:
         self._messages: dict[str, float] = {}
         self._executor = -math.inf
         self._is_running: dict[int, bool] = {}
+        self._reach: dict[int, _Reach] = {}
         self._has_begun = False
         self._is_ending = False
         self._are_all_due = False
@@ -186,13 +209,19 @@ class Interlocks:
         self.expire(now)
         return self._zero(now, busy) or self._fallback(now, busy) or self._beat(now, busy)
 
-    def _can_go(self, station: int, busy: Container[int]) -> bool:
+    def _can_go(self, station: int, now: float, busy: Container[int]) -> bool:
         """Tell whether a station may be written to: inactive ones are not probed (rule 4)."""
-        return station not in busy and self._stations[station].active
+        return station not in busy and self._stations[station].active \
+            and now >= self._pause_end(station)
+
+    def _pause_end(self, station: int) -> float:
+        """Return until when a PLC that does not answer is left alone (clock value in s)."""
+        reach = self._reach.get(station)
+        return reach.pause_end if reach else -math.inf
 
     def _zero(self, now: float, busy: Container[int]) -> OwnWrite | None:
         for row in self.heartbeats:
-            if self._can_go(row.mapping.station, busy):
+            if self._can_go(row.mapping.station, now, busy):
                 self._judge(row, now)
                 if row.wants_zero(row.is_held, now):
                     return OwnWrite(Urgency.ZERO, row, row.take(now, is_zero=True))
@@ -218,7 +247,7 @@ class Interlocks:
         youngest = self._writes.youngest()
         for row in self.fallbacks:
             mapping = row.mapping
-            if mapping.serves or not self._can_go(mapping.station, busy) \
+            if mapping.serves or not self._can_go(mapping.station, now, busy) \
                     or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
                 continue
             write = row.take(now)
@@ -231,8 +260,8 @@ class Interlocks:
 
     def _beat(self, now: float, busy: Container[int]) -> OwnWrite | None:
         for row in self.heartbeats:
-            if not self._can_go(row.mapping.station, busy) or not row.wants_beat(now) \
-                    or row.is_held:
+            if not self._can_go(row.mapping.station, now, busy) \
+                    or not row.wants_beat(now) or row.is_held:
                 continue
             if row.reason:
                 row.put_off(now + _GLANCE)
@@ -251,10 +280,30 @@ class Interlocks:
     def ended(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
         """Take note how one of our writes ended."""
         row = own.row
+        self._judge_reach(own, outcome, now)
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, own.write, outcome, now)
+
+    def _judge_reach(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
+        """
+        Leave a PLC that does not answer alone for a while, or it would take the whole line.
+
+        When one answers again that is behind a gateway, it is a first contact, as its station was
+        active all the time (rules 2, 8).
+        """
+        is_behind_gateway = own.row.mapping.via is not None
+        if outcome is Outcome.UNKNOWN:
+            reach = self._reach.setdefault(own.station, _Reach())
+            reach.failures += 1
+            if reach.is_lost:
+                share = _SHARE_OF_OTHERS * (now - own.write.requested) * is_behind_gateway
+                reach.pause_end = now + max(_LEAST_PAUSE, share)
+        elif outcome is not Outcome.NOT_SENT:
+            reach = self._reach.pop(own.station, _Reach())
+            if reach.is_lost and is_behind_gateway:
+                self.contact(own.station, now)
 
     def _fallback_ended(self, row: FallbackRow, write: Write, outcome: Outcome,
                         now: float) -> None:
@@ -294,10 +343,12 @@ class Interlocks:
         youngest = self._writes.youngest()
         for fallback in self.fallbacks:
             if not fallback.mapping.serves and self._stations[fallback.mapping.station].active:
-                yield fallback.next_due(youngest.get(id(fallback.mapping), -math.inf))
+                yield max(fallback.next_due(youngest.get(id(fallback.mapping), -math.inf)),
+                          self._pause_end(fallback.mapping.station))
         for row in self.heartbeats:
             if self._stations[row.mapping.station].active:
-                yield row.next_due(self._messages)
+                yield max(row.next_due(self._messages),
+                          self._pause_end(row.mapping.station))
 
     def _heartbeats_of(self, station: int) -> Iterable[HeartbeatRow]:
         return (row for row in self.heartbeats if row.mapping.station == station)

@@ -16,11 +16,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
@@ -163,3 +168,89 @@ def test_processors_behind_a_gateway_tell_what_they_are() -> None:
     assert 'PLC-5' in known(FIRST).processor
     assert '5/03' in known(SECOND).processor
     assert '1770-KF3' in known(GATEWAY).processor
+
+
+# heartbeats and fallbacks; the rules have the numbers of docs/heartbeats.md
+
+
+class Interlocked(DriverBench):
+    """Two PLCs behind a gateway, each with a heartbeat and a command; what reaches the first."""
+
+    def __init__(self, polling: str) -> None:
+        kinds = {FIRST: 'PLC5', SECOND: 'SLC'}
+        beats = [make_mapping('N10:0', 'Heartbeat', station=number, via=GATEWAY, plc=kind,
+                              tag=f'beat{number}', period=300, heartbeat=Heartbeat())
+                 for number, kind in kinds.items()]
+        self.commands = [make_mapping('N7:1', 'Write', station=number, via=GATEWAY, plc=kind,
+                                      tag=f'speed{number}', fallback=Fallback((7,), 1000))
+                         for number, kind in kinds.items()]
+        super().__init__([*beats, *self.commands], start=False, network=Network(
+            baud=115200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
+            polling=polling))
+        self.plcs = [simulated_plc(number, kind, self.clock, ('N7:0', 10), ('N10:0', 4))
+                     for number, kind in kinds.items()]
+        self.gateway = SimulatedGateway(GATEWAY, self.plcs, Checksum.CRC)
+        self.connect(self.gateway)
+        self.seen: list[list[tuple[float, int]]] = [[], []]
+        for number, plc in enumerate(self.plcs):
+            plc.serve = partial(self._serve, number, plc.serve)  # type: ignore[method-assign]
+        self._tick()
+        self.open()
+
+    def _tick(self) -> None:
+        """Let the executor run."""
+        self.driver.interlocks.executor_ran(self.clock())
+        self.at(self.clock() + 0.1, self._tick)
+
+    def _serve(self, number: int, serve: Callable[[Packet], Packet], command: Packet) -> Packet:
+        """Keep how a heartbeat changes."""
+        reply, seen = serve(command), self.seen[number]
+        value = int.from_bytes(stored(self.plcs[number], 'N10:0'), 'little')
+        if not seen or seen[-1][1] != value:
+            seen.append((self.clock(), value))
+        return reply
+
+    def beats(self, number: int, since: float) -> list[int]:
+        """Return the heartbeats that came to a PLC, 0 for the first."""
+        return [value for when, value in self.seen[number] if when >= since]
+
+
+@pytest.mark.parametrize('polling', POLLING)
+@pytest.mark.parametrize('is_told', [True, False])  # by the gateway; otherwise nothing comes
+def test_rule_11_plc_out_of_reach_does_not_take_the_line_from_the_other(
+        is_told: bool, polling: str) -> None:
+    bench = Interlocked(polling)
+    bench.run(1.0)
+    for command in bench.commands:
+        bench.write(command, [5])
+    bench.run(0.1)
+    if is_told:
+        bench.plcs[1].faults.silent = True
+    else:
+        bench.plcs[1].serve = lambda command: replace(  # type: ignore[method-assign]
+            command.reply(), tns=command.tns ^ 0x8000)
+    begun = bench.clock()
+    bench.run(20.0)
+    changes = [when for when, _ in bench.seen[0] if when >= begun]
+    # Two failures, of a command timeout each, may come together.
+    assert max(after - before for before, after in zip(changes, changes[1:], strict=False)) < 1.4
+    assert len(changes) > (60 if is_told else 30)
+    assert stored(bench.plcs[0], 'N7:1') == b'\7\0'
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_rules_2_and_8_plc_within_reach_again_is_a_first_contact(polling: str) -> None:
+    bench = Interlocked(polling)
+    bench.run(3.0)
+    bench.plcs[1].faults.silent = True
+    bench.run(4.0)
+    store(bench.plcs[1], 'N7:1', [800])  # as from a memory module
+    bench.plcs[1].faults.silent = False
+    since = bench.clock()
+    bench.run(3.0)
+    assert stored(bench.plcs[1], 'N7:1') == b'\7\0'
+    beats = bench.beats(1, since)
+    assert beats[beats.index(0):][:3] == [0, 1, 2]
+    assert 0 not in bench.beats(0, since)  # the other one has been there all the time
+    assert [str(result) for result in bench.listener.results][2:] == [
+        'fallback value written: return']
