@@ -22,11 +22,13 @@ from contextlib import contextmanager
 import errno
 import io
 import os
+from pathlib import Path
+import shutil
 import signal
 import sys
 import time
 from types import FrameType
-from typing import TextIO
+from typing import NoReturn, TextIO
 
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import package_version
@@ -118,6 +120,14 @@ def reason_of(name: str, error: OSError) -> str:
     return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
 
 
+def called(name: str) -> str:
+    """Return how a command of the package is called in this environment."""
+    if shutil.which(name):
+        return name
+    return f'ros2 run abdf1_ros {name}' if shutil.which('ros2') \
+        else f'{Path(sys.executable).name} -m abdf1_ros {name}'
+
+
 def advice_for(number: int | None) -> str:
     """Return advice for an error of the operating system with a serial port, or empty."""
     return _ADVICE.get(number or 0, '')
@@ -135,11 +145,19 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[in
     return '\n'.join(lines)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are two lines: a list of all options hides what is wrong."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        self.exit(2, f'{self.prog}: error: {message}\n"{self.prog} --help" tells what it takes\n')
+
+
 def command_parser(name: str, description: str | None,
                    epilog: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of a command: its texts keep their line ends; it has --version."""
-    parser = argparse.ArgumentParser(
-        prog=name, description=description, epilog=epilog,
+    parser = _Parser(
+        prog=name, description=description, epilog=epilog, allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
     return parser

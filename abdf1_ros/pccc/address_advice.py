@@ -33,8 +33,8 @@ _BIT_AFTER_DOT = re.compile(
     r'(?P<word>[#$]?(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})', re.ASCII)
 _SLC_IO = re.compile(r'[#$]?[IO]\d?[:;]\d+\.\d+(?:/\d+)?', re.ASCII)
 _PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0[0-7]{2}(?:/[0-7]{1,2})?', re.ASCII)
-# The letter O among digits.
-_LETTER_O = re.compile(r'(?<=[:;./0-9O])O(?![A-NP-Z])', re.ASCII)
+# Letters O among digits.
+_LETTERS_O = re.compile(r'(?<=[:;./0-9])O+(?![A-Z])', re.ASCII)
 # The function files of the MicroLogix; they are read by other commands than data files.
 _FUNCTION_FILES = re.compile(
     r'(?P<name>BHI|CS|DAT|DLS|EII|ES|HSC|IOS|LCD|MMI|PTO|PWM|RTC|STI|TPI)\d*(?:[:;/.].*)?',
@@ -48,9 +48,9 @@ def advice(text: str, plc_type: PlcType) -> str | None:
     if plc_type is PlcType.SLC and (match := _FUNCTION_FILES.fullmatch(text)):
         return (f'{match["name"]} is a function file, which is not supported; let the program '
                 'copy what is needed into an N file')
-    if _LETTER_O.search(text):
+    if _LETTERS_O.search(text):
         return ('that is the letter O where a digit should be; write '
-                + _LETTER_O.sub('0', text))
+                + _LETTERS_O.sub(lambda match: '0' * len(match[0]), text))
     if plc_type is PlcType.PLC5 and _SLC_IO.fullmatch(text):
         return ('this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as in '
                 'I:017/12')

@@ -147,8 +147,8 @@ def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[R
     for text in network_remarks(network):
         yield Remark(RemarkKind.SETTING, text)
     for mapping in mappings:
-        for text in mapping.remarks:
-            yield Remark(RemarkKind.SETTING, text, mapping.station)
+        for problem in mapping.remarks:
+            yield Remark(RemarkKind.SETTING, str(problem), mapping.station)
     yield from _overlap_remarks(mappings)
 
 

@@ -22,6 +22,7 @@ from enum import Enum
 import math
 from typing import Any
 
+from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
@@ -107,7 +108,7 @@ class Mapping:
     heartbeat: Heartbeat | None = None
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None
-    remarks: tuple[str, ...] = field(default=(), compare=False)
+    remarks: tuple[Problem, ...] = field(default=(), compare=False)
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False, compare=False)
     dialect: Dialect = field(init=False, repr=False, compare=False)

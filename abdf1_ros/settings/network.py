@@ -159,7 +159,7 @@ class Network:
     polling: str = _net(
         'Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
     # Remarks about the way the file is written.
-    remarks: tuple[str, ...] = field(default=(), compare=False)
+    remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
     @property
     def checksum(self) -> Checksum:
@@ -234,7 +234,7 @@ def _check_port(name: str, value: int | str, where: Place | str) -> None:
             text.isdigit() and (whole_number(text) or 0) >= 1)):
         raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
                              'path such as /dev/ttyUSB0, socket://host:port, or '
-                             'rfc2217://host:port')
+                             'rfc2217://host:port; "plc ports" lists the devices')
 
 
 def _is_url(text: str) -> bool:

@@ -33,7 +33,7 @@ _ACK_SIZE = 2
 
 def network_remarks(network: Network) -> Iterator[str]:
     """Yield what is odd about the settings of a line."""
-    yield from network.remarks
+    yield from map(str, network.remarks)
     if network.data_bits < 8:
         yield (f'Data_Bits {network.data_bits}: DF1 sends bytes of 8 bits; with less the check of '
                'nearly every message fails')
@@ -57,7 +57,7 @@ def _time_remarks(network: Network) -> Iterator[str]:
                f'a reply can come, which is all of Cmd_Timeout {network.cmd_timeout} ms')
 
 
-def row_remarks(row: Row, mapping: Mapping) -> Iterator[str]:
+def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     """Yield what is odd about a row of the map, each with its place."""
     yield from octal_remarks(row)
     yield from _name_remarks(row, mapping)
@@ -82,12 +82,12 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[str]:
                               f'{mapping.type.value} can hold here')
 
 
-def _name_remarks(row: Row, mapping: Mapping) -> Iterator[str]:
+def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     column = 'Topic' if row.get('Topic') else 'Tag'
     text = row.get(column)
     if text.strip('/') != mapping.topic:
         yield _at(row, column, f'{column} "{text}" becomes the topic {mapping.topic}')
 
 
-def _at(row: Row, column: str, text: str) -> str:
-    return str(Problem(row.where(column), text))
+def _at(row: Row, column: str, text: str) -> Problem:
+    return Problem(row.where(column), text)

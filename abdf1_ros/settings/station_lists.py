@@ -42,10 +42,10 @@ def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
     return tuple(dict.fromkeys(stations)), faults
 
 
-def octal_remarks(row: Row) -> Iterator[str]:
+def octal_remarks(row: Row) -> Iterator[Problem]:
     """Yield a remark on a Station with a leading zero: here decimal, on PLC-5 panels octal."""
     text = row.get('Station')
     if _LEADING_ZERO.fullmatch(text) and int(text, 8) != int(text):
-        yield str(Problem(row.where('Station'), (
+        yield Problem(row.where('Station'), (
             f'Station = "{text}" is {int(text)}, decimal; an octal {text} would be '
-            f'{int(text, 8)}')))
+            f'{int(text, 8)}'))

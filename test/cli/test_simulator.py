@@ -344,7 +344,7 @@ def test_port_that_is_not_there_is_an_error_at_once(
 def test_bad_option(capsys: pytest.CaptureFixture[str], option: str) -> None:
     said = call(main, capsys, option)
     assert said.status == 2
-    assert said.err.startswith('usage: simulator')
+    assert said.err.startswith('simulator: error: ')
 
 
 def test_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -71,7 +71,7 @@ def test_what_is_written_well_gets_no_advice(text: str, family: PlcType) -> None
     parse_address(text, family)
 
 
-@pytest.mark.parametrize('text', ['N7:9-0', 'N7:0{0}', 'B3:0.16', 'XYZ:0', 'N7:0 10'])
+@pytest.mark.parametrize('text', ['N7:9-0', 'T4:0.FOO', 'N7:0{0}', 'B3:0.16', 'XYZ:0', 'N7:0 10'])
 def test_what_nobody_can_mean_is_left_to_the_grammar(text: str) -> None:
     assert advice(text, SLC) is None
     with pytest.raises(AddressSyntaxError):

@@ -206,7 +206,7 @@ def test_rule_12_fallback_is_a_value_that_can_be_written() -> None:
 def test_rule_12_fallback_of_bits_of_an_old_slc_is_warned_of() -> None:
     mapping = one(**WRITE | {'Address': 'B3:0/0'}, PLC_Type='SLC', Processor='5/02', Fallback='0',
                   Fallback_After='500')
-    assert 'rewriting the whole word' in mapping.remarks[0]
+    assert 'rewriting the whole word' in str(mapping.remarks[0])
 
 
 def test_rule_13_counter_is_not_an_echo_of_our_heartbeat() -> None:

@@ -77,7 +77,7 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     path.write_text(f'{HEADER}\n{row}\n', encoding='utf-8')
     (mapping,), problems = load_mappings(str(path))
     assert not problems
-    return [remark.removeprefix(str(path)) for remark in mapping.remarks]
+    return [str(remark).removeprefix(str(path)) for remark in mapping.remarks]
 
 
 @pytest.mark.parametrize(('row', 'expected'), [

@@ -34,6 +34,7 @@ from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
     advice_for,
+    called,
     colour,
     drop_output,
     GREEN,
@@ -45,8 +46,17 @@ from abdf1_ros.cli.terminal import (
     table,
 )
 from abdf1_ros.driver.points import Outcome
-from abdf1_ros.errors import Abdf1Error, ConfigurationError, FormatError, PortLost, Problem
+from abdf1_ros.errors import (
+    Abdf1Error,
+    ConfigurationError,
+    FormatError,
+    LinkError,
+    PortLost,
+    Problem,
+    RemoteError,
+)
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
@@ -110,78 +120,103 @@ def _mappings(options: argparse.Namespace, session: Session, command: Command,
     return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
 
 
-def _failed(session: Session, station: int, error: Abdf1Error,
+def _line(options: argparse.Namespace) -> Network:
+    """
+    Return the line of a command for one station, and settle which station that is.
+
+    Raises ConfigurationError for a write to one of several that it does not name, and where the
+    station is ourselves.
+    """
+    network = network_of(options)
+    is_half = network.mode != MODES['full']
+    options.is_assumed = is_half and options.station is None
+    if options.is_assumed and options.command == 'write':
+        raise ConfigurationError([Problem(
+            '--station', 'say which station to write to: a half-duplex line may have several')])
+    if options.station is None:
+        options.station = DEFAULT_STATION
+    if is_half and options.station == network.station:
+        raise ConfigurationError([Problem('--own-station', (
+            f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
+            'give us a number that no PLC of the line has'))])
+    return network
+
+
+def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
             plc_type: str | None = None) -> int:
-    """Tell why a request to a station has failed; return the exit status."""
+    """Tell why a request to a station, about ``place``, has failed; return the exit status."""
     if isinstance(error, ConfigurationError | PortLost):
         raise error
-    _complain(f'station {station}: {error}')
-    advice = presence.hint(session, error) or presence.type_hint(session, station, error, plc_type)
-    if advice:
+    station = options.station
+    _complain(f'{place and f"{place} of "}station {station}: {error}')
+    if advice := presence.hint(session, error) \
+            or presence.type_hint(session, station, error, plc_type):
         _complain(advice)
+    if options.is_assumed and isinstance(error, LinkError):
+        _complain(f'no station was given, so {station} was asked; "plc scan" tells who is there')
+        options.is_assumed = False  # once is enough
+    if place and isinstance(error, RemoteError) and is_address_fault(error):
+        _complain(f'"plc files {station}" tells which data files it has, and how long they are')
     return EXIT_FAILED
 
 
 def _read(options: argparse.Namespace) -> int:
     status = 0
-    with Session(network_of(options), via=options.via) as session:
+    with Session(_line(options), via=options.via) as session:
         try:
             mappings = _mappings(
                 options, session, Command.READ, options.addresses, options.length)
         except Abdf1Error as error:
-            return _failed(session, options.station, error)
+            return _failed(options, session, error)
         plc_type = options.plc_type
         for mapping in mappings:
             try:
                 values = data.read(session, mapping)
             except Abdf1Error as error:
-                status = _failed(session, mapping.station, error, plc_type)
+                status = _failed(options, session, error, str(mapping.address), plc_type)
                 plc_type = None  # once is enough
             else:
-                _print_values(mapping, values)
+                _print_values(mapping, values, RADIXES[options.radix])
     return status
 
 
-def _print_values(mapping: Mapping, values: Values) -> None:
-    rows = list(data.rows(mapping, values))
+def _print_values(mapping: Mapping, values: Values,
+                  radix: data.Radix = data.Radix.DECIMAL) -> None:
+    rows = list(data.rows(mapping, values, radix))
     width = max(len(address) for address, _ in rows)
     for address, text in rows:
         print(f'{address:{width}}  {printable(text)}')
 
 
 def _write(options: argparse.Namespace) -> int:
-    network = network_of(options)
-    if options.station is None and network.mode != MODES['full']:
-        raise ConfigurationError([Problem(
-            '--station', 'say which station to write to: a half-duplex line may have several')])
-    if options.station is None:
-        options.station = DEFAULT_STATION
-    with Session(network, via=options.via) as session:
+    with Session(_line(options), via=options.via) as session:
         try:
             length = data.length_of(options.address, options.type, options.values)
             mapping, = _mappings(
                 options, session, Command.READ_WRITE, [options.address], length)
         except Abdf1Error as error:
-            return _failed(session, options.station, error)
+            return _failed(options, session, error)
         try:
             writing = data.Writing(mapping, options.values)
         except Abdf1Error as error:
             _complain(f'{options.address}: {error}')
             return EXIT_USAGE
-        if not options.yes and not _is_confirmed(session, writing):
+        for remark in mapping.remarks:
+            _complain(remark.text)
+        if not options.yes and not _is_confirmed(options, session, writing):
             _complain('nothing was written; --yes writes')
             return EXIT_USAGE
         return _carry_out(session, writing)
 
 
-def _is_confirmed(session: Session, writing: data.Writing) -> bool:
+def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.Writing) -> bool:
     """Show what will be written; ask for a confirmation where there is a terminal."""
     mapping = writing.mapping
     try:
         print('now:')
         _print_values(mapping, data.read(session, mapping))
     except Abdf1Error as error:
-        _failed(session, mapping.station, error)
+        _failed(options, session, error, str(mapping.address))
     question = f'write {writing.value} to {mapping.address} of station {mapping.station}'
     if not sys.stdin.isatty():
         print(f'would {printable(question)}')
@@ -216,23 +251,23 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    network = network_of(options)
+    network = _line(options)
     with Session(network, via=options.via) as session:
         try:
             mappings = _mappings(
                 options, session, Command.READ, options.addresses, options.length)
         except Abdf1Error as error:
-            return _failed(session, options.station, error)
+            return _failed(options, session, error)
     failed = Watch(network, mappings, options.period, RADIXES[options.radix]).run(options.count)
     return EXIT_FAILED if failed else 0
 
 
 def _status(options: argparse.Namespace) -> int:
-    with Session(network_of(options), via=options.via) as session:
+    with Session(_line(options), via=options.via) as session:
         there = presence.look_at(session, options.station)
         if there.identity is None:
             assert there.error is not None
-            return _failed(session, options.station, there.error)
+            return _failed(options, session, there.error)
     print('\n'.join(presence.describe(there)))
     return 0
 
@@ -240,7 +275,7 @@ def _status(options: argparse.Namespace) -> int:
 def _ping(options: argparse.Namespace) -> int:
     times: list[float] = []
     failures = 0
-    with Session(network_of(options), via=options.via) as session:
+    with Session(_line(options), via=options.via) as session:
         try:
             for _ in range(options.count):
                 try:
@@ -249,7 +284,7 @@ def _ping(options: argparse.Namespace) -> int:
                     raise
                 except Abdf1Error as error:
                     failures += 1
-                    _failed(session, options.station, error)
+                    _failed(options, session, error)
                 else:
                     print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
         except KeyboardInterrupt:
@@ -288,7 +323,9 @@ def _detect(options: argparse.Namespace) -> int:
         return EXIT_FAILED
     there = found.presence
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
-    print(f'net.csv:\n{init.net_csv(network, found)}')
+    station = f' --station {there.station}' if found.settings.mode == MODES['half'] else ''
+    print(f'next: {called("plc")} read N7:0{station} --net net.csv')
+    print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
     return 0
 
 
@@ -306,6 +343,11 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
         _complain('nothing answers with any of these settings')
         for trace in search.traces or [_ALL_TRIED_IN_VAIN]:
             _complain(trace)
+        kept = [option for option, value in (
+            ('--duplex', options.duplex), ('--baud', options.baud), ('--check', options.check))
+            if value]
+        if kept:
+            _complain(f'{" and ".join(kept)}: nothing else was tried; leave it out to try all')
     return found
 
 
@@ -331,8 +373,9 @@ def _init(options: argparse.Namespace) -> int:
     target.write(network, found, there)
     print(f'written: {target.net}, {target.map}\n'
           'how to go on: write the addresses that you need into map.csv, then\n'
-          f'  ros2 run abdf1_ros check {target.net} {target.map}\n'
-          f'  ros2 run abdf1_ros node --ros-args -p net_file:={target.net} '
+          f'  {called("plc")} watch S:0 --station {there[0].station} --net {target.net}\n'
+          f'  {called("check")} {target.net} {target.map}\n'
+          f'  {called("node")} --ros-args -p net_file:={target.net} '
           f'-p map_file:={target.map}')
     return 0
 
@@ -362,7 +405,7 @@ def _ports(options: argparse.Namespace) -> int:
 
 
 def _files(options: argparse.Namespace) -> int:
-    with Session(network_of(options), via=options.via) as session:
+    with Session(_line(options), via=options.via) as session:
         try:
             kind = {'PLC_Type': options.plc_type} if options.plc_type \
                 else data.ask_kind(session, options.station)
@@ -380,7 +423,7 @@ def _files(options: argparse.Namespace) -> int:
                           f'{"elements" if entry.elements else "by rack or slot"}', flush=True)
             progress.clear()
         except Abdf1Error as error:
-            return _failed(session, options.station, error)
+            return _failed(options, session, error)
     if options.map:
         print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period'
               + ('' if options.via is None else ',Via'))

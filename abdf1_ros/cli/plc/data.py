@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
 from concurrent.futures import Future
 from dataclasses import replace
+from enum import Enum
 import re
 import time
 
@@ -47,6 +48,18 @@ _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
 _WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
 _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
+_BETWEEN = '  '
+
+_BITS = {ValueType.INT16: 16, ValueType.UINT16: 16, ValueType.INT32: 32, ValueType.UINT32: 32}
+
+
+class Radix(Enum):
+    """How whole numbers are written; the value is that of Python's formats."""
+
+    DECIMAL = 'd'
+    HEXADECIMAL = 'X'
+    OCTAL = 'o'
+    BINARY = 'b'
 
 
 def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Mapping:
@@ -173,16 +186,34 @@ def _number(mapping: Mapping, text: str) -> float:
     return value
 
 
-def rows(mapping: Mapping, values: Values) -> Iterator[tuple[str, str]]:
-    """Yield values in rows, each with the address of its first."""
+def rows(mapping: Mapping, values: Values, radix: Radix = Radix.DECIMAL,
+         room: int | None = None) -> Iterator[tuple[str, str]]:
+    """Yield values in rows of up to ``room`` characters, each with the address of its first."""
     if isinstance(values, str):
         yield str(mapping.address), repr(values)
         return
+    texts = value_texts(mapping, values, radix)
+    width = max(map(len, texts))
     step = _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
-    width = max(len(value_text(value)) for value in values)
-    for first in range(0, len(values), step):
-        shown = (value_text(value).rjust(width) for value in values[first:first + step])
-        yield str(element(mapping, first)), '  '.join(shown)
+    if room is not None:
+        step = min(step, max(1, (room + len(_BETWEEN)) // (width + len(_BETWEEN))))
+    for first in range(0, len(texts), step):
+        shown = (text.rjust(width) for text in texts[first:first + step])
+        yield str(element(mapping, first)), _BETWEEN.join(shown)
+
+
+def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list[str]:
+    """
+    Return each value as text.
+
+    In another radix than ten a number has as many digits as its type has bits; floats and single
+    bits are the same in all.
+    """
+    if radix is Radix.DECIMAL or mapping.type not in _BITS:
+        return [*map(value_text, values)]
+    bits = _BITS[mapping.type]
+    digits = len(f'{(1 << bits) - 1:{radix.value}}')
+    return [f'{int(value) & (1 << bits) - 1:0{digits}{radix.value}}' for value in values]
 
 
 def element(mapping: Mapping, number: int) -> Address:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from abdf1_ros.cli.plc.line import MODES
+from abdf1_ros.cli.plc.line import free_station, MODES
 from abdf1_ros.cli.plc.presence import look_at, Presence, understands
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.checksum import Checksum
@@ -106,6 +106,8 @@ class Search:
         """Yield the presence of each station; ignore one that only seems to take commands."""
         network = replace(self._network, baud=settings.baud, mode=settings.mode,
                           error_code=settings.check)
+        if settings.mode == MODES['half']:  # a PLC does not answer to its own address
+            network = replace(network, station=free_station(network.station, stations))
         # One that is not absent is asked with ENQ when it is silent, which any full-duplex port
         # answers, whatever its check and its own station are.
         asks = is_first and settings.mode == MODES['full']

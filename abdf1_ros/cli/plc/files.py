@@ -165,6 +165,9 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
         # Words of a structure are counted as words, other elements as such.
         if not kind.is_structure:
             length = max(1, length // per_element)
+        if length < entry.elements and not kind.is_structure and kind is not FileType.STRING:
+            yield (f'# {entry} has {entry.elements} elements; a row of one packet has {length} of '
+                   'them')
         number = '' if kind is FileType.STATUS else entry.number
         yield (f'{kind.value.lower()}{entry.number},Read,{kind.value}{number}:0,{station},'
                f'{plc_type.value},{processor},{length},{_DRAFT_PERIOD}'

@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from abdf1_ros.cli.plc.data import processor_of
 from abdf1_ros.cli.plc.detect import Found
+from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.errors import Problem
 from abdf1_ros.settings.network import Network
@@ -58,21 +59,22 @@ class Files:
             raise Problem(str(self.folder), 'there is no such folder; make it, or name another '
                                             'with --into')
         for path in (self.net, self.map):
-            if path.exists():
+            if path.exists() and path.stat().st_size:  # a pipe that failed leaves an empty one
                 raise Problem(str(path), 'is there already and stays as it is; name another '
                                          'folder with --into')
 
     def write(self, network: Network, found: Found, stations: Sequence[Presence]) -> None:
         """Write both; raises OSError."""
-        self.net.write_text(net_csv(network, found) + '\n', encoding='utf-8')
+        numbers = [presence.station for presence in stations]
+        self.net.write_text(net_csv(network, found, numbers) + '\n', encoding='utf-8')
         self.map.write_text(_HEAD + ''.join(map_rows(stations)), encoding='utf-8')
 
 
-def net_csv(network: Network, found: Found) -> str:
-    """Return a net CSV with the settings that have been found."""
+def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
+    """Return a net CSV with the settings found; our own Station is none of ``stations``."""
     settings = found.settings
-    row = (network.station, settings.mode, settings.check, network.port, settings.baud,
-           network.parity, _TIMEOUT)
+    row = (free_station(network.station, stations), settings.mode, settings.check,
+           network.port, settings.baud, network.parity, _TIMEOUT)
     return ('Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout\n'
             + ','.join(map(str, row)))
 

@@ -17,9 +17,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from dataclasses import replace
 
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.settings.network import load_network, make_network, Network
 
@@ -31,6 +33,11 @@ MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer'}
 # Options that stand for a column of the net CSV.
 _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
             'timeout': 'timeout', 'own_station': 'station'}
+
+
+def free_station(own: int, taken: Collection[int]) -> int:
+    """Return an address for us that no station of a half-duplex line has: ``own`` if it can be."""
+    return next((number for number in (own, *range(1, MAX_STATION)) if number not in taken), own)
 
 
 def network_of(options: argparse.Namespace) -> Network:

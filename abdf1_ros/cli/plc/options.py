@@ -19,8 +19,8 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
+from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
-from abdf1_ros.cli.plc.watch import Radix
 from abdf1_ros.cli.terminal import command_parser
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.access import Access
@@ -44,7 +44,8 @@ class LineDefaults:
     net: str = 'the line'
 
 
-RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'bin': Radix.BINARY}
+RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL,
+           'bin': Radix.BINARY}
 
 _TRIED = 'all are tried'
 _DETECT_DEFAULTS = LineDefaults(
@@ -90,7 +91,7 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
         command = commands.add_parser(
             name, help=text, description=f'{text[0].upper()}{text[1:]}.',
             epilog=f'example:\n{shown}\n\n{_STATUSES}',
-            formatter_class=argparse.RawDescriptionHelpFormatter)
+            allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
         add_line_options(command, defaults)
         if defaults is not _DETECT_DEFAULTS:
             command.add_argument('--via', metavar='N', type=_station, default=None,
@@ -106,15 +107,15 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
                         'watch B3:0 N7:0 --period 0.5 --net net.csv',
                         'watch I:1.0 --radix bin --net net.csv'))
     status = add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv')
-    status.add_argument('station', metavar='STATION', nargs='?', type=_station,
-                        default=DEFAULT_STATION, help='default: %(default)s')
+    _add_station(status)
     ping = add('ping', 'measure how long a PLC takes to send something back',
                'ping 1 --count 10 --net net.csv')
-    ping.add_argument('station', metavar='STATION', type=_station)
+    _add_station(ping)
     ping.add_argument('--count', type=_count, default=4, metavar='N',
                       help='how often (default: %(default)s)')
     scan = add('scan', 'look for stations', 'scan 0-31 --net net.csv')
-    scan.add_argument('stations', metavar='STATIONS', type=_stations, help='such as 0-31 or 1,5')
+    scan.add_argument('stations', metavar='STATIONS', nargs='?', type=_stations,
+                      default=tuple(range(32)), help='such as 1,5 or 0-254 (default: 0-31)')
     search = add('detect', 'find out the settings of a line by trying them',
                  'detect --port /dev/ttyUSB0 --stations 1-4', defaults=_DETECT_DEFAULTS)
     search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
@@ -135,8 +136,13 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     return parser
 
 
+def _add_station(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('station', metavar='STATION', nargs='?', type=_station,
+                        help=f'default: {DEFAULT_STATION}')
+
+
 def _complete_files(found: argparse.ArgumentParser) -> None:
-    found.add_argument('station', metavar='STATION', type=_station)
+    _add_station(found)
     found.add_argument('--files', metavar='LIST', type=_stations, default=tuple(range(32)),
                        help='numbers to look for, up to 254 (default: 0-31)')
     found.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in PlcType],
@@ -145,7 +151,7 @@ def _complete_files(found: argparse.ArgumentParser) -> None:
 
 
 def _complete_write(write: argparse.ArgumentParser) -> None:
-    _add_data_options(write, None, f'needed in half duplex (default in full: {DEFAULT_STATION})')
+    _add_data_options(write, f'needed in half duplex (default in full: {DEFAULT_STATION})')
     write.add_argument('address', metavar='ADDRESS', help='such as N7:10, B3:0/5, F8:2')
     write.add_argument('values', metavar='VALUE', nargs='+',
                        help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string; '
@@ -159,8 +165,6 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
     _add_addresses(watch)
     watch.add_argument('--period', type=_seconds, default=0.5, metavar='S',
                        help='s between reads (default: %(default)s)')
-    watch.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
-                       help='how whole numbers are written (default: %(default)s)')
     watch.add_argument('--count', type=_count, metavar='N', help='end after so many reads')
 
 
@@ -193,10 +197,10 @@ def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
                         help='the same as --duplex full')
 
 
-def _add_data_options(parser: argparse.ArgumentParser, station: int | None = DEFAULT_STATION,
-                      note: str = '(default: %(default)s)') -> None:
+def _add_data_options(parser: argparse.ArgumentParser,
+                      note: str = f'(default: {DEFAULT_STATION})') -> None:
     group = parser.add_argument_group('data')
-    group.add_argument('--station', metavar='N', type=_station, default=station,
+    group.add_argument('--station', metavar='N', type=_station,
                        help=f'address of the PLC {note}')
     group.add_argument('--plc-type', type=str.upper,
                        choices=[kind.value for kind in PlcType],
@@ -217,6 +221,8 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='such as N7:0, B3:0/5, T4:0.ACC, ST9:1')
     parser.add_argument('--length', metavar='N', default='1',
                         help='elements of each address (default: %(default)s)')
+    parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
+                        help='how whole numbers are written (default: %(default)s)')
 
 
 def _seconds(text: str) -> float:

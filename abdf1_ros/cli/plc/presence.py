@@ -17,10 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 import time
 
+from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
@@ -75,7 +76,13 @@ def look_at(session: Session, station: int) -> Presence:
 
 def scan(network: Network, stations: Sequence[int],
          via: int | None = None) -> Iterator[Presence]:
-    """Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost."""
+    """
+    Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost.
+
+    On a half-duplex line we take an address that is none of theirs.
+    """
+    if network.mode == 'Master':
+        network = replace(network, station=free_station(network.station, stations))
     with Session(network, absent=stations, via=via) as session:
         for station in stations:
             yield look_at(session, station)

@@ -18,25 +18,27 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
-from enum import Enum
 import math
 import random
 import shutil
 import sys
+import textwrap
 import threading
 
+from abdf1_ros.cli.plc.data import Radix, rows
 from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.cli.terminal import cut, is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import show, WriteResult
+from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.messages import Event
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values, ValueType
+from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
 
 # Ages and errors are shown again so often (s), also without new values.
@@ -48,15 +50,15 @@ _MAX_NEWS = 1000
 # So long (s) a value that has changed is marked.
 _MARKED = 1.0
 
-_BITS = {ValueType.INT16: 16, ValueType.UINT16: 16, ValueType.INT32: 32, ValueType.UINT32: 32}
+# Characters of a row of values, however narrow the window is.
+_LEAST_ROOM = 16
 
 
-class Radix(Enum):
-    """How numbers are written; the value is that of Python's formats."""
+@dataclass(frozen=True, slots=True)
+class _NoValue:
+    """Why there is none."""
 
-    DECIMAL = 'd'
-    HEXADECIMAL = 'X'
-    BINARY = 'b'
+    error: str
 
 
 class Watch:
@@ -75,10 +77,10 @@ class Watch:
             default_period=period, read_only=True, first_tns=random.randrange(0x10000))
         self._driver = Driver(network, mappings, settings, self)
         self._link = LinkThread(self._driver.machine, opened(network))
-        self._news: deque[tuple[Mapping, str]] = deque(maxlen=_MAX_NEWS)
+        self._news: deque[tuple[Mapping, Values]] = deque(maxlen=_MAX_NEWS)
         self._has_news = threading.Event()
         self._reads: Counter[Mapping] = Counter()
-        self._shown: dict[Mapping, str] = {}
+        self._shown: dict[Mapping, Values | _NoValue] = {}
         self._height = 0
 
     def run(self, count: int | None) -> int:
@@ -105,7 +107,7 @@ class Watch:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a read; called in the link thread."""
-        self._news.append((mapping, printable(shown(mapping, values, self._radix))))
+        self._news.append((mapping, values))
         self._reads[mapping] += 1
         self._has_news.set()
 
@@ -130,48 +132,68 @@ class Watch:
                    for mapping in self._mappings)
 
     def _show(self) -> None:
-        changed = []
+        changed: list[tuple[Mapping, Values | _NoValue]] = []
         while self._news:
-            mapping, text = self._news.popleft()
-            changed.append((mapping, text))
+            changed.append(self._news.popleft())
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
             if error is not None:
-                changed.append((mapping, f'no value: {printable(error)}'))
+                changed.append((mapping, _NoValue(error)))
         if is_terminal(sys.stdout):
             self._note_changes(changed)
             self._redraw()
         else:
             self._print(changed)
 
-    def _print(self, changed: Sequence[tuple[Mapping, str]]) -> None:
-        """Print a line for each mapping that has changed since the last one."""
-        for mapping, text in changed:
-            if self._shown.get(mapping) != text:
-                self._shown[mapping] = text
+    def _print(self, changed: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
+        """Print the rows of each mapping that has changed since the last time."""
+        for mapping, what in changed:
+            if mapping not in self._shown or self._shown[mapping] != what:
+                self._shown[mapping] = what
                 time = datetime.now().isoformat(timespec='milliseconds').partition('T')[2]
-                print(f'{time}  {mapping.address}  {text}', flush=True)
+                for address, text in self._rows(mapping):
+                    print(f'{time}  {address}  {text}', flush=True)
 
-    def _note_changes(self, news: Sequence[tuple[Mapping, str]]) -> None:
-        """Keep the text to show, and the time of its last change."""
-        for mapping, text in news:
-            if self._shown.get(mapping, text) != text:
+    def _note_changes(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
+        """Keep what to show, and the time of its last change."""
+        for mapping, what in news:
+            if mapping in self._shown and self._shown[mapping] != what:
                 self._changed[mapping] = self._driver.machine.now
-            self._shown[mapping] = text
+            self._shown[mapping] = what
+
+    def _rows(self, mapping: Mapping, room: int | None = None) -> list[tuple[str, str]]:
+        """Return what is known of an address, in rows of up to ``room`` characters."""
+        what = self._shown.get(mapping)
+        if what is None:
+            return [(str(mapping.address), '')]
+        if isinstance(what, _NoValue):
+            text = f'no value: {printable(what.error)}'
+            lines = textwrap.wrap(text, room) if room else [text]
+            return [(str(mapping.address) if line is lines[0] else '', line) for line in lines]
+        return [(address, printable(text))
+                for address, text in rows(mapping, what, self._radix, room)]
+
+    def _head(self, mapping: Mapping) -> tuple[str, ...]:
+        """Return what stands before the values of an address."""
+        now = self._driver.machine.now
+        age = self._driver.points[mapping].age(now)
+        is_new = now - self._changed.get(mapping, -math.inf) < _MARKED
+        return (str(mapping.address), str(mapping.station), mapping.type.value,
+                '' if age is None else f'{max(age, 0.0):.1f}', '*' if is_new else '')
 
     def _redraw(self) -> None:
         """Draw the table over the one before."""
-        now = self._driver.machine.now
-        rows = []
-        for mapping in self._mappings:
-            age = self._driver.points[mapping].age(now)
-            is_new = now - self._changed.get(mapping, -math.inf) < _MARKED
-            rows.append((str(mapping.address), str(mapping.station), mapping.type.value,
-                         '' if age is None else f'{max(age, 0.0):.1f}', '*' if is_new else '',
-                         self._shown.get(mapping, '')))
         width, height = shutil.get_terminal_size()
-        head = ('address', 'station', 'type', 'age s', '', 'value')
-        lines = table(head, rows, right=(1, 3)).split('\n')
+        heads = [self._head(mapping) for mapping in self._mappings]
+        # Other columns keep their widths: the values get what is left of the line.
+        names = ('address', 'station', 'type', 'age s', '')
+        taken = sum(max(map(len, column)) + 2 for column in zip(names, *heads, strict=True))
+        cells = []
+        for mapping, head in zip(self._mappings, heads, strict=True):
+            (_, text), *more = self._rows(mapping, max(width - 1 - taken, _LEAST_ROOM))
+            cells.append((*head, text))
+            cells += [(address, *[''] * (len(head) - 1), text) for address, text in more]
+        lines = table((*names, 'value'), cells, right=(1, 3)).split('\n')
         if len(lines) > height - 1:
             hidden = len(lines) - (height - 2)
             lines = [*lines[:height - 2], f'+{hidden} more; a higher window shows them']
@@ -179,19 +201,3 @@ class Watch:
         up = f'\x1b[{self._height}A' if self._height else ''
         print(up + '\n'.join(f'\x1b[K{line}' for line in picture), flush=True)
         self._height = len(picture)
-
-
-def shown(mapping: Mapping, values: Values, radix: Radix) -> str:
-    """
-    Return values as text.
-
-    In another radix than ten a number has as many digits as its type has bits; strings, floats
-    and single bits are the same in all.
-    """
-    kind = mapping.type
-    if radix is Radix.DECIMAL or isinstance(values, str) or kind not in _BITS:
-        return show(values)
-    bits = _BITS[kind]
-    digits = bits if radix is Radix.BINARY else bits // 4
-    texts = (f'{int(value) & (1 << bits) - 1:0{digits}{radix.value}}' for value in values)
-    return '[' + ', '.join(texts) + ']'

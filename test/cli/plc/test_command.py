@@ -93,7 +93,7 @@ def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
 def test_type_that_is_not_that_of_the_plc_is_named_once(plc: Plc) -> None:
     said = plc('read', 'N7:0', 'N7:1', '--plc-type', 'SLC')
     assert (said.status, said.lines) == (1, [])
-    assert said.err.count('plc: station 1: STS ') == 2
+    assert [said.err.count(f'plc: N7:{word} of station 1: STS ') for word in (0, 1)] == [1, 1]
     assert said.err.count('plc: station 1 is PLC-5/40') == 1
     assert said.err.splitlines()[1].endswith('; --plc-type says SLC')
 
@@ -101,7 +101,39 @@ def test_type_that_is_not_that_of_the_plc_is_named_once(plc: Plc) -> None:
 def test_read_goes_on_after_a_refusal(plc: Plc) -> None:
     said = plc('read', 'N99:0', 'N7:0')
     assert (said.status, said.lines) == (1, ['N7:0 1200'])
-    assert 'plc: station 1: STS F0 EXT STS' in said.err
+    assert said.err.startswith('plc: N99:0 of station 1: STS F0 EXT STS')
+    assert '"plc files 1" tells which data files it has' in said.err
+
+
+def test_silence_of_a_station_that_nobody_named(plc: Plc, simulator: Process) -> None:
+    told = 'no station was given, so 1 was asked; "plc scan" tells who is there'
+    simulator.say('silent 1')
+    assert told in plc('read', 'N7:0').err
+    assert told in plc('status').err
+    assert told not in plc('read', 'N7:0', '--station', '1').err
+
+
+@pytest.mark.parametrize('args', [
+    ('read', 'N7:0'), ('status', '1'), ('ping', '1'), ('write', 'N7:0', '1', '--station', '1')])
+def test_own_station_is_not_asked(plc: Plc, args: tuple[str, ...]) -> None:
+    said = plc(*args, '--own-station', '1')
+    assert said.status == 2
+    assert said.err.startswith('plc: --own-station: 1 is our own Station, so no PLC can answer')
+
+
+def test_scan_asks_a_plc_that_has_our_number(plc: Plc) -> None:
+    assert plc('scan', '0-2', '--own-station', '2').lines[-1] == '2 of 3 stations answer'
+
+
+def test_write_to_an_input_is_told(plc: Plc) -> None:
+    said = plc('write', 'I:1.0', '5', '--station', '2')
+    assert said.err.splitlines()[0] == (
+        'plc: I:1.0 is an input: the PLC overwrites what is written there with its next scan')
+
+
+def test_read_in_another_radix(plc: Plc) -> None:
+    said = plc('read', 'N7:10', '--length', '3', '--station', '2', '--radix', 'hex')
+    assert said.lines == ['N7:10 0065 0066 0067']
 
 
 def test_read_over_a_net_file(line: str, files: Files,
@@ -267,20 +299,20 @@ def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:
     said = plc('watch', 'N7:0', 'F8:0', '--period', '0.05', '--count', '5')
     assert said.status == 0
     shown = [line.split(maxsplit=2)[1:] for line in said.lines]
-    assert sorted(map(tuple, shown)) == [('F8:0', '[12.5]'), ('N7:0', '[1200]')]
+    assert sorted(map(tuple, shown)) == [('F8:0', '12.5'), ('N7:0', '1200')]
 
 
 def test_watch_tells_why_there_is_no_value(plc: Plc) -> None:
     said = plc('watch', 'N99:0', 'N7:0', '--period', '0.05', '--count', '2')
     assert said.status == 1
     assert any('N99:0 no value: STS F0' in line for line in said.lines)
-    assert any(line.endswith('N7:0 [1200]') for line in said.lines)
+    assert any(line.endswith('N7:0 1200') for line in said.lines)
 
 
 def test_watch_goes_on_until_it_is_interrupted(line: str) -> None:
     with Process('plc', 'watch', 'N7:10', '--station', '2', '--period', '0.05', '--timeout',
                  '5000', '--port', line) as process:
-        process.wait_for('N7:10  [')
+        process.wait_for('N7:10  ')
         process.send(signal.SIGINT)
         assert process.result() == 0
 
@@ -310,7 +342,7 @@ def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
     os.close(ours)
     assert process.wait(20) == 0
     assert b'\x1b[2A\x1b[Kaddress' in screen
-    assert screen.rstrip().endswith(b'[1200]')
+    assert screen.rstrip().endswith(b'1200')
 
 
 def test_write_names_its_station_where_there_may_be_several(plc: Plc) -> None:
@@ -346,7 +378,9 @@ def test_detect_tries_in_order_and_stops_at_the_first_answer(
                     '300')
     assert said.status == 0
     assert said.lines[0].startswith('19200 baud, half duplex, BCC: station 2 SLC 5/03')
-    assert said.lines[1:] == [
+    assert said.lines[1].startswith('next: ')
+    assert said.lines[1].endswith('plc read N7:0 --station 2 --net net.csv')
+    assert said.lines[2:] == [
         'net.csv:', 'Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout',
         f'5,Master,BCC,{port},19200,None,300']
 
@@ -359,7 +393,8 @@ def test_detect_of_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert said.status == 1
     assert said.err == ('plc: nothing answers with any of these settings\n'
                         'plc: not one character came: cable, port, power? Or a station that was '
-                        'not asked (--stations; a PLC-5 shows its own in octal)\n')
+                        'not asked (--stations; a PLC-5 shows its own in octal)\n'
+                        'plc: --baud: nothing else was tried; leave it out to try all\n')
 
 
 def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
@@ -370,7 +405,9 @@ def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
                     '--duplex', 'half', '--baud', '9600')
     assert said.status == 1
     assert said.err.splitlines() == ['plc: nothing answers with any of these settings',
-                                     'plc: 9600 baud, half duplex, CRC: 2 characters came']
+                                     'plc: 9600 baud, half duplex, CRC: 2 characters came',
+                                     'plc: --duplex and --baud and --check: nothing else was '
+                                     'tried; leave it out to try all']
 
 
 def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,9 @@ from abdf1_ros.cli.plc.data import (
     mapping_of,
     parse_values,
     processor_of,
+    Radix,
     rows,
+    value_texts,
     Writing,
 )
 from abdf1_ros.cli.plc.session import Session
@@ -37,6 +39,7 @@ from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.mappings import make_mapping
 
 
 def make(address: str, **cells: str) -> Mapping:
@@ -156,3 +159,15 @@ def test_whole_numbers_in_every_notation(value: int) -> None:
 ])
 def test_length_of_a_write(address: str, kind: str | None, texts: list[str], length: int) -> None:
     assert length_of(address, kind, texts) == length
+
+
+@pytest.mark.parametrize(('kind', 'value', 'radix', 'text'), [
+    ('int16', -2, Radix.HEXADECIMAL, 'FFFE'), ('int16', 10, Radix.HEXADECIMAL, '000A'),
+    ('int16', -1, Radix.OCTAL, '177777'), ('uint16', 5, Radix.BINARY, '0000000000000101'),
+    ('int32', -1, Radix.HEXADECIMAL, 'FFFFFFFF'),
+    ('int16', -2, Radix.DECIMAL, '-2'),
+    ('float32', 1.5, Radix.HEXADECIMAL, '1.5')])
+def test_values_are_written_in_another_radix(
+        kind: str, value: float, radix: Radix, text: str) -> None:
+    mapping = make_mapping('F8:0' if kind == 'float32' else 'N7:0', kind=kind)
+    assert value_texts(mapping, [value], radix) == [text]

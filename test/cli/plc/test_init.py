@@ -73,6 +73,14 @@ def test_rows_that_are_only_comments_are_good_rows_too(
     assert (len(mappings), problems) == (8, [])
 
 
+def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) -> None:
+    (tmp_path / 'net.csv').touch()  # as a pipe that failed leaves it
+    with plc_line(tmp_path / 'plc', simulated_plc(5, 'SLC', time.monotonic, *SLC)) as name:
+        assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200']) == 0
+    assert 'station 5: SLC 5/03' in capsys.readouterr().out
+    assert load_network(str(tmp_path / 'net.csv')).station != 5
+
+
 def test_init_leaves_files_alone_that_are_there(
         port: str, tmp_path: Path, capsys: Output) -> None:
     (tmp_path / 'map.csv').write_text('mine', encoding='utf-8')
@@ -92,6 +100,14 @@ def test_files_are_found_with_type_and_length(
     assert main(['files', station, '--port', port, '--files', '0-21']) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert {name: int(count) if count.isdigit() else 0 for name, count, *_ in lines} == found
+
+
+def test_file_that_is_longer_than_its_row(port: str, capsys: Output) -> None:
+    assert main(['files', '1', '--port', port, '--files', '7', '--map']) == 0
+    comment, row = capsys.readouterr().out.splitlines()[1:]
+    length = row.split(',')[6]
+    assert int(length) < 256
+    assert comment == f'# N7 has 256 elements; a row of one packet has {length} of them'
 
 
 @pytest.mark.parametrize('station', ['1', '2'])

@@ -28,9 +28,11 @@ def parse(*args: str) -> argparse.Namespace:
 
 def test_defaults() -> None:
     read = parse('read', 'N7:0')
-    assert (read.command, read.addresses, read.length, read.station) == ('read', ['N7:0'], '1', 1)
+    assert (read.command, read.addresses) == ('read', ['N7:0'])
+    assert (read.length, read.radix) == ('1', 'dec')
     assert read.plc_type is read.type is read.access is read.word_order is None
-    assert parse('status').station == 1
+    assert read.station is parse('status').station is parse('files').station is None
+    assert parse('scan').stations == tuple(range(32))
     assert parse('ping', '3').count == 4
     assert parse('watch', 'N7:0').period == 0.5
     assert parse('watch', 'N7:0').count is None
@@ -86,7 +88,7 @@ def test_lists_of_stations() -> None:
     ('watch', 'N7:0', '--count', '1.5'), ('watch', 'N7:0', '--count', '\u0661'),
     ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'), ('read',),
     ('scan', '1', '--peer', '--duplex', 'half'), ('scan', '1', '--duplex', 'half', '--peer'),
-    ('write', 'N7:0'), ('fly',),
+    ('write', 'N7:0'), ('fly',), ('write', 'N7:0', '1', '--ye'),
     ('read', 'N7:0', '--type', 'int8')])
 def test_wrong(args: tuple[str, ...]) -> None:
     with pytest.raises(SystemExit) as ending:
