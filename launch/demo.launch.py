@@ -42,7 +42,7 @@ def generate_launch_description() -> LaunchDescription:
         *(DeclareLaunchArgument(
             name, default_value=default, description='passed on to bridge.launch.py')
           for name, default in defaults.items()),
-        # No Node action: that would add --ros-args, and the simulator is no ROS node.
+        # No Node action: that would add --ros-args, and the simulator is not a ROS node.
         ExecuteProcess(
             cmd=[ExecutableInPackage('simulator', 'abdf1_ros'), '--pty', PORT],
             name='simulator',

@@ -173,7 +173,7 @@ def duplicate_discarded(end: MasterEnd) -> None:
         raise Failed('one reply to a message sent twice', 'two (is duplicate detection off?)')
 
 
-@case('new-tns-executed', 'A message with another TNS is no duplicate.', 'M 3-4, 6-7', _SLAVE)
+@case('new-tns-executed', 'A message with another TNS is not a duplicate.', 'M 3-4, 6-7', _SLAVE)
 def new_tns_executed(end: MasterEnd) -> None:
     for _ in range(2):
         command = end.command(body=b'\x00twice')

@@ -77,7 +77,7 @@ class TypedData:
             type_id, size = _read_descriptor(reader)
         data = reader.rest()
         if size == 0 or len(data) % size:
-            raise FormatError(f'{len(data)} bytes are no whole elements of {size} bytes')
+            raise FormatError(f'{len(data)} bytes are not whole elements of {size} bytes')
         return cls(type_id, size, data)
 
 

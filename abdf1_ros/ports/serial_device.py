@@ -38,7 +38,7 @@ import serial.rs485
 
 # Our own words, where those of the operating system tell too little.
 _BUSY = 'another program has it open'
-_REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is no serial port'}
+_REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is not a serial port'}
 
 _PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
 

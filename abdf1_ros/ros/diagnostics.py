@@ -30,7 +30,7 @@ from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
-from abdf1_ros.ros.station_health import health_values, trouble, wrong_type
+from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -261,7 +261,7 @@ class Diagnostics:
             return ERROR, f'station {station.number} inactive since {since:.1f} s'
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
-        why = trouble(self._driver.health.known(station.number).identity)
+        why = processor_fault(self._driver.health.known(station.number).identity)
         if why is not None:
             return WARN, f'station {station.number} active, but {why}'
         if (wrong := self._wrong_type(station.number)) is not None:

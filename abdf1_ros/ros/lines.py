@@ -370,7 +370,7 @@ class Lines:
 
 def sections(path: str) -> list[LineName]:
     """
-    Return the nodes that a parameter file has a section for; those with wildcards are no nodes.
+    Return the nodes that a parameter file has a section for; those with wildcards are not nodes.
 
     Raises ConfigurationError where there is none that can be read, and where one comes twice:
     only one of them would run.

@@ -32,7 +32,7 @@ from std_srvs.srv import Trigger
 _PATIENCE = 5.0
 
 
-def trouble(identity: Identity | None) -> str | None:
+def processor_fault(identity: Identity | None) -> str | None:
     """Return the fault of a processor that answers but does not run, None where none is known."""
     if identity is None:
         return None

@@ -147,7 +147,7 @@ class Codec:
         return self.element_words * self.length
 
     def decode(self, data: bytes) -> Values:
-        """Return the values in ``data``; FormatError where the words are no such value."""
+        """Return the values in ``data``; FormatError where the words are not such a value."""
         if self.type is ValueType.STRING:
             return strings.decode_packed(data) if self.packed else strings.decode_counted(data)
         if self.type is ValueType.BOOL:
@@ -165,7 +165,7 @@ class Codec:
     def check(self, values: Sequence[float] | str) -> None:
         """Raise FormatError, saying which value is wrong, unless all can be written."""
         if isinstance(values, str) is not (self.type is ValueType.STRING):
-            raise FormatError(f'{values!r} is no {self.type.value}')
+            raise FormatError(f'{values!r} is not a valid {self.type.value}')
         if isinstance(values, str):
             self._encode_string(values)
             return
@@ -175,7 +175,8 @@ class Codec:
         for index, value in enumerate(values):
             is_whole = self.type is ValueType.FLOAT32 or value % 1 == 0
             if not low <= value <= high or not is_whole:  # also NaN
-                raise FormatError(f'value {value} at index {index} is no {self.type.value}')
+                raise FormatError(
+                    f'value {value} at index {index} is not a valid {self.type.value}')
 
     def encode(self, values: Sequence[float] | str) -> bytes:
         """Return whole words for ``values`` that ``check`` has passed; not for bits."""

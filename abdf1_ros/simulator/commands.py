@@ -110,7 +110,7 @@ def _faults(line: str, verb: str, arguments: list[str], is_full_duplex: bool) ->
         elif verb == 'error' and len(arguments) in (1, 2):
             faults.status = tuple(map(_byte, arguments))
         elif verb != 'normal' or arguments:
-            raise CommandError(f'"{line.strip()}" is no command\n{COMMANDS.rstrip()}')
+            raise CommandError(f'"{line.strip()}" is not a command\n{COMMANDS.rstrip()}')
     except ValueError as error:
         raise CommandError(f'{line.strip()}: {error}') from None
     return faults

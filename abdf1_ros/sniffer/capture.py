@@ -97,7 +97,7 @@ class CaptureWriter:
         self._head = head.encode('ascii', 'backslashreplace').decode('ascii')
         self._written = 0
         if path.exists() and not _is_capture(path):
-            raise OSError(f'{path} is there and is no capture; give another name')
+            raise OSError(f'{path} exists and is not a capture; give another name')
         self._file = self._begin()
 
     def write(self, chunk: Chunk) -> None:
@@ -168,5 +168,5 @@ def _chunk(line: str, where: str) -> Chunk:
         raise Problem(where, f'"{line[:_SHOWN]}" should be seconds, ">", "<" or "?", and bytes, '
                       'as in 0.004210 < 10 04')
     if abs(number) >= _LATEST:
-        raise Problem(where, f'"{time[:_SHOWN]}" is no number of seconds')
+        raise Problem(where, f'"{time[:_SHOWN]}" is not a number of seconds')
     return chunk

@@ -90,7 +90,7 @@ class Recording:
             self._position += len(line)
             where = f'{self._name}:{number}'
             if not line.isascii() or b'\0' in line:
-                raise Problem(where, 'this is no text; for a file of raw bytes give --binary')
+                raise Problem(where, 'this is not text; for a file of raw bytes give --binary')
             if len(line) > _LONGEST_LINE:
                 raise Problem(where, f'the line is longer than {_LONGEST_LINE // 1_000_000} MB; '
                               'divide it, or for a file of raw bytes give --binary')
@@ -148,5 +148,5 @@ def _bytes(text: str, where: str) -> bytes:
     try:
         return bytes.fromhex(re.sub(r'0x|,', ' ', text))
     except ValueError:
-        raise Problem(where, f'"{text[:60]}" is no hexadecimal dump; write bytes as in '
+        raise Problem(where, f'"{text[:60]}" is not a hexadecimal dump; write bytes as in '
                       '10 05 01 FF, or give --binary for a file of raw bytes') from None

@@ -195,7 +195,7 @@ def test_commands_on_input_several_at_once(
     simulator.line()
     simulator.type('error 2 50\n\nhush 1\nsilent 1\n')
     assert simulator.line() == 'simulator: station 2: error 50'
-    assert simulator.line() == 'simulator: "hush 1" is no command'
+    assert simulator.line() == 'simulator: "hush 1" is not a command'
     while simulator.line() != 'simulator: station 1: silent':
         pass
     line = descriptor(tmp_path / 'plc')
@@ -249,8 +249,8 @@ def test_bad_time(capsys: pytest.CaptureFixture[str], data: Path, at: str) -> No
 
 
 @pytest.mark.parametrize('command, text', [
-    ('hush 1', '--at: "hush 1" is no command'), ('silent 3', '--at: name a station (1, 2)'),
-    ('msg 1 N7:0 5', '--at: "msg 1 N7:0 5" is no command'),
+    ('hush 1', '--at: "hush 1" is not a command'), ('silent 3', '--at: name a station (1, 2)'),
+    ('msg 1 N7:0 5', '--at: "msg 1 N7:0 5" is not a command'),
     ('slow 1 x', '--at: slow 1 x: "x" should be')])
 def test_command_for_later_is_looked_at_before(
         capsys: pytest.CaptureFixture[str], data: Path, command: str, text: str) -> None:

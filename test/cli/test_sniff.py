@@ -138,7 +138,8 @@ def test_bad_line_ends_with_file_and_line_and_the_summary_so_far(
 
 
 @pytest.mark.parametrize('options, status, err, ends_with_summary', [
-    ([], 2, 'sniff: /dev/zero:1: this is no text; for a file of raw bytes give --binary\n', False),
+    ([], 2, 'sniff: /dev/zero:1: this is not text; for a file of raw bytes give --binary\n',
+     False),
     (['--binary', '--seconds', '1'], 0, '', True)])
 def test_endless_file_does_not_fill_the_memory(
         options: list[str], status: int, err: str, ends_with_summary: bool) -> None:
@@ -203,7 +204,7 @@ def test_missing_ports(capsys: Output, tmp_path: Path) -> None:
     assert f'sniff: {none}: ' in refused(capsys, '--tap', 'pty', str(none))
     assert refused(capsys, '--port', 'pty', '--save', '/nowhere/x').endswith(
         'sniff: /nowhere/x: No such file or directory\n')
-    assert 'is no capture; give another name' in refused(
+    assert 'is not a capture; give another name' in refused(
         capsys, '--port', 'pty', '--save', str(tmp_path))
 
 

@@ -496,7 +496,7 @@ def test_read_that_shows_a_write_is_due_at_once() -> None:
     assert bench.read(11.4) in (beside, elsewhere)
 
 
-def test_writes_that_hasten_a_slow_read_leave_nothing_behind() -> None:
+def test_writes_that_refresh_a_slow_read_leave_no_entries() -> None:
     slow, other = make_job('N7:5', period=86_400_000), make_job('N9:5', period=86_400_000)
     bench = Bench(slow, other)
     assert [bench.read(0.0), bench.read(0.0)] == [slow, other]

@@ -231,7 +231,7 @@ def write_results(bench: DriverBench) -> list[str]:
 
 @pytest.mark.parametrize('values, reason', [
     ([1], '1 values, the mapping has 2'),
-    ([1, 70000], 'value 70000 at index 1 is no int16'),
+    ([1, 70000], 'value 70000 at index 1 is not a valid int16'),
     ([1, 51], 'value 51 at index 1 is outside Min 0, Max 50')])
 def test_refused_for_its_values(values: list[float], reason: str) -> None:
     mapping = make_mapping('N7:0', 'Write', length=2, minimum=0, maximum=50)

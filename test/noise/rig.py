@@ -359,7 +359,7 @@ class Rig:
             return _POLL_TIMEOUT + one
         return one + (tries + 2) * wait
 
-    def trouble(self, rate: float, seconds: float) -> None:
+    def disturb(self, rate: float, seconds: float) -> None:
         """Let there be noise, and things to do, for a while."""
         self.wire.rate = rate
         end = self.clock() + seconds

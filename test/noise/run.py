@@ -64,7 +64,7 @@ class Case:
         """Run for a while; return how much was wrong."""
         rig = Rig(self.mode, self.error_code, self.kinds, seed)
         while rig.clock() < hours * _HOUR:
-            rig.trouble(self.rate, _STRETCH)
+            rig.disturb(self.rate, _STRETCH)
             rig.settle()
         ears, wire = rig.judge.ears, rig.wire
         self.theory = self.theory or Theory(

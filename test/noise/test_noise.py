@@ -43,7 +43,7 @@ LONGEST_RECOVERY = 30.0
 def test_noise(mode: str, rate: float, error_code: str) -> None:
     rig = Rig(mode, error_code, seed=round(1 / rate))
     for _ in range(2):
-        rig.trouble(rate, 300.0)
+        rig.disturb(rate, 300.0)
         rig.settle()
     counts = rig.judge.counts
     assert rig.judge.faults == 0, counts
@@ -71,7 +71,7 @@ def test_bcc_misses_as_many_as_theory_says(kind: Kind) -> None:
 
 def test_wire_without_errors_changes_nothing() -> None:
     rig = Rig('Message')
-    rig.trouble(0.0, 60.0)
+    rig.disturb(0.0, 60.0)
     rig.settle()
     assert (rig.wire.singles, rig.wire.several, rig.judge.unseen) == (0, 0, 0)
     assert rig.judge.counts['WRITTEN'] + rig.judge.counts['SUPERSEDED'] \
@@ -82,7 +82,7 @@ def test_same_seed_gives_the_same_figures() -> None:
     figures = []
     for _ in range(2):
         rig = Rig('Peer', seed=4)
-        rig.trouble(1e-2, 60.0)
+        rig.disturb(1e-2, 60.0)
         rig.settle()
         figures.append((rig.judge.counts, rig.wire.characters, rig.recoveries))
     assert figures[0] == figures[1]

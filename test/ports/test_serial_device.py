@@ -52,7 +52,7 @@ def wake() -> Iterator[int]:
 
 
 @pytest.mark.parametrize('name, text', [
-    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is no serial port'),
+    ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is not a serial port'),
     ('/tmp', 'Is a directory'), ('socket://127.0.0.1:1', 'Connection refused'),
     ('rfc2217://127.0.0.1:1', 'Connection refused')])
 def test_port_that_cannot_be_opened(name: str, text: str) -> None:

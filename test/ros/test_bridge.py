@@ -372,11 +372,11 @@ def test_bits_leave_the_other_bits_of_their_word_alone(
     ('weight', [-1.0], 'value -1 at index 0 is outside 0 to 2147483648, the range of uint32 with '
                        'Scale 0.5, Offset 0'),
     ('label', 'too long', '8 characters, the mapping has room for 6'),
-    ('setpoint', [float('nan')], 'value nan at index 0 is no float32'),
-    ('setpoint', [float('inf')], 'value inf at index 0 is no float32'),
-    ('lamp', [2], 'value 2 at index 0 is no bool'),
+    ('setpoint', [float('nan')], 'value nan at index 0 is not a valid float32'),
+    ('setpoint', [float('inf')], 'value inf at index 0 is not a valid float32'),
+    ('lamp', [2], 'value 2 at index 0 is not a valid bool'),
     ('lamp', [], '0 values, the mapping has 1'),
-    ('digits', [10000, 0], 'value 10000 at index 0 is no bcd16'),
+    ('digits', [10000, 0], 'value 10000 at index 0 is not a valid bcd16'),
     ('name', 83 * 'x', '83 characters, a PLC string has 82'),
     ('name', '5 €', "character '€' does not exist in a PLC")])
 def test_unfit_write_is_refused_with_the_reason(

@@ -314,7 +314,7 @@ def test_faults_of_the_simulator(line: Line) -> None:
     line.simulator.until('station 1: normal')
     assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
     line.simulator.tell('slow 1 3')
-    line.simulator.until('"slow 1 3" is no command')
+    line.simulator.until('"slow 1 3" is not a command')
 
 
 def test_slow_port_is_given_the_time_that_a_message_takes(tmp_path: Path) -> None:

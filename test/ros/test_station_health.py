@@ -27,7 +27,12 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.ros.station_health import health_values, LinkCounterService, trouble, wrong_type
+from abdf1_ros.ros.station_health import (
+    health_values,
+    LinkCounterService,
+    processor_fault,
+    wrong_type,
+)
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -59,7 +64,7 @@ def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
     (with_mode(Mode.RUN, 'RUN', 'bad RAM'), 'bad RAM (RUN)')])
 def test_what_keeps_a_processor_from_its_work(identity: Identity | None,
                                               text: str | None) -> None:
-    assert trouble(identity) == text
+    assert processor_fault(identity) == text
 
 
 PLC5 = Identity('PLC-5', 'PLC-5/40')

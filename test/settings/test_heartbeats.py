@@ -199,7 +199,7 @@ def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
 
 
 def test_rule_12_fallback_is_a_value_that_can_be_written() -> None:
-    assert 'Fallback cannot be written: value 1.5 at index 0 is no int16' in fault(
+    assert 'Fallback cannot be written: value 1.5 at index 0 is not a valid int16' in fault(
         **WRITE, Fallback='1.5', Fallback_After='500')
 
 

@@ -63,20 +63,20 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
 
 @pytest.mark.parametrize('line, text', [
     ('silent', 'name a station (1, 12)'), ('silent 3', 'name a station (1, 12)'),
-    ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is no command'),
-    ('silent 1 2', '"silent 1 2" is no command'), ('full 1 2', '"full 1 2" is no command'),
-    ('counters 1 2', '"counters 1 2" is no command'),
-    ('slow 1', '"slow 1" is no command'),
+    ('silent one', 'name a station (1, 12)'), ('hush 1', '"hush 1" is not a command'),
+    ('silent 1 2', '"silent 1 2" is not a command'), ('full 1 2', '"full 1 2" is not a command'),
+    ('counters 1 2', '"counters 1 2" is not a command'),
+    ('slow 1', '"slow 1" is not a command'),
     *((f'slow 1 {text}', f'slow 1 {text}: "{text}" should be a whole number from 0')
       for text in ('few', '-3', '1.5', '1_0', '\u0661')),
-    ('delay 1', '"delay 1" is no command'),
+    ('delay 1', '"delay 1" is not a command'),
     *((f'delay 1 {text}', f'delay 1 {text}: "{text}" should be ms from 0 to 3600000')
       for text in ('long', '-5', 'nan', '1e9', '1_0')),
     *((f'noise 1 {text}', f'noise 1 {text}: "{text}" should be a share from 0 to 1')
       for text in ('much', '-0.1', '1.1', 'nan')),
     *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal, as in 0B')
       for text in ('zz', '5', '500000', '\u0661\u0661')),
-    ('error 1', '"error 1" is no command'), ('normal 1 x', '"normal 1 x" is no command')])
+    ('error 1', '"error 1" is not a command'), ('normal 1 x', '"normal 1 x" is not a command')])
 def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
     plcs[0].faults = before = InjectedFaults(slow=2)
     with pytest.raises(CommandError) as caught:
@@ -108,7 +108,7 @@ def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
 
 
 @pytest.mark.parametrize('line, text', [
-    ('mode 12', '"mode 12" is no command'), ('mode 12 run now', '"mode 12 run now" is no'),
+    ('mode 12', '"mode 12" is not a command'), ('mode 12 run now', '"mode 12 run now" is not'),
     ('mode 12 stop', 'mode 12 stop: the modes are run, program, remote, test, fault')])
 def test_bad_mode(plcs: list[SimulatedPlc], line: str, text: str) -> None:
     with pytest.raises(CommandError) as caught:
@@ -130,10 +130,11 @@ def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> Non
 
 
 @pytest.mark.parametrize('line, text', [
-    ('msg 12 N7:0', '"msg 12 N7:0" is no command'),
+    ('msg 12 N7:0', '"msg 12 N7:0" is not a command'),
     ('msg 12 Q7:0 5', 'msg Q7:0: SLC has no Q files'),
     ('msg 12 N7:0 x', 'msg N7:0: "x" should be a number'),
-    ('slow 12 3', '"slow 12 3" is no command'), ('delay 12 3', '"delay 12 3" is no command')])
+    ('slow 12 3', '"slow 12 3" is not a command'),
+    ('delay 12 3', '"delay 12 3" is not a command')])
 def test_bad_command_on_a_full_duplex_line(
         plcs: list[SimulatedPlc], line: str, text: str) -> None:
     with pytest.raises(CommandError) as caught:
@@ -143,7 +144,7 @@ def test_bad_command_on_a_full_duplex_line(
 
 
 def test_message_needs_a_full_duplex_line(plcs: list[SimulatedPlc]) -> None:
-    with pytest.raises(CommandError, match='"msg 12 N7:0 5" is no command'):
+    with pytest.raises(CommandError, match='"msg 12 N7:0 5" is not a command'):
         execute('msg 12 N7:0 5', plcs)
     assert not plcs[1].outbox
 

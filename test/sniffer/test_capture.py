@@ -125,12 +125,12 @@ def test_others_cannot_read_a_capture(tmp_path: Path) -> None:
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     path.write_text('important', encoding='ascii')
-    with pytest.raises(OSError, match='is no capture; give another name'):
+    with pytest.raises(OSError, match='is not a capture; give another name'):
         CaptureWriter(path)
     assert path.read_text(encoding='ascii') == 'important'
-    with pytest.raises(OSError, match='is no capture'):
+    with pytest.raises(OSError, match='is not a capture'):
         CaptureWriter(Path('/dev/null'))
-    with pytest.raises(OSError, match='is no capture'):
+    with pytest.raises(OSError, match='is not a capture'):
         CaptureWriter(tmp_path)
     with pytest.raises(FileNotFoundError):
         CaptureWriter(tmp_path / 'nowhere' / 'x')
@@ -161,7 +161,7 @@ def test_bad_line_is_named(line: str) -> None:
 
 @pytest.mark.parametrize('time', ['1e10', '-1e10', '9' * 100])
 def test_time_is_a_number(time: str) -> None:
-    with pytest.raises(Problem, match='a.cap:2: .* is no number of seconds'):
+    with pytest.raises(Problem, match='a.cap:2: .* is not a number of seconds'):
         list(read_capture('a.cap', ['# abdf1_ros capture 1', f'{time} > 10 04'], {}))
 
 

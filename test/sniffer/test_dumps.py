@@ -94,7 +94,7 @@ def test_offset_that_cannot_follow_what_was_left_out(offset: str) -> None:
 
 @pytest.mark.parametrize('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
 def test_bad_line_is_named(line: str) -> None:
-    with pytest.raises(Problem, match='is no hexadecimal dump; write bytes as in') as caught:
+    with pytest.raises(Problem, match='is not a hexadecimal dump; write bytes as in') as caught:
         joined(['10 04', line])
     assert str(caught.value).startswith('x:2: ')
 
@@ -120,13 +120,13 @@ def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:
 
 
 def test_binary_file_taken_for_text(tmp_path: Path) -> None:
-    with pytest.raises(Problem, match=r'x:1: this is no text; for a file of raw bytes give --b'):
+    with pytest.raises(Problem, match=r'x:1: this is not text; for a file of raw bytes give --b'):
         chunks(tmp_path / 'x', DATA)
 
 
 @pytest.mark.parametrize('content', [b'\0', b'10 04\0'])
 def test_zeros_are_no_text(tmp_path: Path, content: bytes) -> None:
-    with pytest.raises(Problem, match=r'x:1: this is no text; for a file of raw bytes give --b'):
+    with pytest.raises(Problem, match=r'x:1: this is not text; for a file of raw bytes give --b'):
         chunks(tmp_path / 'x', content)
 
 
@@ -140,7 +140,7 @@ def test_longest_line(tmp_path: Path) -> None:
 
 
 def test_file_without_an_end() -> None:
-    with pytest.raises(Problem, match='/dev/zero:1: this is no text'):
+    with pytest.raises(Problem, match='/dev/zero:1: this is not text'):
         next(Recording(Path('/dev/zero')).chunks())
     endless = Recording(Path('/dev/zero'), is_binary=True).chunks()
     assert all(0 < len(next(endless).data) <= 65536 for _ in range(3))

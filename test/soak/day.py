@@ -63,7 +63,7 @@ def _run(mode: str, hours: int, seed: int) -> int:
     kept = []
     for hour in range(hours):
         while rig.clock() < (hour + 1) * _HOUR:
-            rig.trouble()
+            rig.disturb()
         rig.settle()
         rig.check_bounds()
         gc.collect()

@@ -164,7 +164,7 @@ class FaultyLine:
         assert self.ear.diagnostics is not None
         self.ear.diagnostics.statuses(self.clock())
 
-    def trouble(self) -> None:
+    def disturb(self) -> None:
         """Let every kind of fault happen once, in any order; then all is well again."""
         for name in self._random.sample([*self.kinds], len(self.kinds)):
             self.faults[name] += 1

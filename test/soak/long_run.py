@@ -209,7 +209,7 @@ class LongRun:
         """Wait until everything is read."""
         self._until(lambda: self._link_is('2 of 2 stations have answered'), 'both stations')
 
-    def trouble(self, seconds: float) -> None:
+    def disturb(self, seconds: float) -> None:
         """Let one fault after the other happen for so long."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
@@ -328,7 +328,7 @@ def _rounds(run: LongRun, end: float) -> list[float]:
         if is_quiet:
             run.run(_ROUND)
         else:
-            run.trouble(_ROUND)
+            run.disturb(_ROUND)
             run.until_well()
         counts = run.end_round()
         recoveries.append(run.begin_round())

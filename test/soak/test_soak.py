@@ -29,10 +29,10 @@ MOST_GROWTH = 150_000
 @pytest.mark.parametrize('mode', MODES)
 def test_faults_cannot_grow_memory(mode: str) -> None:
     rig = FaultyLine(mode)
-    rig.trouble()  # fills caches, and what is learned at first
+    rig.disturb()  # fills caches, and what is learned at first
     rig.settle()
     before = kept_bytes(rig)
-    rig.trouble()
+    rig.disturb()
     rig.settle()
     assert kept_bytes(rig) - before < MOST_GROWTH
     rig.check_bounds()

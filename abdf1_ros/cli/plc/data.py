@@ -131,7 +131,7 @@ class Writing:
     """
     One write to one mapping.
 
-    Raises FormatError, saying what is wrong, when ``texts`` are no values of the mapping.
+    Raises FormatError, saying what is wrong, when ``texts`` are not values of the mapping.
     """
 
     def __init__(self, mapping: Mapping, texts: Sequence[str]) -> None:
@@ -182,7 +182,7 @@ def _number(mapping: Mapping, text: str) -> float:
         value = decimal_number(text.replace(',', '.'))
         right = 'a number such as -1.5 or 2e3'
     if value is None or not low <= value <= high:
-        raise FormatError(f'"{text}" is no {kind.value}, {right}')
+        raise FormatError(f'"{text}" is not a valid {kind.value}, {right}')
     return value
 
 

@@ -211,9 +211,11 @@ def test_write_asks_who_sits_at_a_terminal(line: str, plc: Plc, answer: str, sta
 
 
 @pytest.mark.parametrize('args, text', [
-    (('N7:0', '40000'), '"40000" is no int16'), (('N7:0', '1_000'), '"1_000" is no int16'),
-    (('N7:0', 'ten'), '"ten" is no int16'), (('N7:0', '1.5'), '"1.5" is no int16'),
-    (('B3:0/0', '2'), '"2" is no bool'),
+    (('N7:0', '40000'), '"40000" is not a valid int16'),
+    (('N7:0', '1_000'), '"1_000" is not a valid int16'),
+    (('N7:0', 'ten'), '"ten" is not a valid int16'),
+    (('N7:0', '1.5'), '"1.5" is not a valid int16'),
+    (('B3:0/0', '2'), '"2" is not a valid bool'),
     (('ST9:0', 'Tank', '5'), 'ST9:0 takes one text; quote it if it has spaces'),
     (('T4:0', '5'), 'belongs to the processor'), (('N7', '5'), 'ADDRESS "N7": an element is'),
     (('N7:9999', '5'), 'ADDRESS "N7:9999": elements of N run from 0 to 255')])

@@ -112,9 +112,9 @@ def test_no_values(address: str, texts: list[str]) -> None:
 
 
 @pytest.mark.parametrize('address, text, right', [
-    ('N7:0', '1_000', '"1_000" is no int16, a whole number from -32768 to 32767'),
-    ('B3:0/1', '2', '"2" is no bool, a whole number from 0 to 1'),
-    ('F8:0', '1_000', '"1_000" is no float32, a number such as -1.5 or 2e3'),
+    ('N7:0', '1_000', '"1_000" is not a valid int16, a whole number from -32768 to 32767'),
+    ('B3:0/1', '2', '"2" is not a valid bool, a whole number from 0 to 1'),
+    ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3'),
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
 def test_value_that_is_none_says_what_would_be_right(address: str, text: str, right: str) -> None:
     with pytest.raises(FormatError) as caught:
