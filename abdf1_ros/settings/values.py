@@ -35,36 +35,35 @@ FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 
 
 class ValueType(Enum):
-    """What a mapping's Type column may say."""
+    """
+    What a mapping's Type column may say.
 
-    BOOL = 'bool'
-    INT16 = 'int16'
-    UINT16 = 'uint16'
-    INT32 = 'int32'
-    UINT32 = 'uint32'
-    FLOAT32 = 'float32'
-    BCD16 = 'bcd16'
-    STRING = 'string'
+    ``words`` are what one element takes in a PLC, 0 for a bit; ``message`` is the name of the
+    message in std_msgs that carries such values, ``array_code`` the type code of the
+    ``array.array`` that holds them, ``range`` the least and the greatest of them.
+    """
 
-    @property
-    def words(self) -> int:
-        """Return the words that one element takes in a PLC, 0 for a bit."""
-        return _WORDS[self]
+    words: int
+    message: str
+    array_code: str
+    range: tuple[float, float]  # noqa: A003
 
-    @property
-    def array_code(self) -> str:
-        """Return the type code of ``array.array`` that holds such values."""
-        return _ARRAY_CODES[self]
+    BOOL = 'bool', 0, 'UInt8MultiArray', 'B', (0, 1)
+    INT16 = 'int16', 1, 'Int16MultiArray', 'h', (-32768, 32767)
+    UINT16 = 'uint16', 1, 'UInt16MultiArray', 'H', (0, 65535)
+    INT32 = 'int32', 2, 'Int32MultiArray', 'i', (-2**31, 2**31 - 1)
+    UINT32 = 'uint32', 2, 'UInt32MultiArray', 'I', (0, 2**32 - 1)
+    FLOAT32 = 'float32', 2, 'Float32MultiArray', 'f', (-FLOAT_MAX, FLOAT_MAX)
+    BCD16 = 'bcd16', 1, 'UInt16MultiArray', 'H', (0, 9999)
+    STRING = 'string', strings.COUNTED_WORDS, 'String', '', (-math.inf, math.inf)
 
-    @property
-    def message(self) -> str:
-        """Return the name of the message in std_msgs that carries such values."""
-        return _MESSAGES[self]
-
-    @property
-    def range(self) -> tuple[float, float]:  # noqa: A003
-        """Return the least and the greatest value."""
-        return _RANGES[self]
+    def __new__(cls, name: str, words: int, message: str, array_code: str,
+                limits: tuple[float, float]) -> ValueType:
+        """Return a member whose value is what the column says."""
+        member = object.__new__(cls)
+        member._value_, member.words, member.message = name, words, message
+        member.array_code, member.range = array_code, limits
+        return member
 
 
 class WordOrder(Enum):
@@ -73,24 +72,6 @@ class WordOrder(Enum):
     LOW = 'Low'
     HIGH = 'High'
 
-
-_WORDS = {
-    ValueType.BOOL: 0, ValueType.INT16: 1, ValueType.UINT16: 1, ValueType.BCD16: 1,
-    ValueType.INT32: 2, ValueType.UINT32: 2, ValueType.FLOAT32: 2,
-    ValueType.STRING: strings.COUNTED_WORDS}
-_ARRAY_CODES = {
-    ValueType.BOOL: 'B', ValueType.INT16: 'h', ValueType.UINT16: 'H', ValueType.BCD16: 'H',
-    ValueType.INT32: 'i', ValueType.UINT32: 'I', ValueType.FLOAT32: 'f'}
-_MESSAGES = {
-    ValueType.BOOL: 'UInt8MultiArray', ValueType.INT16: 'Int16MultiArray',
-    ValueType.UINT16: 'UInt16MultiArray', ValueType.BCD16: 'UInt16MultiArray',
-    ValueType.INT32: 'Int32MultiArray', ValueType.UINT32: 'UInt32MultiArray',
-    ValueType.FLOAT32: 'Float32MultiArray', ValueType.STRING: 'String'}
-_RANGES: dict[ValueType, tuple[float, float]] = {
-    ValueType.BOOL: (0, 1), ValueType.INT16: (-32768, 32767), ValueType.UINT16: (0, 65535),
-    ValueType.BCD16: (0, 9999), ValueType.INT32: (-2**31, 2**31 - 1),
-    ValueType.UINT32: (0, 2**32 - 1), ValueType.FLOAT32: (-FLOAT_MAX, FLOAT_MAX),
-    ValueType.STRING: (-math.inf, math.inf)}
 
 _WORD_TYPES = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16, ValueType.INT32,
                ValueType.UINT32, ValueType.FLOAT32)
