@@ -87,28 +87,21 @@ class Accounting:
         self.counters.stale_messages += 1
         self.report(wrong_message(reply, reply.src))
 
-    def check(self, reply: Packet, command: Packet) -> None:
-        """Count the reply to ``command``; WrongCommandCode when it is another command's (S0)."""
+    def complete(self, task: Task, reply: Packet) -> None:
+        """End a task with the reply to its command, or as WrongCommandCode where not its (S0)."""
         station = self._stations[reply.src]
-        expected = command.cmd | REPLY_BIT
+        expected = task.command.cmd | REPLY_BIT
         if reply.cmd != expected:
             self.counters.invalid_messages += 1
             details = station.number, reply.cmd, expected
             self.note(Message.ERR_BAD_FUNCTION_CODE, *details, station=station.number)
-            raise WrongCommandCode(*details)
+            task.fail(WrongCommandCode(*details))
+            return
         station.replies += 1
         station.overdue = 0
         station.last_tns = reply.tns
         self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
-
-    def complete(self, task: Task, reply: Packet) -> None:
-        """End a task with the reply to its command."""
-        try:
-            self.check(reply, task.command)
-        except WrongCommandCode as error:
-            task.fail(error)
-        else:
-            task.reply(reply)
+        task.reply(reply)
 
     def late(self, station: int, *, keeps_others_waiting: bool) -> None:
         """Count and report a reply that has not come within Cmd_Timeout (S0, counter 2545)."""

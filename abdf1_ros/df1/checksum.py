@@ -25,10 +25,8 @@ class Checksum(Enum):
     BCC = 'BCC'
     CRC = 'CRC'
 
-    @property
-    def size(self) -> int:
-        """Return the number of check bytes: 1 or 2."""
-        return 1 if self is Checksum.BCC else 2
+    def __init__(self, name: str) -> None:
+        self.size = 1 if name == 'BCC' else 2  # check bytes
 
     def of_message(self, data: bytes | bytearray, station: int | None = None) -> int:
         """

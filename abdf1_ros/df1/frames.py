@@ -80,7 +80,12 @@ def message_frame(data: bytes, checksum: Checksum) -> bytes:
 def master_frame(station: int, data: bytes, checksum: Checksum) -> bytes:
     """Return the frame of a master's message to ``station`` (0-255) around ``data`` (M 5-2)."""
     check = checksum.encode(checksum.of_message(data, station))
-    return SOH + stuff(bytes((station,))) + STX + stuff(data) + ETX + check
+    return _addressed(station) + stuff(data) + ETX + check
+
+
+@cache
+def _addressed(station: int) -> bytes:
+    return SOH + stuff(bytes((station,))) + STX
 
 
 @cache

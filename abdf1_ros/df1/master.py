@@ -47,7 +47,7 @@ from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, T
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive, WrongCommandCode
+from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
 from abdf1_ros.messages import Event
 
 
@@ -80,45 +80,35 @@ class HalfDuplexMaster:
             now = self._machine.now
             task = source.next_task(now)
             if task is not None:
-                yield from self._carry_out(task)
+                yield from self.carry_out(task)
             elif not self._line.has_forwards():
                 due = source.next_due()
                 yield Step(None, None if due is None else max(due - now, 0.0))
 
-    def _carry_out(self, task: Task) -> Talk:
+    def carry_out(self, task: Task) -> Talk:
+        """Send the command of a task and end it; a broadcast has no reply but our own."""
+        command = task.command
+        number = self._stations.via(command.dst)  # on this line (M 3-7)
         try:
-            reply = yield from self.exchange(task)
+            if number != BROADCAST and not self._stations[number].active:
+                yield from self._line.probe(number)
+            task.sent = True
+            started = yield from self._line.deliver(number, command, task.expires)
+            reply = command.reply() if number == BROADCAST else (
+                yield from self._collect(number, command, started, task.reply_size))
         except CommandExpired as error:
             task.sent = error.sent
             task.fail(error)
-        except (StationInactive, CommandTimeout, WrongCommandCode) as error:
+        except StationInactive as error:
+            task.fail(error)
+        except CommandTimeout as error:
+            yield from self._give_up(command.dst)
             task.fail(error)
         else:
-            task.reply(reply)
-
-    def exchange(self, task: Task) -> Generator[Step, Heard, Packet]:
-        """
-        Send the command of a task, which is told so, and return the reply to it.
-
-        A broadcast has no reply; the one returned for it is our own.
-
-        Raises StationInactive, CommandTimeout, CommandExpired or WrongCommandCode.
-        """
-        command = task.command
-        number = self._stations.via(command.dst)  # on this line (M 3-7)
-        if number != BROADCAST and not self._stations[number].active:
-            yield from self._line.probe(number)
-        task.sent = True
-        started = yield from self._line.deliver(number, command, task.expires)
-        if number == BROADCAST:
-            return command.reply()
-        try:
-            reply = yield from self._collect(number, command, started, task.reply_size)
-        except CommandTimeout:
-            yield from self._give_up(command.dst)
-            raise
-        self._line.check_reply(reply, command)
-        return reply
+            if number == BROADCAST:
+                task.reply(reply)
+            else:
+                self._line.complete(task, reply)
 
     def _collect_for_slave(self, number: int, command: Packet) -> Talk:
         """Poll for the reply to a command that was passed on (M 3-8)."""

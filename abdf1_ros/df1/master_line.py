@@ -188,8 +188,10 @@ class MasterLine:
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
         """Poll an inactive station; report whatever was heard that is not a good answer."""
-        answer = yield from self.poll(number)
-        if not is_good(answer) and (not isinstance(answer, Silence) or self._last_code):
+        answer = yield from self._poll(number)
+        if is_good(answer):
+            self.stations.heard(number, self.machine.now)
+        elif not isinstance(answer, Silence) or self._last_code:
             self._note_cause(answer, number, Message.NTC_EOT_STX_EXPECTED)
         return answer
 
@@ -201,8 +203,9 @@ class MasterLine:
         ``reply_size`` is that of the task whose reply is expected.
         """
         for retry in range(1, self.settings.enq_retries + 2):
-            answer = yield from self.poll(number, pause, reply_size)
+            answer = yield from self._poll(number, pause, reply_size)
             if is_good(answer):
+                self.stations.heard(number, self.machine.now)
                 return answer
             pause = 0.0
             cause = self._note_cause(answer, number, Message.NTC_EOT_STX_EXPECTED)
@@ -213,16 +216,13 @@ class MasterLine:
         self.note(Message.NTC_ENQ_LIMIT_EXCEEDED, self.settings.enq_retries, station=number)
         self.fail_inactive(number)
 
-    def poll(self, number: int, pause: float = 0.0,
-             reply_size: int = 0) -> Generator[Step, Heard, Heard]:
+    def _poll(self, number: int, pause: float = 0.0,
+              reply_size: int = 0) -> Generator[Step, Heard, Heard]:
         """Poll once; return EOT, NAK, a frame good or bad, or silence."""
         self.counters.polls_sent += 1
-        answer = yield from self._ask(
+        return self._ask(
             Step(frames.poll_frame(number), self._timeout, pause, reply_size=reply_size), number,
             _POLL_ANSWERS)
-        if is_good(answer):
-            self.stations.heard(number, self.machine.now)
-        return answer
 
     def _ask(self, question: Step, number: int,
              wanted: tuple[Control, ...]) -> Generator[Step, Heard, Heard]:
@@ -303,7 +303,7 @@ class MasterLine:
 
     def _speaks_for(self, number: int, src: int) -> bool:
         """Tell whether a message of ``src`` may come from station ``number`` of this line."""
-        return self.stations.via(src) == number
+        return src == number or self.stations.via(src) == number
 
     def _is_echo(self, symbol: Frame | Poll, frame: bytes | None) -> bool:
         """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
@@ -354,17 +354,9 @@ class MasterLine:
 
     def complete(self, task: Task, reply: Packet) -> None:
         """End a task with the reply to its command."""
-        self._heard_from(reply)
-        self.accounting.complete(task, reply)
-
-    def _heard_from(self, reply: Packet) -> None:
         if reply.sts == 0 or reply.sts & 0xF0:  # else a gateway has sent it in its place (M 8-2)
             self.stations.heard(reply.src, self.machine.now)
-
-    def check_reply(self, reply: Packet, command: Packet) -> None:
-        """Count the reply to ``command``; WrongCommandCode when it is another's."""
-        self._heard_from(reply)
-        self.accounting.check(reply, command)
+        self.accounting.complete(task, reply)
 
     def take_unwanted(self, number: int, packet: Packet) -> None:
         """
@@ -431,7 +423,8 @@ class MasterLine:
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""
-        return any(packet.dst not in busy for packet in self._forwards)
+        return bool(self._forwards) and any(
+            packet.dst not in busy for packet in self._forwards)
 
     @property
     def is_full(self) -> bool:

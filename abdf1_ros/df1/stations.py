@@ -59,14 +59,23 @@ class Station:
 
     def accepts(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""
-        if self.repeats(packet):
+        key = packet.dst, *packet.duplicate_key
+        if key == self.last_key:
             return False
-        self.last_key = packet.dst, *packet.duplicate_key
+        self.last_key = key
         return True
 
     def repeats(self, packet: Packet) -> bool:
         """Tell whether ``packet`` is a repetition of the last message."""
         return (packet.dst, *packet.duplicate_key) == self.last_key
+
+
+class _Records(dict[int, Station]):
+    """The records of stations, each made when it is first asked for."""
+
+    def __missing__(self, number: int) -> Station:
+        """Return a new record."""
+        return self.setdefault(number, Station(number))
 
 
 class ActiveStationList:
@@ -88,8 +97,8 @@ class ActiveStationList:
                  routes: Mapping[int, int] | None = None, probe_time: float = 0.0) -> None:
         self.polled: Collection[int] = ()
         self.probes = Probes(probe_time)
+        self._records = _Records()
         self._stations: dict[int, Station] = {}
-        self._strangers: dict[int, Station] = {}
         self._on_change = on_change
         self._routes = {station: gateway for station, gateway in (routes or {}).items()
                         if station != gateway}
@@ -98,8 +107,7 @@ class ActiveStationList:
     def add(self, numbers: Iterable[int]) -> None:
         """Take stations into the list."""
         for number in numbers:
-            self._stations[number] = self[number]
-            self._strangers.pop(number, None)
+            self._stations[number] = self._records[number]
         self._stations = dict(sorted(self._stations.items()))
 
     def __iter__(self) -> Iterator[Station]:
@@ -112,8 +120,7 @@ class ActiveStationList:
 
     def __getitem__(self, number: int) -> Station:
         """Return the record of a station (0-254), of the list or not."""
-        station = self._stations.get(number)
-        return station or self._strangers.setdefault(number, Station(number))
+        return self._records[number]
 
     def via(self, number: int) -> int:
         """Return the station of this line that is polled for a station: its gateway, or itself."""
@@ -125,7 +132,7 @@ class ActiveStationList:
 
     def heard(self, number: int, now: float) -> None:
         """Note an answer of any kind: the station is active, and all that share its gateway."""
-        station = self[number]
+        station = self._records[number]
         station.last_heard = now
         if station.active:
             return  # and so are all that share its gateway

@@ -113,12 +113,10 @@ class Rig:
             if self._command is not None:
                 command, self._command = self._command, None
                 started, was_active = machine.now, self.stations[command.dst].active
-                result: Packet | LinkError
-                try:
-                    result = yield from self.master.exchange(
-                        CommandTask(command, lambda: machine.now))
-                except LinkError as error:
-                    result = error
+                task = CommandTask(command, lambda: machine.now)
+                yield from self.master.carry_out(task)
+                assert task.result is not None
+                result = task.result
                 self.outcomes.append(Outcome(command, result, machine.now - started, was_active))
                 self._done = True
             yield Step(None, None)

@@ -82,10 +82,8 @@ class MasterScript:
     def _procedure(self, machine: Machine) -> Procedure:
         while True:
             if self._result is None:
-                try:
-                    self._result = yield from self.master.exchange(self.task)
-                except LinkError as error:
-                    self._result = error
+                yield from self.master.carry_out(self.task)
+                self._result = self.task.result
             yield Step(None, None)
 
     def run(self, command: Packet, *script: Expect | Answer | Silence) -> Packet | LinkError:
