@@ -80,7 +80,7 @@ class Agenda:
 
     def _own(self, now: float, busy: Container[int]) -> OwnWrite | None:
         """Return a heartbeat or fallback; these do not count as writes in a row (rule 11)."""
-        own = self.interlocks.next(now, busy) if self.interlocks else None
+        own = self.interlocks.next(now, busy) if self.interlocks is not None else None
         if own is not None:
             self.writes.begin_own(own.write)
             self._own_in_a_row += 1
@@ -140,7 +140,7 @@ class Agenda:
         """Return when there is something to do next (clock value in s), None for never."""
         moments = [moment for moment in (self.reads.next_due(), self.checks.next_due())
                    if moment is not None]
-        if self.interlocks and (own := self.interlocks.next_due()) < math.inf:
+        if self.interlocks is not None and (own := self.interlocks.next_due()) < math.inf:
             moments.append(own)
         return min(moments, default=None)
 

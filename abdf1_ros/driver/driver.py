@@ -136,10 +136,11 @@ class Driver:
             self.stations, self.health, self._tasks, patience=settings.write_timeout,
             report=listener.written)
         self._reads, self._writes = self._agenda.reads, self._agenda.writes
-        self.interlocks = self._agenda.interlocks = Interlocks(
+        self.interlocks = Interlocks(
             () if settings.read_only else mappings, self.stations, self._writes,
             network.cmd_timeout / 1000,
             lambda write: self._served.store(write.mapping, write.raw), listener.written)
+        self._agenda.interlocks = self.interlocks if self.interlocks else None
         self._reads.replace((), map(self._job, blocks), 0.0)
         self._read_backs = ReadBacks(settings.write_timeout, listener.written)
 
@@ -260,7 +261,7 @@ class Driver:
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the command that has the line next, not for a ``busy`` station."""
-        self.expire(now)
+        self._sort_inbox(now)  # the machine has let expire what has waited too long
         job = self._agenda.next(now, busy)
         if job is None:
             return None
@@ -430,11 +431,12 @@ class Driver:
         now = self.machine.now
         self._read_backs.read(job.block, data, job.started, now)
         self._guards.values_read(job.points, job.slices, data, now)
-        has_recovered = any(point.error is not None for point in job.points)
+        has_recovered = False
         for point, place in zip(job.points, job.slices, strict=True):
+            has_recovered |= point.error is not None
             if not job.is_refresh and not point.is_due(now, job.block.period):
                 continue
-            reason = self._guards.why_withheld(point.mapping, job.started, now)
+            reason = point.guard.why_not(job.started, now) if point.guard else ''
             if not reason:
                 self._update(point, data[place])
             elif point.withhold(reason, now):

@@ -27,7 +27,6 @@ import math
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.interlocks import ANSWERS_IN_TIME
-from abdf1_ros.settings.mapping import Mapping
 
 
 class RunGuard:
@@ -97,7 +96,6 @@ class Guards:
     """The guards of all rows with Publish_While."""
 
     def __init__(self, points: Iterable[ReadPoint]) -> None:
-        self._guards: dict[int, RunGuard | CounterGuard] = {}
         self._runs: dict[int, list[RunGuard]] = {}
         self._counters: dict[str, list[CounterGuard]] = {}
         for point in points:
@@ -107,11 +105,11 @@ class Guards:
             if condition.tag is None or condition.timeout is None:
                 run = RunGuard(point.stale_time)
                 self._runs.setdefault(point.mapping.station, []).append(run)
-                self._guards[id(point.mapping)] = run
+                point.guard = run
             else:
                 counter = CounterGuard(condition.tag, condition.timeout / 1000)
                 self._counters.setdefault(condition.tag, []).append(counter)
-                self._guards[id(point.mapping)] = counter
+                point.guard = counter
 
     def status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""
@@ -131,8 +129,3 @@ class Guards:
         for point, place in zip(points, places, strict=True):
             for counter in self._counters.get(point.mapping.tag, ()):
                 counter.read(data[place], now)
-
-    def why_withheld(self, mapping: Mapping, started: float, now: float) -> str:
-        """Return why a value is not to be published, empty if it is."""
-        guard = self._guards.get(id(mapping))
-        return guard.why_not(started, now) if guard else ''

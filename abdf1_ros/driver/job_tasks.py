@@ -72,7 +72,10 @@ class JobTasks:
 
     def waiting(self, busy: Container[int]) -> JobTask | None:
         """Return a task whose next command waits to be sent, but not to a ``busy`` station."""
-        return next((task for task in self._waiting if task.station not in busy), None)
+        for task in self._waiting:
+            if task.station not in busy:
+                return task
+        return None
 
     def take(self, task: JobTask, now: float) -> JobTask:
         """Return a waiting task that is now to be sent."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Protocol
 
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.address import Address
@@ -44,6 +45,13 @@ class Freshness(Enum):
     WAITING = 'waiting for the first read'
 
 
+class Guard(Protocol):
+    """What decides whether a value that was read may be published."""
+
+    def why_not(self, started: float, now: float) -> str:
+        """Return why a value read from ``started`` on is not to be published, empty if it is."""
+
+
 class ReadPoint:
     """
     What is known about one mapping that reads.
@@ -53,7 +61,7 @@ class ReadPoint:
     ``interval`` is the seconds between the last two good reads, None if a failed one was between
     them. ``error`` says why the last read gave no value, ``withheld`` why its value was not
     published. Values are withheld since ``withheld_since`` (clock value in s), and this is the
-    ``withholdings``-th time.
+    ``withholdings``-th time. ``guard`` decides that, where the row has one.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
@@ -64,6 +72,7 @@ class ReadPoint:
         self.interval: float | None = None
         self.error: str | None = None
         self.failures = 0
+        self.guard: Guard | None = None
         self.withheld = ''
         self.withheld_since = 0.0
         self.withholdings = 0

@@ -36,7 +36,7 @@ import math
 
 from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import ReadPoint, Write
-from abdf1_ros.driver.transactions import read_packet
+from abdf1_ros.driver.transactions import words_of
 from abdf1_ros.plan.forecast import PATIENCE, scan_time
 from abdf1_ros.plan.planner import Block
 
@@ -64,6 +64,7 @@ class ReadJob:
     def __init__(self, block: Block, points: Sequence[ReadPoint],
                  longest_read: float = math.inf) -> None:
         self.block = block
+        self.station = block.station
         self.points = tuple(points)
         # Needed at every read, and always the same.
         self._commands = block.commands()
@@ -84,11 +85,6 @@ class ReadJob:
         self._packets: list[bytes] = []
 
     @property
-    def station(self) -> int:
-        """Return the station to read from."""
-        return self.block.station
-
-    @property
     def reply_size(self) -> int:
         """Return the bytes after the header of a good reply to the next command."""
         return self._reply_sizes[len(self._packets)]
@@ -102,13 +98,13 @@ class ReadJob:
         """
         Read one packet; return all words after the last, None before.
 
-        Raises like ``read_packet``; the next read then begins anew.
+        Raises LinkError, and like ``words_of``; the next read then begins anew.
         """
         packets, self._packets = self._packets, []
         number = len(packets)
         if not number:
             self.started, self.late, self.is_to_repeat = now, late, False
-        packets.append((yield from read_packet(self.block, number, self._commands[number])))
+        packets.append(words_of(self.block, number, (yield self._commands[number])))
         if len(packets) == len(self._commands):
             return b''.join(packets)
         self._packets = packets
@@ -231,10 +227,13 @@ class ReadQueue:
 
     def _clean_heaps(self) -> list[list[_QueueEntry]]:
         """Return the heaps that are not empty, each beginning with a valid entry."""
+        heaps = []
         for heap in self._heaps.values():
             while heap and not self._counts(heap[0]):
                 heapq.heappop(heap)
-        return [heap for heap in self._heaps.values() if heap]
+            if heap:
+                heaps.append(heap)
+        return heaps
 
     def _counts(self, entry: _QueueEntry) -> bool:
         """Tell whether this entry is its job's last one, and the job has not been replaced."""

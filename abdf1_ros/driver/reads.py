@@ -71,6 +71,8 @@ class Reads:
 
     def next_probe(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
+        if not self._aside:
+            return None
         for number in list(self._aside):
             if self._stations[number].replies_in_time:  # to a write, or to somebody else
                 self.release(number, now)
@@ -132,7 +134,8 @@ class Reads:
             self._put_off = now if self._due else now + job.block.period
             self._set_aside(job)
             return
-        self.release(job.station, now)
+        if self._aside:
+            self.release(job.station, now)
         if job.is_under_way or job.is_to_repeat:
             self._due.put(job, job.due)
         elif job.started < job.refreshed:  # it had begun before the write

@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.diagnostic_status import decode_identity
-from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import Identity
@@ -38,30 +38,36 @@ REWRITTEN = ('by reading the word and writing it back; a change that the PLC mad
              'lost')
 
 
-def read_packet(block: Block, number: int,
-                command: Request) -> Steps[bytes]:
+def words_of(block: Block, number: int, reply: Packet) -> bytes:
     """
-    Read the words of one request of a block; ``command`` is that request encoded.
+    Return the words in the reply to one request of a block.
 
-    Raises LinkError, RemoteError, or FormatError for a reply that cannot be used.
+    Raises RemoteError, or FormatError for a reply that cannot be used.
     """
     request = block.requests[number]
     try:
-        reply = check_status((yield command), family_of(block.start.plc_type).meanings)
+        data = _data_of(reply, request.start)
     except RemoteError as error:
         if error.sts == STS_ILLEGAL_COMMAND and \
                 request.words > block.dialect.sure_read(request.start.file_type):
             raise RemoteError(error.sts, error.ext_sts, f'{error}, or too many words at once for '
                               'this processor: name it in the column Processor') from None
         raise
-    return block.dialect.read_data(request.start, request.words, reply)
+    return block.dialect.read_data(request.start, request.words, data)
+
+
+def _data_of(reply: Packet, address: Address) -> bytes:
+    """Return the data of a good reply; RemoteError, in the words of the family, for any other."""
+    if reply.sts == 0:
+        return reply.data
+    return check_status(reply, family_of(address.plc_type).meanings)
 
 
 def read_block(block: Block) -> Steps[bytes]:
-    """Read all words of a block; raises like ``read_packet``."""
+    """Read all words of a block; raises LinkError, and like ``words_of``."""
     data = b''
     for number, command in enumerate(block.commands()):
-        data += yield from read_packet(block, number, command)
+        data += words_of(block, number, (yield command))
     return data
 
 
@@ -86,8 +92,7 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
 def _send(write: Write, packet: int) -> Steps[str]:
     """Send one packet; return a remark for the result, empty for none."""
     try:
-        check_status((yield write.commands[packet]),
-                     family_of(write.mapping.plc_type).meanings)
+        _data_of((yield write.commands[packet]), write.mapping.address)
     except RemoteError as error:
         if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
             raise
@@ -122,7 +127,7 @@ def _ended_early(write: Write, outcome: Outcome, now: float, done: int,
 
 
 def read_values(mapping: Mapping, block: Block) -> Steps[Values]:
-    """Read a block and return the raw values of one mapping; raises like ``read_packet``."""
+    """Read a block and return the raw values of one mapping; raises like ``read_block``."""
     words = yield from read_block(block)
     return mapping.codec.decode(words[block.slice_of(mapping)])
 

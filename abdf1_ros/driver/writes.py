@@ -97,8 +97,10 @@ class WriteQueue:
         Writes to stations in ``busy`` keep waiting, and so do writes of words that are being
         written: the packets of two writes must not mix.
         """
+        if not self._waiting:
+            return None
         self.expire(now)
-        write = self._first_free(busy) if self._waiting else None
+        write = self._first_free(busy)
         if write is not None:
             self._waiting.remove(write)
             self._under_way.append(write)
