@@ -40,6 +40,7 @@ from std_msgs.msg import (  # noqa: I101
     UInt8MultiArray,
     UInt16MultiArray,
 )
+from support.ptys import wait_until
 from support.ros import (
     details,
     ERROR,
@@ -321,7 +322,8 @@ def test_loss_of_the_port_leaves_no_write_without_a_result(make_bench: Benches) 
     bench.plcs.say('slow 1 100000')
     for _ in range(3):
         publish(*8 * [1])
-    bench.observer.until(lambda: bench.words('B3:1') == [255], 'the first write')
+    bench.observer.until(lambda: bench.node.writes_taken == 1 + 3, 'all writes')
+    wait_until(lambda: bench.words('B3:1') == [255])
     bench.plcs.lose()
     first, *others = bench.until_results(3)
     assert first.message.startswith('unknown whether written: port lost: ')
