@@ -22,7 +22,7 @@ from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
-from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
@@ -30,6 +30,7 @@ from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -258,3 +259,90 @@ def test_served_value_that_has_become_too_old_is_not_stored() -> None:
     assert bench.master_reads('N7:50', 1) == b'\5\0'
     assert [str(result) for result in bench.listener.results] == [
         'written', 'not written: not sent: waited longer than 2 s for the line']
+
+
+# heartbeats and fallbacks; the rules have the numbers of docs/heartbeats.md
+
+
+class Interlocked(Bench):
+    """The PLC has a heartbeat and a command of ours; all that the master lets through is kept."""
+
+    def __init__(self) -> None:
+        self.speed = make_mapping('N7:10', 'Write', station=PLC, plc='SLC', tag='speed',
+                                  fallback=Fallback((7,), 600))
+        super().__init__([make_mapping('N7:20', 'Heartbeat', station=PLC, plc='SLC', tag='beat',
+                                       period=300, heartbeat=Heartbeat()), self.speed])
+        self.is_alive = True
+        self.seen: list[tuple[str, int]] = []
+        self.plc.slave = HalfDuplexSlave(SlaveSettings(PLC, self.network.checksum), self._keep)
+
+    def _keep(self, command: Packet) -> Packet:
+        before = self._words()
+        reply = self.plc.serve(command)
+        self.seen += self._words() - before
+        return reply
+
+    def _words(self) -> set[tuple[str, int]]:
+        return {(name, int.from_bytes(stored(self.plc, place), 'little'))
+                for name, place in (('beat', 'N7:20'), ('speed', 'N7:10'))}
+
+    def told(self, seconds: float) -> list[tuple[str, int]]:
+        """Let time pass, the executor with it; return what the PLC was told."""
+        self.seen.clear()
+        end = self.clock() + seconds
+        while self.clock() < end:
+            if self.is_alive:
+                self.driver.interlocks.executor_ran(self.clock())
+            self.run(0.1)
+        return [*self.seen]
+
+
+def test_rules_2_and_8_as_a_slave() -> None:
+    bench = Interlocked()
+    store(bench.plc, 'N7:20', [99])
+    assert bench.told(1.0) == [
+        ('beat', 0), ('speed', 7), *(('beat', number) for number in (1, 2, 3, 4))]
+    bench.write(bench.speed, [5])
+    told = bench.told(1.2)
+    at = told.index(('beat', 0))
+    assert ('speed', 5) in told[:at]
+    assert told[at:at + 3] == [('beat', 0), ('speed', 7), ('beat', 1)]
+
+
+def test_rules_3_and_9_nothing_old_goes_out_when_the_master_polls_again() -> None:
+    bench = Interlocked()
+    bench.told(1.0)
+    bench.write(bench.speed, [5])
+    bench.told(0.3)
+    bench.line.pause(bench.master.machine, 3.0)
+    bench.write(bench.speed, [6])
+    assert bench.told(1.5) == []
+    bench.is_alive = False
+    told = bench.told(4.0)
+    assert ('speed', 6) not in told
+    assert told == [('beat', 0), ('speed', 7)]  # the executor does not run
+    bench.is_alive = True
+    assert bench.told(1.0)[:2] == [('beat', 1), ('beat', 2)]
+
+
+def test_rule_5_as_a_slave() -> None:
+    bench = Interlocked()
+    bench.told(1.0)
+    bench.write(bench.speed, [5])
+    bench.told(0.3)
+    bench.driver.wind_down()
+    bench.line.wake(bench.driver.machine)
+    assert bench.told(1.0) == [('beat', 0), ('speed', 7)]
+    assert bench.driver.interlocks.is_over
+
+
+def test_rule_8_change_to_run_is_seen_by_a_slave() -> None:
+    bench = Interlocked()
+    bench.told(3.0)
+    bench.plc.processor.setting = Setting.PROGRAM
+    bench.told(3.0)
+    store(bench.plc, 'N7:10', [800])
+    bench.plc.processor.setting = Setting.RUN
+    told = bench.told(3.0)
+    at = told.index(('beat', 0))
+    assert told[at:at + 3] == [('beat', 0), ('speed', 7), ('beat', 1)]
