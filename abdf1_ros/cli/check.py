@@ -175,7 +175,7 @@ def _summary(name: str, found: Findings, report: Report | None) -> str:
     if report is None:
         return '\n'.join(errors)
     text = (f'{printable(name)}: {len(found.mappings)} rows, port '
-            f'{printable(report.network.port)}, scan {report.scan_time * 1000:.0f} ms, '
+            f'{printable(report.network.port)}, scan {report.poll_cycle * 1000:.0f} ms, '
             f'load {report.load:.0%}')
     if warnings := len(report.remarks()):
         text += colour(f', {warnings} warning{"s" if warnings > 1 else ""}', YELLOW, sys.stdout)
@@ -307,7 +307,7 @@ def _entry(report: Report, block: Block) -> dict[str, Any]:
 
 def _times_text(report: Report) -> str:
     response = report.response_time * 1000
-    return (f'expected poll cycle: {report.scan_time * 1000:.1f} ms for everything once, with '
+    return (f'expected poll cycle: {report.poll_cycle * 1000:.1f} ms for everything once, with '
             f'{response:g} ms for each answer of a PLC\n'
             f'load of the line: {report.load:.0%} of the time is needed to keep the periods'
             + ''.join(f'\n{printable(str(bound))}' for bound in report.bounds))
@@ -331,7 +331,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'network': {name: getattr(report.network, name) for name in FIELDS},
             'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
-            'scan_time_ms': _ms(report.scan_time), 'load': round(report.load, 4),
+            'scan_time_ms': _ms(report.poll_cycle), 'load': round(report.load, 4),
             'needed_baud': report.needed_baud(),
             'bounds': [_bound(bound) for bound in report.bounds],
             'response_time_ms': _ms(report.response_time)}

@@ -56,7 +56,7 @@ from abdf1_ros.plan.forecast import (
     longest_probe,
     longest_transaction,
     period_of,
-    scan_time,
+    poll_cycle,
     stale_times,
 )
 from abdf1_ros.plan.interlocks import MODE_PERIOD, own_load
@@ -125,7 +125,7 @@ class Driver:
         self._planner = Planner(line_model(network), settings.default_period)
         self._refusals = Refusals(self._planner)
         blocks = self._planner.plan(mappings)
-        self.expected_scan_time = scan_time(blocks)
+        self.expected_poll_cycle = poll_cycle(blocks)
         self.points = self._make_points(blocks)
         self._guards = Guards(self.points.values())
         self.health = Checks(
@@ -150,14 +150,14 @@ class Driver:
         return self._tasks.transactions
 
     @property
-    def scan_time(self) -> float | None:
+    def poll_cycle(self) -> float | None:
         """Return how long (s) the slowest mapping has waited between its last two reads."""
-        return self._reads.scan_time
+        return self._reads.poll_cycle
 
     @property
-    def longest_scan_time(self) -> float | None:
-        """Return the longest ``scan_time`` (s) there has been, outages not counted."""
-        return self._reads.longest_scan_time
+    def longest_poll_cycle(self) -> float | None:
+        """Return the longest ``poll_cycle`` (s) there has been, outages not counted."""
+        return self._reads.longest_poll_cycle
 
     @property
     def blocks(self) -> list[Block]:

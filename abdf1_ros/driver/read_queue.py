@@ -37,7 +37,7 @@ import math
 from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import ReadPoint, Write
 from abdf1_ros.driver.transactions import words_of
-from abdf1_ros.plan.forecast import PATIENCE, scan_time
+from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
 from abdf1_ros.plan.planner import Block
 
 _TURNS = 4
@@ -165,7 +165,7 @@ class ReadQueue:
 
     def __init__(self) -> None:
         self.jobs: set[ReadJob] = set()
-        self._scan_time = 0.0
+        self._poll_cycle = 0.0
         self._heaps: dict[float, list[_QueueEntry]] = {}
         self._tickets = itertools.count(1)
         self._turn = 0
@@ -179,7 +179,7 @@ class ReadQueue:
         added = list(new)
         self.jobs.difference_update(old)
         self.jobs.update(added)
-        self._scan_time = scan_time(job.block for job in self.jobs)
+        self._poll_cycle = poll_cycle(job.block for job in self.jobs)
         for job in added:
             self.put(job, now)
 
@@ -219,7 +219,7 @@ class ReadQueue:
         return min(due, key=lambda heap: heap[0][0] + self._period(heap[0][2]))
 
     def _period(self, job: ReadJob) -> float:
-        return job.block.period or PATIENCE * self._scan_time
+        return job.block.period or PATIENCE * self._poll_cycle
 
     def _periods_late(self, entry: _QueueEntry, now: float) -> float:
         due, _, job = entry

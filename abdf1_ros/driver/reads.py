@@ -49,13 +49,13 @@ class Reads:
         return bool(self._aside)
 
     @property
-    def scan_time(self) -> float | None:
+    def poll_cycle(self) -> float | None:
         """Return the longest time (s) between the last two good reads of any job."""
         return max((job.interval for job in self.jobs if job.interval is not None),
                    default=None)
 
     @property
-    def longest_scan_time(self) -> float | None:
+    def longest_poll_cycle(self) -> float | None:
         """Return the longest time (s) there has ever been between two good reads of a job."""
         return max((job.longest for job in self.jobs if job.longest is not None), default=None)
 

@@ -50,7 +50,7 @@ def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> floa
     return block.line_time + ANSWERS * response_time * len(block.requests)
 
 
-def scan_time(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
+def poll_cycle(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
     """Return the seconds that it takes to read every block once."""
     return sum(block_time(block, response_time) for block in blocks)
 
@@ -75,8 +75,8 @@ def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIM
     the part of the line's time that heartbeats need.
     """
     blocks = list(blocks)
-    once, needed = scan_time(blocks, response_time), load(blocks, response_time) + own_load
-    unlimited = scan_time((block for block in blocks if not block.period), response_time)
+    once, needed = poll_cycle(blocks, response_time), load(blocks, response_time) + own_load
+    unlimited = poll_cycle((block for block in blocks if not block.period), response_time)
     wanted = {block.period: block.period or PATIENCE * once for block in blocks}
     if unlimited and needed < 1:
         wanted[0.0] = min(wanted[0.0], unlimited / (1 - needed))

@@ -142,12 +142,12 @@ def without_contained(spans: Iterable[Span]) -> list[Span]:
 
 
 def partition(needed: Mapping[float, Iterable[Span]], model: CostModel,
-              scan_time: float) -> list[Candidate]:
+              poll_cycle: float) -> list[Candidate]:
     """
     Return the blocks that hold all ``needed`` spans; its keys are their periods in seconds.
 
     Spans of a long period may share a block with spans of a short one, where that is cheaper.
-    A block is not expected to be read more often than every ``scan_time`` seconds.
+    A block is not expected to be read more often than every ``poll_cycle`` seconds.
     """
     candidates: list[Candidate] = []
     for period in sorted(needed):
@@ -155,7 +155,7 @@ def partition(needed: Mapping[float, Iterable[Span]], model: CostModel,
                 if not any(faster.span.holds(span) for faster in candidates))
         candidates += [Candidate(span, period) for span in cheapest(left, model)]
     candidates.sort(key=lambda candidate: candidate.span)
-    while (pair := _best_pair(candidates, model, scan_time)) is not None:
+    while (pair := _best_pair(candidates, model, poll_cycle)) is not None:
         one, other = pair
         candidates[candidates.index(one)] = _joined(one, other, model)
         candidates.remove(other)
@@ -168,10 +168,10 @@ def _joined(one: Candidate, other: Candidate, model: CostModel) -> Candidate:
 
 
 def _best_pair(candidates: Sequence[Candidate], model: CostModel,
-               scan_time: float) -> tuple[Candidate, Candidate] | None:
+               poll_cycle: float) -> tuple[Candidate, Candidate] | None:
     """Return the two blocks that save the most of the line's time when read together."""
     def load(candidate: Candidate) -> float:
-        return model.cost(candidate.span) / max(candidate.period, scan_time)
+        return model.cost(candidate.span) / max(candidate.period, poll_cycle)
 
     best, most = None, 0.0
     loads = [load(candidate) for candidate in candidates]

@@ -141,9 +141,9 @@ class Planner:
         plans = [self._plan_area(area, group, math.inf) for area, group in areas.items()]
         # On a full line no block is read more often than once in a poll cycle. So keeping fast
         # blocks short saves less there than their periods promise.
-        scan_time = sum(block.line_time for plan in plans for block in plan)
+        poll_cycle = sum(block.line_time for plan in plans for block in plan)
         return [block for area, group in areas.items()
-                for block in self._plan_area(area, group, scan_time)]
+                for block in self._plan_area(area, group, poll_cycle)]
 
     def split(self, block: Block) -> list[Block]:
         """
@@ -197,7 +197,7 @@ class Planner:
         return mapping.period / 1000
 
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
-                    scan_time: float) -> list[Block]:
+                    poll_cycle: float) -> list[Block]:
         """Plan the mappings of one area."""
         refused = self._refused[area]
         model = self._cost_model(demands[0].mapping, refused)
@@ -212,7 +212,7 @@ class Planner:
         needed: defaultdict[float, list[Span]] = defaultdict(list)
         for demand in together:
             needed[demand.period].append(demand.span)
-        served = alone | _served(together, partition(needed, model, scan_time))
+        served = alone | _served(together, partition(needed, model, poll_cycle))
         return [self._block(group, span) for span, group in served.items()]
 
     def _cost_model(self, example: Mapping, refused: Iterable[Span]) -> CostModel:

@@ -79,9 +79,9 @@ class Report:
     response_time: float
 
     @property
-    def scan_time(self) -> float:
+    def poll_cycle(self) -> float:
         """Return the seconds that it takes to read every block once."""
-        return forecast.scan_time(self.blocks, self.response_time)
+        return forecast.poll_cycle(self.blocks, self.response_time)
 
     @property
     def load(self) -> float:
@@ -274,7 +274,7 @@ def _gap_remarks(report: Report) -> Iterator[Remark]:
     for blocks in groups.values():
         time = sum(map(report.time, blocks))
         least = _time_side_by_side(report, blocks)
-        if time - least >= _WORTH_SAVING * report.scan_time:
+        if time - least >= _WORTH_SAVING * report.poll_cycle:
             mappings = [mapping for block in blocks for mapping in block.mappings]
             first, last = _ends(mappings)
             spare = sum(block.words for block in blocks) - len(_words(mappings))

@@ -144,7 +144,7 @@ class Measured:
     """What a run has shown: per second, in seconds, and counts."""
 
     transactions: float
-    scan_time: float
+    poll_cycle: float
     slowest_scan: float
     troubles: int
     polls: float
@@ -305,7 +305,7 @@ def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedP
         scans: list[float] = []
         while time.monotonic() - began < seconds:
             time.sleep(0.05)
-            if (scan := driver.scan_time) is not None:
+            if (scan := driver.poll_cycle) is not None:
                 scans.append(scan)
         passed = time.monotonic() - began
         done, polled = driver.transactions - before, driver.counters.polls_sent - polls

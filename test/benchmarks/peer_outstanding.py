@@ -21,7 +21,7 @@ simulator's peer with a PLC-5 table: responses (ACK) go out at once, each reply 
 after it was ready, one after the other, as a PLC that serves its port once in a program scan.
 At the other end the driver in Mode Peer, with a map of ten blocks of ten words in ten files
 that are all read as often as the line allows. For each setting of max_outstanding the driver
-runs --seconds; the first second does not count. "scan time" is how long the slowest block
+runs --seconds; the first second does not count. "poll cycle" is how long the slowest block
 waited between its last two reads, averaged over ten looks a second; "troubles" counts errors
 and retries, of which there should be none.
 
@@ -118,7 +118,7 @@ def mappings() -> list[Mapping]:
 
 def measure(outstanding: int, baud: int, think: float,
             seconds: float) -> tuple[float, float, int, float]:
-    """Return transactions per second, scan time, troubles, and line time of a transaction."""
+    """Return transactions per second, poll cycle, troubles, and line time of a transaction."""
     network = Network(mode='Peer', baud=baud)
     table = DataTable(PlcType.PLC5)
     for mapping in mappings():
@@ -135,7 +135,7 @@ def measure(outstanding: int, baud: int, think: float,
         began, before, scans = time.monotonic(), driver.transactions, []
         while time.monotonic() - began < seconds:
             time.sleep(0.1)
-            scans.append(driver.scan_time or math.nan)
+            scans.append(driver.poll_cycle or math.nan)
         passed, done = time.monotonic() - began, driver.transactions - before
     line_time = driver.blocks[0].line_time
     return done / passed, sum(scans) / len(scans), listener.troubles, line_time
@@ -152,7 +152,7 @@ def main() -> None:
     options = parser.parse_args()
     print(f'{len(BLOCKS)} blocks of {WORDS} words, {options.baud} baud, '
           f'{options.think:g} ms of thinking per command, {options.seconds:g} s each')
-    print('outstanding  transactions/s  scan time   ratio  troubles')
+    print('outstanding  transactions/s  poll cycle   ratio  troubles')
     first = math.nan
     for outstanding in options.outstanding:
         rate, scan, troubles, line_time = measure(

@@ -116,7 +116,7 @@ def spread_map(tags: int) -> list[Mapping]:
 class Search:
     """The cheapest blocks for the rows of one place, found by trying."""
 
-    def __init__(self, planner: Planner, rows: Sequence[Mapping], scan_time: float) -> None:
+    def __init__(self, planner: Planner, rows: Sequence[Mapping], poll_cycle: float) -> None:
         example = rows[0]
         self._element = example.address.layout.words
         self._limit = example.dialect.max_read(example.address.file_type)
@@ -128,7 +128,7 @@ class Search:
         for entry in rows:
             first = entry.address.offset
             span = Span(first, first + entry.codec.words).aligned(self._element)
-            rate = 1 / max((entry.period or 0) / 1000, scan_time)
+            rate = 1 / max((entry.period or 0) / 1000, poll_cycle)
             self._needed[span] = max(rate, self._needed.get(span, 0.0))
 
     def least(self) -> float:
@@ -166,17 +166,17 @@ class Search:
         return options
 
 
-def optimum(planner: Planner, rows: Sequence[Mapping], scan_time: float) -> float:
+def optimum(planner: Planner, rows: Sequence[Mapping], poll_cycle: float) -> float:
     """Return the cost of the best plan for all rows, none of which is longer than a packet."""
     places = defaultdict(list)
     for entry in rows:
         places[entry.station, entry.address.area].append(entry)
-    return sum(Search(planner, group, scan_time).least() for group in places.values())
+    return sum(Search(planner, group, poll_cycle).least() for group in places.values())
 
 
-def cost(blocks: Sequence[Block], scan_time: float) -> float:
+def cost(blocks: Sequence[Block], poll_cycle: float) -> float:
     """Return the part of the line's time that a plan takes."""
-    return sum(block.line_time / max(block.period, scan_time) for block in blocks)
+    return sum(block.line_time / max(block.period, poll_cycle) for block in blocks)
 
 
 def main() -> None:
@@ -190,17 +190,17 @@ def main() -> None:
     planner = Planner(line_model(Network(baud=options.baud)), 0.1)
     rows = realistic_map(options.tags)
     blocks = planner.plan(rows)
-    scan_time = sum(block.line_time for block in blocks)
+    poll_cycle = sum(block.line_time for block in blocks)
     single = [block for entry in rows for block in planner.plan([entry])]
-    planned, best = cost(blocks, scan_time), optimum(planner, rows, scan_time)
-    alone = cost(single, scan_time)
+    planned, best = cost(blocks, poll_cycle), optimum(planner, rows, poll_cycle)
+    alone = cost(single, poll_cycle)
     print(f'{len(rows)} tags at {options.baud} baud: {len(blocks)} blocks, '
-          f'{scan_time:.2f} s of characters in a scan')
+          f'{poll_cycle:.2f} s of characters in a scan')
     print(f'plan                {planned:7.3f} of the time of the line')
     print(f'optimum             {best:7.3f}, which the plan misses by '
           f'{100 * max(planned / best - 1, 0.0):.1f} %')
     print(f'one read per tag    {alone:7.3f}, {alone / planned:.1f} times the plan; one scan '
-          f'{sum(block.line_time for block in single) / scan_time:.1f} times')
+          f'{sum(block.line_time for block in single) / poll_cycle:.1f} times')
     print(f'load of the machine {os.getloadavg()[0]:7.1f}')
     for tags in options.timed:
         rows = spread_map(tags)

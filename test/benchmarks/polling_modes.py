@@ -20,7 +20,7 @@ against ten simulated SLC stations on one half-duplex line of --baud (see ``pace
 station that has taken a command answers polls with EOT for --delay ms, then with its reply.
 With Polling Message the master waits for that reply before the next command; with Polling
 Standard it goes on with the other stations, so their thinking runs side by side. Each mode
-runs --seconds; the first two do not count. "scan time" is how long the slowest station waited
+runs --seconds; the first two do not count. "poll cycle" is how long the slowest station waited
 between its last two reads, averaged over twenty looks a second; "troubles" counts errors and
 retries, of which there should be none.
 
@@ -55,12 +55,12 @@ def main() -> None:
     options = parser.parse_args()
     print(f'{options.stations} stations of {WORDS} words, {options.baud} baud, '
           f'{options.delay:g} ms of thinking per command, {options.seconds:g} s each')
-    print('polling   scan time   slowest  transactions/s  polls/s   ratio  troubles')
+    print('polling   poll cycle   slowest  transactions/s  polls/s   ratio  troubles')
     first = None
     for polling in POLLING_MODES:
         seen = run(polling, options)
         first = first or seen
-        print(f'{polling:8}  {1000 * seen.scan_time:6.0f} ms  {1000 * seen.slowest_scan:5.0f} ms'
+        print(f'{polling:8}  {1000 * seen.poll_cycle:6.0f} ms  {1000 * seen.slowest_scan:5.0f} ms'
               f'  {seen.transactions:14.1f}  {seen.polls:7.1f}'
               f'  {seen.transactions / first.transactions:6.2f}  {seen.troubles:8d}', flush=True)
 

@@ -149,7 +149,7 @@ def test_saturated_line_is_shared_by_all_in_turn() -> None:
 
 def test_nothing_is_ever_due_without_reads() -> None:
     bench = Bench()
-    assert (bench.agenda.next_due(), bench.next(1e9), bench.reads.scan_time) == (
+    assert (bench.agenda.next_due(), bench.next(1e9), bench.reads.poll_cycle) == (
         None, None, None)
 
 
@@ -537,31 +537,31 @@ def test_parts_replace_a_job() -> None:
     assert [bench.read(0.0), bench.read(0.0), bench.read(0.0)] == [left, right, None]
 
 
-def test_scan_time_is_that_of_the_slowest_job() -> None:
+def test_poll_cycle_is_that_of_the_slowest_job() -> None:
     one, other = make_job(), make_job('N9:0')
     bench = Bench(one, other)
     one.done(1.0)
-    assert bench.reads.scan_time is None
+    assert bench.reads.poll_cycle is None
     one.done(1.5)
     other.done(1.0)
     other.done(3.0)
-    assert bench.reads.scan_time == 2.0
+    assert bench.reads.poll_cycle == 2.0
     other.done(3.1)
-    assert bench.reads.scan_time == 0.5
-    assert bench.reads.longest_scan_time == 2.0
+    assert bench.reads.poll_cycle == 0.5
+    assert bench.reads.longest_poll_cycle == 2.0
 
 
-def test_scan_time_does_not_count_an_outage() -> None:
+def test_poll_cycle_does_not_count_an_outage() -> None:
     job = make_job()
     bench = Bench(job)
-    assert bench.reads.longest_scan_time is None
+    assert bench.reads.longest_poll_cycle is None
     job.done(1.0)
     job.done(1.5)
     job.interrupted()
-    assert bench.reads.scan_time is None
+    assert bench.reads.poll_cycle is None
     job.done(60.0)
     job.done(60.25)
-    assert (bench.reads.scan_time, bench.reads.longest_scan_time) == (0.25, 0.5)
+    assert (bench.reads.poll_cycle, bench.reads.longest_poll_cycle) == (0.25, 0.5)
 
 
 class AnyOrder(RuleBasedStateMachine):

@@ -868,7 +868,7 @@ def test_no_write_is_executed_twice_when_answers_get_lost() -> None:
 def test_stale_time_follows_the_period_or_the_line() -> None:
     fast, slow = make_mapping('N7:0', period=10), make_mapping('F8:0', period=1000)
     bench, _ = make_bench(fast, slow, stale_after=5.0, network=Network(baud=1200))
-    scan = bench.driver.expected_scan_time
+    scan = bench.driver.expected_poll_cycle
     assert scan == pytest.approx(
         sum(block.line_time + 0.02 for block in bench.driver.blocks))
     assert 0.4 < scan < 1.0
@@ -883,7 +883,7 @@ def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:
     fast = make_mapping('N7:0', period=200)
     slow = [make_mapping(f'N{file}:0', length=20, period=20_000) for file in range(9, 39)]
     bench, _ = make_bench(fast, *slow, stale_after=3.0, network=Network(baud=9600))
-    assert bench.driver.expected_scan_time > 2.5
+    assert bench.driver.expected_poll_cycle > 2.5
     wait = max(map(block_time, bench.driver.blocks))
     assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + wait)
     assert wait < 0.2
@@ -911,7 +911,7 @@ def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     bench.run(0.5)
     values = bench.listener.values(long)
     assert values and all(entry == [1] * 250 for entry in values)
-    assert (bench.driver.longest_scan_time or 0) < 1
+    assert (bench.driver.longest_poll_cycle or 0) < 1
 
 
 def test_long_block_lets_others_go_between_its_packets() -> None:
@@ -938,15 +938,15 @@ def test_default_period_is_a_setting() -> None:
 
 
 @pytest.mark.parametrize('baud', [1200, 9600, 19200, 115200])
-def test_scan_time_is_close_to_the_expected_one_on_a_saturated_line(baud: int) -> None:
+def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) -> None:
     mappings = [make_mapping(f'{text}', length=length, period=0) for text, length in (
         ('N7:0', 40), ('F8:0', 10), ('B3:0', 4), ('T4:0', 9))]
     bench, _ = make_bench(*mappings, network=Network(baud=baud))
     bench.open()
     bench.run(20.0)
-    assert bench.driver.scan_time is not None
-    expected = bench.driver.expected_scan_time - 4 * 0.02  # our PLC answers at once
-    assert bench.driver.scan_time == pytest.approx(expected, rel=0.03, abs=0.002)
+    assert bench.driver.poll_cycle is not None
+    expected = bench.driver.expected_poll_cycle - 4 * 0.02  # our PLC answers at once
+    assert bench.driver.poll_cycle == pytest.approx(expected, rel=0.03, abs=0.002)
 
 
 def test_driver_without_stations_rests_until_a_write_comes() -> None:

@@ -26,7 +26,7 @@ from abdf1_ros.plan.forecast import (
     longest_wait,
     needed_baud,
     PATIENCE,
-    scan_time,
+    poll_cycle,
 )
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Planner
@@ -44,12 +44,12 @@ def blocks_of(network: Network) -> list:  # type: ignore[type-arg]
     return Planner(line_model(network), 0.1).plan(ROWS)
 
 
-def test_scan_time_is_characters_and_two_answers_a_transaction() -> None:
+def test_poll_cycle_is_characters_and_two_answers_a_transaction() -> None:
     blocks = blocks_of(NETWORK)
     characters = sum(block.line_time for block in blocks)
-    assert scan_time(blocks, 0.0) == pytest.approx(characters)
-    assert scan_time(blocks, 0.01) == pytest.approx(characters + 6 * 0.01)
-    assert scan_time(blocks) == scan_time(blocks, 0.01)
+    assert poll_cycle(blocks, 0.0) == pytest.approx(characters)
+    assert poll_cycle(blocks, 0.01) == pytest.approx(characters + 6 * 0.01)
+    assert poll_cycle(blocks) == poll_cycle(blocks, 0.01)
 
 
 def test_mapping_of_several_packets_has_answers_for_each() -> None:
@@ -143,5 +143,5 @@ def test_forecast_is_what_a_line_does_whose_station_answers_at_once(
     bench.plc(1, 'PLC5', ('N7:0', 40), ('F8:0', 20), ('T4:0', 9))
     bench.open()
     bench.run(20.0)
-    measured = bench.driver.scan_time
-    assert measured == pytest.approx(scan_time(bench.driver.blocks, 0.0), rel=0.03)
+    measured = bench.driver.poll_cycle
+    assert measured == pytest.approx(poll_cycle(bench.driver.blocks, 0.0), rel=0.03)

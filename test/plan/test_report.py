@@ -78,7 +78,7 @@ def test_times_of_one_read(plc: str, settings: dict[str, object], line_time: flo
     report = report_of(make_mapping('N7:0', plc=plc, length=2), **settings)
     block, = report.blocks
     assert block.line_time == pytest.approx(line_time)
-    assert report.time(block) == report.scan_time == pytest.approx(line_time + ANSWERS)
+    assert report.time(block) == report.poll_cycle == pytest.approx(line_time + ANSWERS)
     assert report.load == pytest.approx(line_time + ANSWERS)  # of one second
     assert report.remarks() == []
 
@@ -124,7 +124,7 @@ def test_via_is_for_a_master(mode: str) -> None:
 
 def test_slower_plc_makes_everything_slower() -> None:
     report = report_of(make_mapping('N7:0', length=2), response=0.03)
-    assert report.scan_time == pytest.approx(TWO_WORDS + 0.06)
+    assert report.poll_cycle == pytest.approx(TWO_WORDS + 0.06)
 
 
 def test_blocks_go_by_station_and_then_by_row() -> None:
@@ -212,7 +212,7 @@ def test_several_stations_in_full_duplex() -> None:
 
 def test_gap_that_costs_a_second_read() -> None:
     report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:200', item=2))
-    assert report.scan_time == pytest.approx(2 * (ONE_WORD + ANSWERS))
+    assert report.poll_cycle == pytest.approx(2 * (ONE_WORD + ANSWERS))
     remark, = report.remarks()
     assert (remark.kind, remark.station) == (RemarkKind.GAP, 1)
     assert remark.text == (

@@ -161,10 +161,10 @@ def test_read_topic_offers_its_stale_time(bridge: Bridge) -> None:
 def test_stale_time_is_three_periods_and_what_the_line_cannot_do_of_them(
         bridge: Bridge, tag: str, period: int) -> None:
     link = find_status(bridge.diagnostics.first(), 'link')
-    scan_time = int(details(link)['expected poll cycle'].removesuffix(' ms'))
-    assert scan_time > 100  # what most of these rows want, so the line is too slow
+    poll_cycle = int(details(link)['expected poll cycle'].removesuffix(' ms'))
+    assert poll_cycle > 100  # what most of these rows want, so the line is too slow
     stale_time = read_qos(bridge, tag).lifespan.nanoseconds / 1e6
-    assert 3 * period < stale_time < 3 * (period + scan_time) + scan_time
+    assert 3 * period < stale_time < 3 * (period + poll_cycle) + poll_cycle
 
 
 def test_topic_published_on_change_promises_no_heartbeat(bridge: Bridge) -> None:

@@ -230,10 +230,10 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
 
 
-def test_scan_time_is_unknown_before_the_second_read(bench: Bench) -> None:
+def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
     values = details(bench.status('link'))
     assert values['poll cycle'] == values['longest poll cycle'] == 'unknown'
-    expected = round(bench.driver.expected_scan_time * 1000)
+    expected = round(bench.driver.expected_poll_cycle * 1000)
     assert values['expected poll cycle'] == f'{expected} ms'
 
 
@@ -382,7 +382,7 @@ def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
     assert make_bench(ROWS[2]).says('mappings') == (OK, 'OK: no mapping reads')
 
 
-def test_blocks_may_be_divided_while_the_scan_time_is_asked_for(bench: Bench) -> None:
+def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
     jobs: Any = bench.driver._reads._due.jobs
 

@@ -108,7 +108,7 @@ def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
     assert r'"Tank\x1b[31m\n4"' in line_with('na\\nme', picture).text
 
 
-def test_link_shows_load_and_scan_time() -> None:
+def test_link_shows_load_and_poll_cycle() -> None:
     picture = snapshot(statuses=[Status(
         'link', Style.WARNING, 'WARN: port open', {
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',

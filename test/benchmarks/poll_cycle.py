@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Compare the scan time that is forecast with the one that is measured.
+Compare the poll cycle that is forecast with the one that is measured.
 
-Method. The forecast is ``driver.forecast.scan_time``: the characters of all blocks, and the time
+Method. The forecast is ``driver.forecast.poll_cycle``: the characters of all blocks, and the time
 that each answer takes. It is made for a map of a PLC-5 with blocks of several sizes that are all
 read as often as the line allows. Then the driver reads that map on a line of each speed, half
 and full duplex, whose other end begins each answer after --response ms
@@ -23,7 +23,7 @@ and full duplex, whose other end begins each answer after --response ms
 first row, over --seconds; the first two scans, in which all reads are late, do not count. The
 goal is a difference below 3 %.
 
-Run it as "python test/benchmarks/scan_time.py"; it needs nothing but the package.
+Run it as "python test/benchmarks/poll_cycle.py"; it needs nothing but the package.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
-from abdf1_ros.plan.forecast import scan_time  # noqa: E402
+from abdf1_ros.plan.forecast import poll_cycle  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import Values, ValueType  # noqa: E402
@@ -76,7 +76,7 @@ def mappings() -> list[Mapping]:
 
 
 def measure(network: Network, response: float, seconds: float) -> tuple[float, float, int]:
-    """Return forecast and measured scan time in seconds, and troubles."""
+    """Return forecast and measured poll cycle in seconds, and troubles."""
     rows = mappings()
     watch = Watch(rows[0])
     driver = Driver(network, rows, DriverSettings(processor_period=0.0), watch)
@@ -86,7 +86,7 @@ def measure(network: Network, response: float, seconds: float) -> tuple[float, f
             time.sleep(0.02)
     times = watch.times[2:]
     steps = [later - earlier for earlier, later in zip(times, times[1:], strict=False)]
-    return scan_time(driver.blocks, response), statistics.median(steps), watch.troubles
+    return poll_cycle(driver.blocks, response), statistics.median(steps), watch.troubles
 
 
 def main() -> None:
