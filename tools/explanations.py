@@ -195,7 +195,8 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
                      'open: nothing was sent. The reason follows.',
-    Outcome.NOT_SENT: 'Station inactive, or it waited longer than `write_timeout`; '
+    Outcome.NOT_SENT: 'Station inactive, or too late with its replies before; the port was '
+                      'lost; or it waited longer than `write_timeout`; '
                       '`fallback`: it was published before a fallback value went out.',
     Outcome.FAILED: "The PLC's own error follows, as STS and in words.",
     Outcome.PARTLY: 'A write of several packets failed between them. Where a reply is missing, it '
