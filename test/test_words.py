@@ -1,0 +1,79 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The words of CONTRIBUTING.md: one term for one thing, and no two classes of one name."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+import re
+
+from tools.rooms import MODULES, PACKAGE
+
+ROOT = PACKAGE.parent
+
+_ALIAS = re.compile(r'_?[A-Z][a-z]\w*')
+
+# "There is no" is easy to read for people of another language, "this is no" is not.
+_IS_NO = r'(?<!there )(?<!There )\bis no\b(?! longer| more)'
+
+
+def forbidden_words() -> list[str]:
+    """Return the words in the column "not" of the table in CONTRIBUTING.md."""
+    text = (ROOT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    section = text.partition('\n## Words\n')[2].partition('\n## ')[0]
+    rows = [line.strip('|').split('|') for line in section.splitlines() if line.startswith('|')]
+    return [word.strip() for row in rows[2:] for word in row[2].split(',') if word.strip()]
+
+
+def names_of(source: str) -> Iterator[str]:
+    """Yield the classes and type aliases of a module, without a leading underscore."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef):
+            yield node.name.lstrip('_')
+    for statement in tree.body:
+        if isinstance(statement, ast.Assign):
+            yield from (target.id.lstrip('_') for target in statement.targets
+                        if isinstance(target, ast.Name) and _ALIAS.fullmatch(target.id)
+                        and not isinstance(statement.value, ast.Call))  # as of TypeVar
+
+
+def pages() -> list[Path]:
+    """Return all texts of ours that people read, but for CONTRIBUTING.md itself."""
+    return [*(PACKAGE / module for module in MODULES), *sorted((ROOT / 'docs').rglob('*.md')),
+            *sorted((ROOT / 'tools').glob('*.py')), *sorted((ROOT / 'examples').glob('*.py')),
+            ROOT / 'README.md']
+
+
+def test_no_two_classes_have_one_name() -> None:
+    counts = Counter(name for module in MODULES
+                     for name in names_of((PACKAGE / module).read_text(encoding='utf-8')))
+    assert [name for name, count in counts.items() if count > 1] == []
+    assert counts['Driver'] == counts['Request'] == 1
+
+
+def test_one_term_for_one_thing() -> None:
+    words = forbidden_words()
+    assert {'errand', 'hasten', 'namesake'} <= set(words)
+    # Not inside of words: troubleshooting stays. But as a part of a name, in any case.
+    pattern = re.compile(rf'(?<![a-z])(?:{"|".join(words)})(?:s|ed|ing)?(?![a-z])|{_IS_NO}',
+                         re.IGNORECASE)
+    found = [f'{page.relative_to(ROOT)}:{number}: {line.strip()}' for page in pages()
+             for number, line in enumerate(page.read_text(encoding='utf-8').splitlines(), 1)
+             if pattern.search(line)]
+    assert found == []
