@@ -15,30 +15,41 @@
 """
 Start the bridge.
 
-An argument left empty is not passed on, so that the default of the node, or what a parameter
-file says, holds. ``ros2 launch abdf1_ros bridge.launch.py --show-args`` lists them all.
+Every parameter of the node is an argument here. One left empty is not passed on, so that the
+default of the node, or what a parameter file says, holds. An argument that does not exist ends the
+launch. ``ros2 launch abdf1_ros bridge.launch.py --show-args`` lists them all.
 """
 
+import sys
+
+from abdf1_ros.ros.launching import descriptions, parameter_types, unknown_arguments
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, TimerAction
 from launch.events.process import ProcessExited
+from launch.substitutions import TextSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
-
-# Parameters of the node that have an argument here; all are strings.
-PARAMETERS = ('net_file', 'map_file', 'port')
 
 # Exit status for faulty files or parameters, which do not become better by trying again.
 FAULTY = 2
 RESPAWN_DELAY = 2.0
 YES, NO = ('true', 'True'), ('false', 'False')
 
+OWN = ('params_file', 'namespace', 'name', 'log_level', 'respawn')
+
 
 def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """Return the node, with the arguments that were given."""
     # A copy: when the node ends, those of the context may be others.
-    return [bridge(dict(context.launch_configurations))]
+    arguments = dict(context.launch_configurations)
+    problems = unknown_arguments(__file__, [*OWN, *parameter_types()], sys.argv)
+    if not arguments['params_file']:
+        problems += [f'{name}: which file? Give {name}:=FILE.csv, or params_file:=FILE.yaml'
+                     for name in ('net_file', 'map_file') if not arguments[name]]
+    if problems:
+        raise RuntimeError('; '.join(problems))
+    return [bridge(arguments)]
 
 
 def bridge(arguments: dict[str, str]) -> Node:
@@ -52,9 +63,9 @@ def bridge(arguments: dict[str, str]) -> Node:
                                 'which is for faulty files or parameters')]
         return [TimerAction(period=RESPAWN_DELAY, actions=[bridge(arguments)])]
 
-    # As ParameterValue, because a bare string that reads like a number would become one.
-    given = {name: ParameterValue(arguments[name], value_type=str)
-             for name in PARAMETERS if arguments[name]}
+    # Typed, because a bare string that reads like a number would become one.
+    given = {name: ParameterValue(TextSubstitution(text=arguments[name]), value_type=kind)
+             for name, kind in parameter_types().items() if arguments[name]}
     # Later ones win: an argument beats the file, in which $(find-pkg-share ...) may stand.
     parameters: list[ParameterFile | dict[str, ParameterValue]] = []
     if arguments['params_file']:
@@ -85,15 +96,8 @@ def logger(arguments: dict[str, str]) -> str:
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments and start the node."""
     return LaunchDescription([
-        DeclareLaunchArgument(
-            'net_file', default_value='',
-            description='CSV file of the serial link; needed here or in params_file'),
-        DeclareLaunchArgument(
-            'map_file', default_value='',
-            description='CSV file of the mappings; needed here or in params_file'),
-        DeclareLaunchArgument(
-            'port', default_value='',
-            description='serial device or pyserial URL; empty: Com_Port of the net file'),
+        *(DeclareLaunchArgument(name, default_value='', description=text)
+          for name, text in descriptions().items()),
         DeclareLaunchArgument(
             'params_file', default_value='',
             description='YAML file of further parameters; empty: none. Launch fills in $(...) '

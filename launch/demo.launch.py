@@ -15,11 +15,20 @@
 """
 Start a simulated PLC on a pseudo-terminal, and the bridge on that: no hardware needed.
 
-What is given beside the port, for instance log_level:=debug, is passed on to the bridge.
+What is given beside the port, for instance log_level:=debug, is passed on to the bridge. An
+argument that the bridge does not take ends the launch.
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription
+import sys
+
+from abdf1_ros.ros.launching import parameter_types, unknown_arguments
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
@@ -29,6 +38,13 @@ PORT = '/tmp/abdf1_demo'
 # Arguments of the bridge that have another default here, or the same; its port is the simulator's.
 DEFAULTS = {'params_file': '', 'namespace': '', 'name': 'abdf1', 'log_level': 'info',
             'respawn': 'false'}
+
+
+def refuse_unknown(context: LaunchContext) -> None:
+    """Raise RuntimeError where the bridge does not take what was given."""
+    problems = unknown_arguments(__file__, [*DEFAULTS, *parameter_types()], sys.argv)
+    if problems:
+        raise RuntimeError('; '.join(problems))
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -42,6 +58,7 @@ def generate_launch_description() -> LaunchDescription:
         *(DeclareLaunchArgument(
             name, default_value=default, description='passed on to bridge.launch.py')
           for name, default in defaults.items()),
+        OpaqueFunction(function=refuse_unknown),
         # No Node action: that would add --ros-args, and the simulator is not a ROS node.
         ExecuteProcess(
             cmd=[ExecutableInPackage('simulator', 'abdf1_ros'), '--pty', PORT],

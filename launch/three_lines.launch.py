@@ -17,14 +17,19 @@ Start the bridges of a cell with three serial lines, each in the namespace of it
 
 What differs between them stands in config/three_lines.yaml; copy both files and change them. A
 bridge that ends by itself is started again, unless its files or parameters are faulty. With
-one_process:=true all of them run in one process, the command "lines".
+one_process:=true all of them run in one process, the command "lines". Any other argument ends the
+launch.
 """
 
+import sys
+
+from abdf1_ros.ros.launching import unknown_arguments
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
     GroupAction,
     IncludeLaunchDescription,
+    OpaqueFunction,
     TimerAction,
 )
 from launch.conditions import IfCondition, UnlessCondition
@@ -67,8 +72,15 @@ def all_lines() -> Node:
                 condition=IfCondition(LaunchConfiguration('one_process')))
 
 
+def refuse_unknown(context: LaunchContext) -> None:
+    """Raise RuntimeError for what would reach no bridge: parameters go into the file."""
+    problems = unknown_arguments(__file__, ('lines_file', 'one_process'), sys.argv)
+    if problems:
+        raise RuntimeError('; '.join(problems))
+
+
 def generate_launch_description() -> LaunchDescription:
-    """Declare the argument and start the bridges."""
+    """Declare the arguments and start the bridges."""
     lines_file = PathJoinSubstitution(
         [FindPackageShare('abdf1_ros'), 'config', 'three_lines.yaml'])
     return LaunchDescription([
@@ -78,6 +90,7 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'one_process', default_value='false',
             description='true: all bridges in one process'),
+        OpaqueFunction(function=refuse_unknown),
         *map(line, LINES),
         all_lines(),
     ])

@@ -23,6 +23,7 @@ import re
 import signal
 
 from abdf1_ros.paths import config_file
+from abdf1_ros.ros.launching import parameter_types
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.ros import EVERYTHING, get_parameters, Observer, Process
@@ -84,8 +85,27 @@ def test_every_argument_is_described(launch: Starter, file: str) -> None:
     assert names
     assert 'no description given' not in shown.text
     if file == 'bridge.launch.py':
-        assert set(names) == {'net_file', 'map_file', 'port', 'params_file', 'namespace', 'name',
-                              'log_level', 'respawn'}
+        own = {'params_file', 'namespace', 'name', 'log_level', 'respawn'}
+        assert set(names) == own | parameter_types().keys()
+
+
+@pytest.mark.parametrize('file, argument, told', [
+    ('bridge.launch.py', 'reda_only:=true', 'did you mean read_only?'),
+    ('bridge.launch.py', 'xyz:=1', '--show-args lists them'),
+    ('demo.launch.py', 'mapfile:=my.csv', 'did you mean map_file?'),
+    ('three_lines.launch.py', 'read_only:=true', '--show-args lists them')])
+def test_argument_that_does_not_exist_ends_the_launch(
+        launch: Starter, file: str, argument: str, told: str) -> None:
+    process = launch(file, *(EXAMPLE if file == 'bridge.launch.py' else []), argument)
+    assert process.result() == 1
+    assert f'{argument.partition(":")[0]}: there is no such argument; {told}' in process.text
+    assert 'process started' not in process.text
+
+
+def test_bridge_needs_its_files(launch: Starter) -> None:
+    process = launch('bridge.launch.py', EXAMPLE[0])
+    assert process.result() == 1
+    assert 'map_file: which file? Give map_file:=FILE.csv, or params_file' in process.text
 
 
 # The bridge
@@ -97,10 +117,12 @@ def test_arguments_reach_the_node_and_beat_the_parameter_file(
     params.write_text('/**: {ros__parameters: {port: /dev/from_file, stale_after: 7.0}}\n')
     with Observer() as observer:
         process = launch('bridge.launch.py', *EXAMPLE, f'params_file:={params}',
-                         'port:=/dev/ttyS99', 'namespace:=cell', 'name:=line')
+                         'port:=/dev/ttyS99', 'namespace:=cell', 'name:=line', 'read_only:=yes',
+                         'write_timeout:=3', 'default_period:=50')
         process.wait_for('/dev/ttyS99: cannot open the port')
-        assert get_parameters(observer, 'port', 'stale_after', node='/cell/line') == [
-            '/dev/ttyS99', 7.0]
+        assert get_parameters(
+            observer, 'port', 'stale_after', 'read_only', 'write_timeout', 'default_period',
+            node='/cell/line') == ['/dev/ttyS99', 7.0, True, 3.0, 50]
     ended(process)
 
 
@@ -138,7 +160,8 @@ def test_log_level_reaches_a_node_below_a_pushed_namespace(
 
 @pytest.mark.parametrize('yes', ['true', 'True'])
 def test_faulty_configuration_is_not_started_again(launch: Starter, yes: str) -> None:
-    process = launch('bridge.launch.py', 'net_file:=/nowhere/net.csv', f'respawn:={yes}')
+    process = launch('bridge.launch.py', 'net_file:=/nowhere/net.csv', EXAMPLE[1],
+                     f'respawn:={yes}')
     process.wait_for('not started again after status 2, which is for faulty files or parameters')
     process.result()  # nothing is left to be done
     assert process.text.count('process started with pid') == 1

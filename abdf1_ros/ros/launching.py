@@ -1,0 +1,55 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the launch files take, beside what is theirs alone; ROS drops what a file does not know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+import difflib
+from pathlib import Path
+
+from abdf1_ros.ros.parameters import Parameters
+
+
+def parameter_types() -> dict[str, type]:
+    """Return the type of each of the node's own parameters, by name."""
+    return {entry.name: type(entry.default) for entry in fields(Parameters)}
+
+
+def descriptions() -> dict[str, str]:
+    """Return what each of the node's own parameters is, with its default."""
+    return {entry.name: entry.metadata['description']
+            + (f'; default: {entry.default}' if entry.default != '' else '')
+            for entry in fields(Parameters)}
+
+
+def unknown_arguments(file: str, known: Iterable[str], argv: Sequence[str]) -> list[str]:
+    """
+    Return what is wrong with the arguments ``name:=value`` of ``ros2 launch``, for people.
+
+    ``file`` is the launch file, ``known`` what it takes, ``argv`` the command line. A file that
+    others include gets none of their arguments, so nothing is wrong with them.
+    """
+    if Path(file).name not in [Path(text).name for text in argv]:
+        return []
+    known = list(known)
+    problems = []
+    for name in [text.partition(':=')[0] for text in argv if ':=' in text]:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, 1)
+            hint = f'did you mean {close[0]}?' if close else '--show-args lists them'
+            problems.append(f'{name}: there is no such argument; {hint}')
+    return problems
