@@ -166,7 +166,7 @@ class FullDuplexPeer:
                 continue
             symbol = yield Step(None, self._idle_time(source))
             if not isinstance(symbol, Silence):
-                yield Step(self._hear(symbol), 0)
+                yield from self._answer(symbol)
 
     def _forget(self) -> None:
         self._replies: deque[Packet] = deque()
@@ -174,6 +174,7 @@ class FullDuplexPeer:
         self._last_response = frames.NAK
         self._accepted: _Accepted | None = None
         self._noise = 0
+        self._unused: Packet | None = None
         self._is_aborted = False
         self._embedded_in = 0  # the last message that had a response inside, by its number
         self._machine.embeds = False
@@ -281,7 +282,6 @@ class FullDuplexPeer:
         symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires)
         end, position = machine.free_at + self._timeout, machine.position
         while not isinstance(symbol, Silence) or self._left(end) > 0:
-            answer = b''
             if symbol in (Control.ACK, Control.NAK) and machine.has_left(position):
                 assert isinstance(symbol, Control)
                 self._count_response(symbol.code)
@@ -289,11 +289,10 @@ class FullDuplexPeer:
             if isinstance(symbol, Silence):
                 last_byte = self._heard_since(begun, symbol) or last_byte
             else:
-                answer = self._hear(symbol)
+                yield from self._answer(symbol)
             if is_answered():
-                yield Step(answer, 0)
                 return Code.STX
-            symbol = yield from self._next(answer, end)
+            symbol = yield from self._next(end)
         self._note(Message.NTC_ACK_EXPECTED, self._heard_since(begun, symbol) or last_byte,
                    station=None)
         return None
@@ -305,25 +304,41 @@ class FullDuplexPeer:
     def _listen(self, seconds: float = _LATE_RESPONSE) -> Hearing:
         """Only receive for a while; responses that come now are late and count for nothing."""
         end = max(self._machine.now, self._machine.free_at) + seconds
-        symbol = yield from self._next(b'', end)
+        symbol = yield from self._next(end)
         while not isinstance(symbol, Silence) or self._left(end) > 0:
-            answer = b'' if isinstance(symbol, Silence) else self._hear(symbol)
-            symbol = yield from self._next(answer, end)
+            if not isinstance(symbol, Silence):
+                yield from self._answer(symbol)
+            symbol = yield from self._next(end)
 
     def _left(self, end: float) -> float:
         """Return the seconds up to ``end`` in which nothing of ours is on the line."""
         return end - max(self._machine.now, self._machine.free_at)
 
-    def _next(self, answer: bytes,
-              end: float) -> Generator[Step, Heard, Heard]:
-        """Send an answer, then return the next symbol up to ``end``, or up to the next tick."""
+    def _next(self, end: float) -> Generator[Step, Heard, Heard]:
+        """Return the next symbol up to ``end``, or up to the next tick."""
         self._expire()
         left = self._left(end)
-        if left > 0:
-            return (yield Step(answer, min(left, _TICK)))
-        if answer:
-            yield Step(answer, 0)
-        return Silence()
+        return (yield Step(b'', min(left, _TICK))) if left > 0 else Silence()
+
+    def _answer(self, symbol: Symbol) -> Hearing:
+        """Send the response to a symbol, and make use of the message that it brings."""
+        response = self._hear(symbol)
+        if self._machine.tx_delay:  # the response has to wait for that, the message need not
+            self._make_use()
+        if response:
+            yield Step(response, 0)
+        self._make_use()
+
+    def _make_use(self) -> None:
+        """Take the reply, or carry out the command, that has been accepted."""
+        packet, self._unused = self._unused, None
+        if packet is None:
+            return
+        if packet.is_reply:
+            self._take_reply(packet)
+        else:
+            self._counters.commands_received += 1
+            self._replies.append(self._serve(packet))
 
     def _hear(self, symbol: Symbol) -> bytes:
         """Return what the receiver answers to a symbol (M 4-7..4-9)."""
@@ -371,11 +386,7 @@ class FullDuplexPeer:
             self._counters.refused_for_memory += 1
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
         self._accepted = _Accepted(packet.duplicate_key, self._machine.now)
-        if packet.is_reply:
-            self._take_reply(packet)
-        else:
-            self._counters.commands_received += 1
-            self._replies.append(self._serve(packet))
+        self._unused = packet
         return self._respond(frames.ACK)
 
     def _is_repetition(self, packet: Packet) -> bool:

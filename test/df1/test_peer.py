@@ -578,6 +578,19 @@ def test_tx_delay_comes_before_every_transmission() -> None:
     assert peer.wait(0.5) == [(0.2, ACK), (0.4, peer.frame(OUR_REPLY))]
 
 
+def test_response_leaves_before_the_message_is_made_use_of() -> None:
+    order: list[str] = []
+
+    def serve(command: Packet) -> Packet:
+        order.append('served')
+        return command.reply()
+
+    peer = PeerBench(PeerSettings(), serve=serve)
+    peer.machine.send_at_once = lambda data: order.append(data.hex())
+    assert peer.hear_packet(THEIRS) == peer.frame(THEIRS.reply())
+    assert order == [ACK.hex(), 'served']
+
+
 def test_nothing_heard_during_tx_delay_is_lost() -> None:
     peer = bench(timing=LineTiming(tx_delay=0.5), timeout=5.0)
     task = peer.begin(COMMAND)
