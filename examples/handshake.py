@@ -19,16 +19,19 @@ Have the PLC do a job once, and know whether it has.
 A handshake of three numbers, each an int16 word. ROS writes REQUEST, the number of the job; the
 program of the PLC copies it to BUSY when it begins and to DONE when it has finished::
 
-    NEQ request done  NEQ request busy  GRT request 0   MOV request busy, begin the job
-    (the job has finished)                              MOV busy done
+    EQU busy done  NEQ request done  GRT request 0   MOV request busy, begin the job
+    (the job has finished)                           MOV busy done
 
 The race that people build without it: a bit "start" is set, and a bit "done" is waited for. Done
 is still set from the job before, so the robot drives on before this job has begun. A number that
-was never used before cannot be mistaken for an old one.
+was never used before cannot be mistaken for an old one. The same race waits at the other end: a
+job that has not begun in time is given up, and begins afterwards, with nobody there. So the
+request is taken back, which has to be confirmed on ~/write_results, and only what is read after it
+counts.
 
-Needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done. The
-request is published at a steady rate while the job runs, so the row may have a Fallback of 0: then
-the PLC also learns when this program dies.
+Needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done, with
+these tags. The request is published at a steady rate while the job runs, so the row may have a
+Fallback of 0: then the PLC also learns when this program dies.
 
 Exit status: 0 done, 1 not done and not begun, 3 unknown.
 """
@@ -42,6 +45,7 @@ import signal
 import sys
 import time
 
+from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -86,6 +90,11 @@ class Handshake(Node):
         # The last value at once, but none that is older than the bridge's stale time.
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._state: tuple[int, int] | None = None
+        self._states = 0  # how many have come
+        self._result = 'no result has come'
+        self._is_at_rest = False  # a 0 has been confirmed
+        self.create_subscription(
+            DiagnosticStatus, f'{bridge}/write_results', self._take_result, 100)
         self.create_subscription(Int16MultiArray, f'{bridge}/read/job_state', self._take, qos)
         self._requests = self.create_publisher(Int16MultiArray, f'{bridge}/write/job_request', 1)
 
@@ -96,12 +105,18 @@ class Handshake(Node):
             print('not begun: no job_state from the PLC, or nobody takes job_request')
             return NOT_BEGUN
         assert self._state is not None
+        if self._state[0] != self._state[1]:
+            print(f'not begun: the PLC is busy with job {self._state[0]}')
+            return NOT_BEGUN
         number = next_number(*self._state)
         print(f'job {number} requested', flush=True)
         step = self._request(number, begin_within, lambda step: step is not Step.WAITING)
         if step is Step.WAITING:
-            # It may still begin: take the request back, then look once more.
-            step = self._request(0, begin_within, lambda step: False, number)
+            print(f'job {number}: {step.value}; request: {self._result}', flush=True)
+            if not self._take_back(begin_within):
+                print(f'job {number}: unknown whether it begins: the request is not taken back')
+                return UNKNOWN
+            step = step_of(number, *self._state)
         if step is Step.BUSY:
             print(f'job {number} has begun', flush=True)
             step = self._request(number, done_within, lambda step: step is Step.DONE)
@@ -109,22 +124,46 @@ class Handshake(Node):
         print(f'job {number}: {step.value}')
         return {Step.DONE: DONE, Step.WAITING: NOT_BEGUN, Step.BUSY: UNKNOWN}[step]
 
-    def _request(self, value: int, seconds: float, is_enough: Callable[[Step], bool],
-                 number: int = 0) -> Step:
-        """Publish ``value`` at a steady rate until the step of the job is enough."""
-        end, due, step = time.monotonic() + seconds, 0.0, Step.WAITING
-        while time.monotonic() < end and not is_enough(step):
+    def _request(self, number: int, seconds: float, is_enough: Callable[[Step], bool]) -> Step:
+        """Ask for job ``number`` until its step is enough."""
+        def step() -> Step:
+            assert self._state is not None
+            return step_of(number, *self._state)
+
+        self._publish_until(number, lambda: is_enough(step()), seconds)
+        return step()
+
+    def _take_back(self, seconds: float) -> bool:
+        """Write 0; whether that has been confirmed, and the state been read after it."""
+        self._is_at_rest = False
+        if not self._publish_until(0, lambda: self._is_at_rest, seconds):
+            return False
+        # The first that comes may have been read before; it is on its way already.
+        states = self._states
+        return self._spin(lambda: self._states >= states + 2, seconds)
+
+    def _publish_until(self, value: int, condition: Callable[[], bool], seconds: float) -> bool:
+        """Publish at a steady rate until the condition holds; whether it does in time."""
+        end, due = time.monotonic() + seconds, 0.0
+        while not condition() and time.monotonic() < end:
             if time.monotonic() >= due:
                 due = time.monotonic() + _PERIOD
                 self._requests.publish(Int16MultiArray(data=[value]))
             rclpy.spin_once(self, timeout_sec=0.05)
-            assert self._state is not None
-            step = step_of(number or value, *self._state)
-        return step
+        return condition()
 
     def _take(self, message: Int16MultiArray) -> None:
         busy, done = message.data
         self._state = busy, done
+        self._states += 1
+
+    def _take_result(self, result: DiagnosticStatus) -> None:
+        if result.name != 'job_request':
+            return
+        self._result = result.message
+        value = next((pair.value for pair in result.values if pair.key == 'value'), '')
+        if result.message.startswith(('written', 'fallback value written')):
+            self._is_at_rest = value == '[0]'
 
     def _spin(self, condition: Callable[[], bool], seconds: float) -> bool:
         end = time.monotonic() + seconds

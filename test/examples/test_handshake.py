@@ -20,6 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 import runpy
 
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int16MultiArray
@@ -32,18 +33,28 @@ Plc = Callable[[int, list[int]], None]
 """Is given a request and changes the words busy and done."""
 
 
-def run(plc: Plc, state: list[int], *args: str) -> tuple[int, list[str], list[int]]:
-    """Return exit status and lines of the example, and the requests that came."""
+def run(plc: Plc, state: list[int], *args: str,
+        result: str = 'written') -> tuple[int, list[str], list[int]]:
+    """
+    Return exit status and lines of the example, and the requests that came.
+
+    ``result`` is that of each; what is not written does not come to the PLC.
+    """
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     requests: list[int] = []
     with Observer() as observer:
         states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', latched)
+        results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
         states.publish(Int16MultiArray(data=state))
+        observer.node.create_timer(
+            0.1, lambda: states.publish(Int16MultiArray(data=state)))
 
         def take(message: Int16MultiArray) -> None:
             requests.append(message.data[0])
-            plc(message.data[0], state)
-            states.publish(Int16MultiArray(data=state))
+            if result == 'written':
+                plc(message.data[0], state)
+            results.publish(DiagnosticStatus(name='job_request', message=result, values=[
+                KeyValue(key='value', value=f'[{message.data[0]}]')]))
 
         observer.node.create_subscription(Int16MultiArray, '/fake/write/job_request', take, 10)
         with Process(EXAMPLE, '--node', '/fake', *args) as example:
@@ -66,8 +77,31 @@ def test_job_is_done_when_the_plc_has_its_number() -> None:
 
 def test_done_of_the_job_before_counts_for_nothing() -> None:
     status, lines, requests = run(lambda request, state: None, [4, 4], '--begin-within', '3')
-    assert (status, lines[-1]) == (1, 'job 5: the PLC has not begun')
+    assert (status, lines[-2:]) == (1, [
+        'job 5: the PLC has not begun; request: written', 'job 5: the PLC has not begun'])
     assert requests[-1] == 0  # the request has been taken back
+
+
+def test_job_that_begins_when_it_is_given_up_is_not_lost() -> None:
+    def begin_late(request: int, state: list[int]) -> None:
+        if not request:
+            state[:] = [5, 5]
+
+    status, lines, _ = run(begin_late, [4, 4], '--begin-within', '3')
+    assert (status, lines[-1]) == (0, 'job 5: done')
+
+
+def test_request_that_nobody_confirms_leaves_it_unknown() -> None:
+    status, lines, _ = run(lambda request, state: None, [4, 4], '--begin-within', '4',
+                           result='unknown whether written: no reply')
+    assert (status, lines[-2:]) == (3, [
+        'job 5: the PLC has not begun; request: unknown whether written: no reply',
+        'job 5: unknown whether it begins: the request is not taken back'])
+
+
+def test_nothing_is_asked_for_while_another_job_is_under_way() -> None:
+    status, lines, requests = run(lambda request, state: None, [5, 4])
+    assert (status, lines, requests) == (1, ['not begun: the PLC is busy with job 5'], [])
 
 
 def test_job_that_is_not_done_in_time_is_unknown() -> None:
