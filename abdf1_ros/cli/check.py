@@ -41,7 +41,7 @@ from abdf1_ros.cli.terminal import (
     YELLOW,
 )
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.served import row_problems
+from abdf1_ros.driver.served import usable_rows
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
@@ -94,11 +94,9 @@ def examine(net_file: str, map_file: str,
     except ConfigurationError as error:
         found.problems += error.problems
     if found.network is not None:
-        for mapping, problem in row_problems(
-                found.mappings, found.network, default_period, map_file):
-            if mapping in found.mappings:
-                found.mappings.remove(mapping)
-            found.problems.append(problem)
+        found.mappings, problems = usable_rows(
+            found.mappings, found.network, default_period, map_file)
+        found.problems += problems
     return found
 
 

@@ -169,15 +169,17 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
     return found
 
 
-def row_problems(mappings: Sequence[Mapping], network: Network, default_period: float,
-                 path: str) -> list[tuple[Mapping, Problem]]:
+def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: float,
+                path: str) -> tuple[list[Mapping], list[Problem]]:
     """
-    Return the rows that cannot be used on this line, and those that depend on such a row.
+    Return the rows that can be used on this line, and the faults of the others.
 
     ``default_period`` (s) is for rows without Period. A row whose counter is not read often enough
-    for its Heartbeat_Timeout cannot be used (docs/heartbeats.md, rules 14 and 15).
+    for its Heartbeat_Timeout cannot be used, nor a row that depends on one that cannot
+    (docs/heartbeats.md, rules 14 and 15).
     """
     found = line_problems(mappings, network, path)
+    problems = [problem for _, problem in found]
     left = [mapping for mapping in mappings if mapping not in dict(found)]
     blocks = Planner(line_model(network), default_period).plan(left)
     faults = [(mapping, 'Heartbeat_Timeout', text)
@@ -185,10 +187,10 @@ def row_problems(mappings: Sequence[Mapping], network: Network, default_period: 
     while faults:
         for mapping, column, text in faults:
             where = Place(path, mapping.line, column=column)
-            found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
+            problems.append(Problem(where, f'Item: {mapping.item}, {text}'))
             left = [other for other in left if other is not mapping]
         faults = _broken(left)
-    return found
+    return left, problems
 
 
 def _broken(mappings: Sequence[Mapping]) -> list[tuple[Mapping, str, str]]:

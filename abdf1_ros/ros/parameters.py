@@ -26,7 +26,7 @@ from typing import Any
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.served import row_problems
+from abdf1_ros.driver.served import usable_rows
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.files import FileWatch
@@ -197,11 +197,9 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
     try:
         map_file = _needed('map_file', parameters.map_file, problems)
         mappings, map_problems = load_mappings(map_file)
-        for mapping, problem in row_problems(
-                mappings, network, parameters.default_period / 1000, map_file):
-            if mapping in mappings:
-                mappings.remove(mapping)
-            map_problems.append(problem)
+        mappings, unusable = usable_rows(
+            mappings, network, parameters.default_period / 1000, map_file)
+        map_problems += unusable
     except ConfigurationError as error:
         problems += error.problems
     if is_strict:

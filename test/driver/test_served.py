@@ -21,7 +21,7 @@ from dataclasses import replace
 import tracemalloc
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.served import line_problems, row_problems, Served
+from abdf1_ros.driver.served import line_problems, Served, usable_rows
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import EmulatedProcessor
@@ -513,8 +513,8 @@ def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> 
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
     counter = make_mapping('N11:3', tag='alive', item=1)
     guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 250))
-    (mapping, problem), = row_problems([counter, guarded], Network(baud=19200), 0.1, 'map.csv')
-    assert mapping is guarded
+    good, (problem,) = usable_rows([counter, guarded], Network(baud=19200), 0.1, 'map.csv')
+    assert good == [counter]
     assert str(problem) == (
         'map.csv:3 (Heartbeat_Timeout): Item: 2, Heartbeat_Timeout 250 ms is shorter than 3 reads '
         'of alive on this line; 300 ms would do')
@@ -527,8 +527,10 @@ def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it()
     word = make_mapping('N7:5', 'Write', tag='speed', topic='speed', item=3)
     beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500, station=2, item=4,
                         heartbeat=Heartbeat(('speed',), 500))
-    found = row_problems([counter, guarded, word, beat], own, 0.1, 'map.csv')
-    assert [mapping.tag for mapping, _ in found] == ['alive', 'level', 'speed', 'beat']
+    good, problems = usable_rows([counter, guarded, word, beat], own, 0.1, 'map.csv')
+    assert good == []
+    assert [problem.text.partition(',')[0] for problem in problems] == [
+        'Item: 1', 'Item: 2', 'Item: 3', 'Item: 4']
 
 
 def test_problems_go_with_their_rows() -> None:
