@@ -41,8 +41,8 @@ from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
     LAST_WRITES,
     make_parser,
-    QUIET,
     run_ros,
+    take_last_writes,
 )
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -353,11 +353,8 @@ class Lines:
             line.ask_to_stop()
         for node in nodes:
             node.link.stop()
-        # Writes that have come already are refused now; whoever waits for a result gets it.
-        give_up, taken = min(time.monotonic() + LAST_WRITES, began + _LATEST_WRITES), -1
-        while taken != (taken := sum(node.writes_taken for node in nodes)) and \
-                time.monotonic() < give_up:
-            time.sleep(QUIET)
+        take_last_writes(time.sleep, lambda: sum(node.writes_taken for node in nodes),
+                         min(time.monotonic() + LAST_WRITES, began + _LATEST_WRITES))
         give_up = time.monotonic() + _LAST_WORDS
         left = [*filter(None, (line.quit(give_up) for line in self.lines))]
         give_up = time.monotonic() + _DESTRUCTION

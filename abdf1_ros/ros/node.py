@@ -32,6 +32,7 @@ from typing import Any
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Outcome, WriteResult
+from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.plan.report import setting_remarks
@@ -54,8 +55,8 @@ from abdf1_ros.ros.process import (
     EXIT_FAULT,
     LAST_WRITES,
     make_parser,
-    QUIET,
     run_ros,
+    take_last_writes,
 )
 from abdf1_ros.ros.reads import ReadTopics
 from abdf1_ros.ros.station_health import LinkCounterService
@@ -140,7 +141,9 @@ class BridgeNode(Node):
         self._tell(configuration)
         self._log = EventLog(self.get_logger(), line_time)
         self._lines = LineLog(self.get_logger(), line_time)
-        self._results = self.create_publisher(DiagnosticStatus, '~/write_results', 100)
+        # All writes that wait can end at once, faster than a subscriber takes their results.
+        self._results = self.create_publisher(
+            DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES)
         self._active = self.create_publisher(
             UInt16MultiArray, '~/active_stations', latched_qos())
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -512,12 +515,8 @@ def _spin(node: BridgeNode, ended: threading.Event) -> None:
     node.begin_end()
     node.finish_end(time.monotonic() + END_LIMIT)
     node.link.stop()
-    # Writes that have come already are refused now; whoever waits for a result gets it.
-    give_up = time.monotonic() + LAST_WRITES
-    is_idle = False
-    while not is_idle and (begun := time.monotonic()) < give_up:
-        executor.spin_once(timeout_sec=QUIET)
-        is_idle = time.monotonic() - begun >= QUIET
+    take_last_writes(executor.spin_once, lambda: node.writes_taken,
+                     time.monotonic() + LAST_WRITES)
     executor.shutdown()
 
 

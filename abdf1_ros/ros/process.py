@@ -27,6 +27,7 @@ import re
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 
 from abdf1_ros.errors import ConfigurationError, Problem
@@ -42,9 +43,12 @@ from rclpy.utilities import remove_ros_args
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
 
-# QUIET: when no callback comes for so long (s), no message from before the end waits any more.
-# LAST_WRITES: a publisher that never pauses is not waited for longer than this (s).
-QUIET = 0.05
+# A look that takes so long (s) without a write has found none. Only several in a row tell that no
+# write from before the end still waits: another callback, held up by a busy host, takes as long.
+_LOOK = 0.02
+_LOOKS = 3
+
+# A publisher that never pauses is not waited for longer than this (s).
 LAST_WRITES = 1.5
 
 # The beginnings of rclpy's errors about the log directory.
@@ -101,6 +105,21 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
         return status
     finally:
         rclpy.try_shutdown()
+
+
+def take_last_writes(look: Callable[[float], None], taken: Callable[[], int], give_up: float,
+                     now: Callable[[], float] = time.monotonic) -> None:
+    """
+    Let a node take the writes that have come before its end, so that each has its result.
+
+    ``look`` lets callbacks run for so long (s) at most, ``taken`` counts the writes; ``give_up``
+    is a value of the clock ``now``.
+    """
+    empty = 0
+    while empty < _LOOKS and (begun := now()) < give_up:
+        before = taken()
+        look(_LOOK)
+        empty = empty + 1 if taken() == before and now() - begun >= _LOOK else 0
 
 
 def _check_log_directory() -> None:

@@ -25,6 +25,7 @@ import time
 from typing import Any
 
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
@@ -277,6 +278,10 @@ def begin_writing(bench: Bench) -> Callable[..., None]:
     assert bench.until_results(1)[0].message == 'written'
     bench.results.clear()
     return publish
+
+
+def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benches) -> None:
+    assert make_bench(PULSES).node._results.qos_profile.depth == MAX_WAITING_WRITES
 
 
 def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:

@@ -25,6 +25,7 @@ import time
 
 from abdf1_ros.plan.forecast import intervals, line_model, longest_wait
 from abdf1_ros.plan.planner import Planner
+from abdf1_ros.ros.process import LAST_WRITES, take_last_writes
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network
 from diagnostic_msgs.msg import DiagnosticArray
@@ -132,12 +133,34 @@ def test_every_write_that_has_come_has_its_result_at_the_end(
         publisher = observer.publisher(Float32MultiArray, '/last/write/levels')
         publisher.publish(message)
         results.first()
-        for _ in range(500):
+        for _ in range(150):  # far fewer than LAST_WRITES is enough for, also on a busy host
             publisher.publish(message)
         node.end()
         simulator.end()
-    observer.until(lambda: len(results) == 501, lambda: f'501 results, got {len(results)}')
+    observer.until(lambda: len(results) == 151, lambda: f'151 results, got {len(results)}')
     observer.forget(results)
+
+
+def writes_taken(*looks: tuple[float, int], limit: float = LAST_WRITES) -> int:
+    """Return how many writes are taken by looks of which each takes (s, writes)."""
+    moment, taken, left = 0.0, 0, [*looks]
+
+    def look(seconds: float) -> None:
+        nonlocal moment, taken
+        duration, writes = left.pop(0) if left else (seconds, 0)
+        moment, taken = moment + duration, taken + writes
+
+    take_last_writes(look, lambda: taken, limit, lambda: moment)
+    return taken
+
+
+def test_slow_callback_is_no_pause_between_writes() -> None:
+    write, timer, slow_timer = (0.001, 1), (0.001, 0), (0.3, 0)
+    assert writes_taken(*5 * [write]) == 5
+    assert writes_taken(*5 * [(0.2, 1)]) == 5  # each held up, as by a busy host
+    assert writes_taken(*5 * [timer], write, slow_timer, slow_timer, write) == 2
+    assert writes_taken(write, *3 * [(0.025, 0)], write) == 1
+    assert writes_taken(*5000 * [(0.01, 1)]) == pytest.approx(100 * LAST_WRITES, abs=1)
 
 
 @pytest.fixture
