@@ -111,7 +111,7 @@ class _Output:
                 for name, chosen in (('check', options.check), ('duplex', options.duplex)))
             # The head of a capture has the settings of the node, of which one may be wrong.
             self._session = TrafficDecoder(_CHECKS.get(check), _DUPLEX.get(duplex),
-                                    is_certain=options.check != _AUTO)
+                                           is_certain=options.check != _AUTO)
             speed = whole_number(baud)
             if self._summary.baud is None and speed and speed > 0:
                 self._summary.baud = speed

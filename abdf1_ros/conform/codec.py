@@ -167,7 +167,7 @@ def _poll(buffer: bytes) -> HeardSymbol | None:
         return None
     station, end = found
     return HeardSymbol(SymbolKind.POLL, buffer[:end + 1], station=station,
-                 is_good=buffer[end] == bcc((station,)))
+                       is_good=buffer[end] == bcc((station,)))
 
 
 def _master_message(buffer: bytes, check: BlockCheck) -> HeardSymbol | None:

@@ -197,7 +197,7 @@ class Planner:
         return mapping.period / 1000
 
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
-                    poll_cycle: float) -> list[Block]:
+                   poll_cycle: float) -> list[Block]:
         """Plan the mappings of one area."""
         refused = self._refused[area]
         model = self._cost_model(demands[0].mapping, refused)

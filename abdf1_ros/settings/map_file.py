@@ -140,7 +140,7 @@ class _Clashes:
 
         def clash(column: str, other: Mapping, text: str) -> None:
             faults.append(CellFault(column, f'{text} of item {other.item} (line {other.line}, tag '
-                                        f'"{shown(other.tag)}")'))
+                                            f'"{shown(other.tag)}")'))
 
         if other := self._names.get(mapping.name):
             same = 'is already the tag' if mapping.tag == other.tag \

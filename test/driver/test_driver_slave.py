@@ -231,7 +231,7 @@ def test_master_reads_and_resets_the_counters_that_we_show() -> None:
     bench = Bench([serve_row('N7:50')])
     assert bench.master_reads('N7:50', 1) == b'\0\0'
     tasks = [bench.ask((0x06, data))
-               for data in (b'\x01\0\0\x1A', b'\x07', b'\x01\0\0\x1A')]
+             for data in (b'\x01\0\0\x1A', b'\x07', b'\x01\0\0\x1A')]
     bench.run(1.0)
     replies = [task.result for task in tasks]
     assert [reply.sts for reply in replies if isinstance(reply, Packet)] == [0, 0, 0]
