@@ -98,7 +98,7 @@ class Accounting:
             task.fail(WrongCommandCode(*details))
             return
         station.replies += 1
-        station.overdue = 0
+        station.overdue = station.returns = 0
         station.last_tns = reply.tns
         self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
         task.reply(reply)

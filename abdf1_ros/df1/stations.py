@@ -27,6 +27,9 @@ MAX_STATION = 254
 # After so many commands in a row without a reply in time the station is treated as silent.
 _MOST_OVERDUE = 2
 
+# A station that has come back so often without a reply to a command does not come from an outage.
+_MOST_RETURNS = 2
+
 
 @dataclass(slots=True)
 class Station:
@@ -38,6 +41,7 @@ class Station:
     nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
     message whose addresses cannot be right. ``overdue`` counts the commands in a row that
     were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
+    ``returns`` counts how often it has become active again since its last reply to a command.
     """
 
     number: int
@@ -51,11 +55,17 @@ class Station:
     remote_errors: int = 0
     silent_since: float | None = None
     overdue: int = 0
+    returns: int = 0
 
     @property
     def replies_in_time(self) -> bool:
         """Tell whether this station is likely to reply to a command in time."""
         return self.active and self.overdue < _MOST_OVERDUE
+
+    @property
+    def takes_no_commands(self) -> bool:
+        """Tell whether it comes and goes: it answers polls, and no command between them."""
+        return self.returns >= _MOST_RETURNS
 
     def accepts(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""
@@ -139,6 +149,7 @@ class ActiveStationList:
         for station in map(self.__getitem__, self.behind(self.via(number))):
             if not station.active:
                 station.active, station.silent_since = True, None
+                station.returns += 1
                 self._tell(station)
 
     def lost(self, number: int, now: float) -> None:

@@ -44,6 +44,9 @@ _WRITE_MEMORY = 10.0
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
 
+# A station that takes no commands and has not been heard for so long (s) is silent.
+_HEARD_LATELY = 10.0
+
 # A node that was killed stays visible for up to 20 s, the lease of its DDS participant. A node of
 # our name that is seen in so many looks in a row, a second apart, is not an earlier run of ours.
 _LOOKS_FOR_DUPLICATES = 30
@@ -201,6 +204,8 @@ class Diagnostics:
             return WARN, f'port open, but not polled for {now - polled:.0f} s'
         active = sum(station.active for station in self._driver.stations)
         total = sum(1 for _ in self._driver.stations)
+        if deaf := len(self.deaf_stations(now)):
+            return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
         if total and not active:
             return ERROR, f'port open, but none of {total} stations answers'
         if active < total:
@@ -256,17 +261,30 @@ class Diagnostics:
     def _judge_station(self, station: Station, now: float) -> Judgement:
         if self._link is None or not self._link.state.is_open:
             return ERROR, f'station {station.number} unknown: the port is not open'
+        if self._is_deaf(station, now):
+            return WARN, deaf_text(station.number)
         if not station.active:
             since = now - (station.silent_since or now)
             return ERROR, f'station {station.number} inactive since {since:.1f} s'
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
+        if not station.replies_in_time:
+            return WARN, f'station {station.number} takes commands, but does not reply in time'
         why = processor_fault(self._driver.health.known(station.number).identity)
         if why is not None:
             return WARN, f'station {station.number} active, but {why}'
         if (wrong := self._wrong_type(station.number)) is not None:
             return WARN, wrong
         return OK, f'station {station.number} active'
+
+    def deaf_stations(self, now: float) -> list[int]:
+        """Return the stations of a master that are heard, but not with replies to commands."""
+        return [station.number for station in self._driver.stations if self._is_deaf(station, now)]
+
+    def _is_deaf(self, station: Station, now: float) -> bool:
+        return (station.takes_no_commands and station.last_heard is not None
+                and now - station.last_heard < _HEARD_LATELY
+                and self._driver.network.mode == 'Master')
 
     def _station_values(self, station: Station, now: float) -> dict[str, str]:
         heard, via = station.last_heard, self._driver.stations.via(station.number)
@@ -327,6 +345,11 @@ def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mappin
         if not mapping.serves:
             rows[mapping.station].setdefault(mapping.plc_type, mapping)
     return rows
+
+
+def deaf_text(station: int) -> str:
+    """Return what is wrong with a station that is heard, but not with replies to commands."""
+    return f'station {station} answers polls, but no command: is Error_Code right?'
 
 
 def changed_text(names: Sequence[str]) -> str:

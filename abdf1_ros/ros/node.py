@@ -42,6 +42,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import (
     changed_text,
+    deaf_text,
     Diagnostics,
     DuplicateNameWatch,
     is_usual_fallback,
@@ -150,6 +151,8 @@ class BridgeNode(Node):
         parameters, network = configuration.parameters, configuration.network
         self._configuration = configuration
         self._wrong_types: list[str] = []
+        self._deaf_stations: list[int] = []
+        self._has_told_tools = False
         # Every node has this service under this name.
         service = f'{self.get_fully_qualified_name()}/get_parameters'
         self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
@@ -326,12 +329,26 @@ class BridgeNode(Node):
     def station_changed(self, station: Station) -> None:
         """Publish the Active Node Table and log the change."""
         self._publish_active()
+        if station.takes_no_commands:
+            return  # it comes and goes, and that is told once
         self._log.forget(station.number)
         about = f'station {station.number}'
         if station.active:
             self._lines.info(about, f'{about} answers again')
         else:
             self._lines.error(about, Message.ERR_INACTIVE_STATION.line(station.number))
+            if station.last_heard is None:
+                self._tell_tools(about)
+
+    def _tell_tools(self, about: str) -> None:
+        """Name, once, what finds out why a station has never been heard."""
+        if self._has_told_tools:
+            return
+        self._has_told_tools = True
+        scan = '' if self.driver.network.mode == 'Peer' else ', "plc scan" which stations answer'
+        self.get_logger().info(
+            f'{about} has never been heard: with the node stopped, "plc detect" finds the '
+            f'settings of the line{scan}')
 
     def _publish_active(self) -> None:
         """Publish the Active Node Table; with a closed port no station is active."""
@@ -365,10 +382,22 @@ class BridgeNode(Node):
             if text not in self._wrong_types:
                 self._lines.warning('types of PLCs', text)
         self._wrong_types = wrong_types
+        self._tell_deaf_stations(self._diagnostics.deaf_stations(now))
         levels = self._diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self._publish_diagnostics(now)
+
+    def _tell_deaf_stations(self, numbers: list[int]) -> None:
+        """Log once that a station takes no commands, and once that it does again."""
+        for number in numbers:
+            if number not in self._deaf_stations:
+                self._lines.warning(f'commands to {number}', f'{deaf_text(number)} "plc detect" '
+                                    'finds it, with the node stopped')
+        for number in self._deaf_stations:
+            if number not in numbers and self.driver.stations[number].active:
+                self._lines.info(f'commands to {number}', f'station {number} answers commands')
+        self._deaf_stations = numbers
 
     def _look_at_files(self, now: float) -> None:
         """Log once that a file has changed since it was read."""

@@ -1014,3 +1014,30 @@ def test_random_values_arrive_as_they_are_whatever_the_plan() -> None:
         for mapping in mappings:
             at = mapping.address.element
             assert bench.listener.values(mapping)[0] == words[at:at + mapping.length]
+
+
+class DeafPlc:
+    """A PLC with another Error_Code: it takes polls, whose check is always a BCC, alone."""
+
+    def __init__(self, plc: SimulatedPlc) -> None:
+        self.is_deaf = True
+        self._plc = plc
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Answer polls as the PLC does."""
+        return b'' if self.is_deaf and isinstance(symbol, Frame) else self._plc.handle(symbol)
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])
+def test_station_that_answers_polls_alone_is_told_from_one_that_comes_back(polling: str) -> None:
+    bench, plc = make_bench(make_mapping('N7:0'), network=Network(baud=115200, polling=polling))
+    deaf = DeafPlc(plc)
+    bench._stations[:] = [deaf]
+    bench.open()
+    station = bench.driver.stations[1]
+    bench.run_until(lambda: station.takes_no_commands)
+    assert bench.listener.changes == [(1, False), (1, True)] * 2
+    assert not bench.listener.reads
+    deaf.is_deaf = False
+    bench.run_until(lambda: bool(bench.listener.reads))
+    assert not station.takes_no_commands

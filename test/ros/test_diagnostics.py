@@ -307,6 +307,30 @@ def test_station_that_is_silent(bench: Bench) -> None:
     assert bench.says('station 1')[0] == OK
 
 
+def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
+    stations = bench.driver.stations
+    for _ in range(2):
+        stations.lost(1, NOW)
+        stations.heard(1, NOW)
+    told = WARN, 'WARN: station 1 answers polls, but no command: is Error_Code right?'
+    assert bench.says('station 1') == told
+    assert bench.says('link') == (
+        WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')
+    stations.lost(1, NOW)  # it comes and goes
+    assert bench.says('station 1') == told
+    assert bench.says('station 1', NOW + 11) == (ERROR, 'ERROR: station 1 inactive since 11.0 s')
+    stations.heard(1, NOW + 12)
+    stations[1].returns = 0  # by a reply
+    assert bench.says('station 1', NOW + 12)[0] == OK
+
+
+def test_station_that_does_not_reply_in_time(bench: Bench) -> None:
+    bench.driver.stations.heard(1, NOW)
+    bench.driver.stations[1].overdue = 2
+    assert bench.says('station 1') == (
+        WARN, 'WARN: station 1 takes commands, but does not reply in time')
+
+
 def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
     bench.diagnostics.happened(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1), NOW)
     bench.diagnostics.happened(Event(Message.NTC_REPLY_MSG_RCVD, (1,), 1), NOW)

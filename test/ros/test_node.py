@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
+import re
 import threading
 import time
 from typing import Any
@@ -300,6 +301,23 @@ def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
     publish(*8 * [1])
     assert bench.until_results(1)[0].message == 'written'
     assert bench.words('B3:1') == [255]
+
+
+def test_station_with_another_error_code_is_told_once(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(SPEED, parameters=('net.error_code:=BCC',))
+    until_status(bench.diagnostics, 'station 1', WARN)
+    stations = bench.node.driver.stations
+    # It goes on to come and go.
+    bench.observer.until(lambda: stations[1].returns >= 5, 'more returns')
+    lines = [line.partition('[abdf1]: ')[2]
+             for line in ''.join(capfd.readouterr()).splitlines()]
+    told = Counter(re.split(r'[:,]', line)[0] for line in lines
+                   if line.startswith(('25', 'station')))
+    assert told == {
+        '2519 NTC_NAK_LIMIT_EXCEEDED': 3, '2509 ERR_INACTIVE_STATION': 2,
+        'station 1 has never been heard': 1, 'station 1 answers again': 1,
+        'station 1 answers polls': 1}
 
 
 def test_write_that_waits_too_long_for_the_line_is_not_sent(make_bench: Benches) -> None:
