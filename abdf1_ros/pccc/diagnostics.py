@@ -38,7 +38,6 @@ MAX_ECHO_SLC = 236  # of an SLC 5/03 and later (M 7-8)
 MAX_COUNTERS = 244  # bytes in a reply to 06/01
 
 STATUS_REQUEST = bytes((STATUS,))
-RESET_REQUEST = bytes((RESET_COUNTERS,))
 
 
 def max_echo(plc_type: PlcType) -> int:

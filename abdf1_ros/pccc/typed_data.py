@@ -29,7 +29,6 @@ from dataclasses import dataclass
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 
-BIT_STRING = 2
 BYTE_STRING = 3
 INTEGER = 4
 FLOAT = 8

@@ -47,7 +47,7 @@ def test_status_request_of_the_vectors(name: str) -> None:
 
 
 def test_reset_of_the_vectors() -> None:
-    assert pair('diag_reset_counters')[0].data == diagnostics.RESET_REQUEST
+    assert pair('diag_reset_counters')[0].data == b'\x07'
 
 
 def test_read_counters() -> None:

@@ -20,7 +20,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.diagnostic_status import decode_identity
-from abdf1_ros.pccc.diagnostics import max_echo, ReadCounters, RESET_REQUEST, STATUS_REQUEST
+from abdf1_ros.pccc.diagnostics import max_echo, ReadCounters, STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
@@ -100,9 +100,9 @@ def test_plc5_ignores_the_address_of_counters(counters: Counters) -> None:
 def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None:
     served = ServedCounters(counters, CounterLayout.SLC_SLAVE)
     before = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
-    assert answer(PlcType.SLC, RESET_REQUEST + b'\1', served) == reply(sts=REFUSED)
+    assert answer(PlcType.SLC, b'\7' + b'\1', served) == reply(sts=REFUSED)
     assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == before != reply(bytes(26))
-    assert answer(PlcType.SLC, RESET_REQUEST, served) == reply()
+    assert answer(PlcType.SLC, b'\7', served) == reply()
     assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == reply(bytes(26))
     assert counters.messages_sent == 300
     counters.messages_sent += 5
