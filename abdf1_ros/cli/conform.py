@@ -92,15 +92,12 @@ class _PortLine:
         self._never, self._keep = os.pipe()
 
     def read(self, timeout: float) -> bytes:
-        """Return the bytes that come within ``timeout`` s."""
         return self._port.read(timeout, self._never)
 
     def write(self, data: bytes) -> None:
-        """Send bytes."""
         self._port.write(data)
 
     def close(self) -> None:
-        """Give the port back."""
         self._port.close()
         os.close(self._never)
         os.close(self._keep)

@@ -58,47 +58,38 @@ def run(name: str) -> int:
 
 
 def node() -> int:
-    """Run the node."""
     return run('node')
 
 
 def lines() -> int:
-    """Run many lines."""
     return run('lines')
 
 
 def monitor() -> int:
-    """Run the monitor."""
     return run('monitor')
 
 
 def demo() -> int:
-    """Run the demonstration."""
     return run('demo')
 
 
 def simulator() -> int:
-    """Run the simulator."""
     return run('simulator')
 
 
 def sniff() -> int:
-    """Run the sniffer."""
     return run('sniff')
 
 
 def check() -> int:
-    """Check files."""
     return run('check')
 
 
 def plc() -> int:
-    """Ask a PLC."""
     return run('plc')
 
 
 def conform() -> int:
-    """Play one end of a line against the rules."""
     return run('conform')
 
 

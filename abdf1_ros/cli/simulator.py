@@ -114,11 +114,9 @@ class _FaultyPort:
             self._port.write(self._plc.damaged(data))
 
     def unsent(self) -> int:
-        """Return how many bytes have still to leave."""
         return self._port.unsent()
 
     def close(self) -> None:
-        """Close the port."""
         self._port.close()
 
 

@@ -103,7 +103,6 @@ class ReportBundle:
             f'{identity}{f"; {faults}" if faults else ""}; status {reply.data.hex(" ")}')
 
     def write(self, path: str, summary: Summary, kind: LineKind) -> None:
-        """Write the bundle."""
         processors = [f'station {station}: {text}'
                       for station, text in sorted(self._processors.items())]
         texts = {

@@ -47,8 +47,6 @@ class Permission(Enum):
 
 
 class Verdict(Enum):
-    """The verdict of a case."""
-
     PASS = 'PASS'
     FAIL = 'FAIL'
     SKIP = 'SKIP'

@@ -190,7 +190,6 @@ class PeerEnd(_AskingEnd):
         self.wire.send(codec.message(command, self.wire.check))
 
     def deliver(self, command: bytes) -> None:
-        """Send a message that has to be acknowledged."""
         self.send(command)
         self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good message')
 
@@ -302,7 +301,6 @@ class ServerEnd:
         self.wire.send(codec.message(self.serve(command.data), self.wire.check))
 
     def finish(self, command: HeardSymbol) -> None:
-        """Answer a command to its end."""
         self.wire.send(codec.ACK)
         self.reply_to(command)
         self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')

@@ -90,12 +90,10 @@ class ListeningDecoder(FrameDecoder):
         del self._heard[:-_MOST_KEPT - len(self._buffer)]
 
     def reset(self) -> None:
-        """Forget everything heard so far."""
         super().reset()
         self._heard.clear()
 
     def next_symbol(self) -> Symbol | None:
-        """Return the next whole symbol, or None when more bytes are needed."""
         symbol = super().next_symbol()
         if symbol is not None:
             self._keep(symbol)

@@ -79,7 +79,6 @@ class SlaveLink:
                 next_look = self._machine.now + TICK
 
     def polled(self) -> None:
-        """Take note that the master has polled us."""
         self.last_poll = self._machine.now
         entry = self._outstanding
         if entry is None or entry.is_delivered:

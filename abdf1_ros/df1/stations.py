@@ -121,11 +121,9 @@ class ActiveStationList:
         self._stations = dict(sorted(self._stations.items()))
 
     def __iter__(self) -> Iterator[Station]:
-        """Iterate over the stations by number."""
         return iter(self._stations.values())
 
     def __contains__(self, number: object) -> bool:
-        """Tell whether a station is in the list."""
         return number in self._stations
 
     def __getitem__(self, number: int) -> Station:

@@ -51,8 +51,6 @@ _NOT_ASKED = 'unknown (not asked yet)'
 
 
 class CheckKind(Enum):
-    """What a check is for."""
-
     ECHO = 'echo'
     STATUS = 'diagnostic status'
     COUNTERS = 'link counters'
@@ -162,7 +160,6 @@ class Checks:
         return None if math.isinf(self._next_due) else self._next_due
 
     def is_due(self, now: float) -> bool:
-        """Tell whether a check is due."""
         for station in self._requests.take():
             self._add_request(station, now)
         return now >= self._next_due

@@ -71,7 +71,6 @@ class OwnWrite:
 
     @property
     def station(self) -> int:
-        """Return the station to write to."""
         return self.write.mapping.station
 
 

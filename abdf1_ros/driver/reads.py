@@ -40,7 +40,6 @@ class Reads:
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
-        """Return all read jobs."""
         return frozenset(self._due.jobs)
 
     @property

@@ -74,7 +74,6 @@ class DataTable:
             raise NoSuchFile(f'there is no file {file}') from None
 
     def read(self, address: Address, words: int) -> bytes:
-        """Return ``words`` words."""
         store, start = self.find(address, words)
         return bytes(store[start:start + 2 * words])
 

@@ -81,7 +81,6 @@ class FileAddressing(Addressing):
         return address
 
     def show(self, address: Address) -> str:
-        """Return the text that ``parse`` reads."""
         kind = address.file_type
         file = '' if kind.is_io else str(address.file)
         return f'{kind.value}{file}:{self._element_text(address)}{self._rest_text(address)}'

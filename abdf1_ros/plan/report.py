@@ -124,7 +124,6 @@ class Report:
         return found
 
     def remarks(self) -> list[Remark]:
-        """Return all remarks."""
         found = [*setting_remarks(self.network, self.mappings)]
         if not self.mappings:
             text = 'the map has no usable row: nothing is read or written'

@@ -65,7 +65,6 @@ class DescriptorPort:
         os.set_blocking(descriptor, False)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
         self._poll.register(wake, select.POLLIN)  # has no effect from the second call on
         milliseconds = None if timeout is None else math.ceil(timeout * 1000)
         for descriptor, _ in self._poll.poll(milliseconds):
@@ -84,11 +83,9 @@ class DescriptorPort:
         return data
 
     def fileno(self) -> int:
-        """Return the descriptor."""
         return self._descriptor
 
     def write(self, data: bytes) -> None:
-        """Hand all of ``data`` to the operating system."""
         give_up = math.inf
         while data:
             try:
@@ -112,5 +109,4 @@ class DescriptorPort:
         return count
 
     def close(self) -> None:
-        """Give the line back."""
         self._close()

@@ -225,7 +225,6 @@ class Rfc2217Port(DescriptorPort):
                       + value.replace(_IAC, _IAC + _IAC) + bytes([_Telnet.IAC, _Telnet.SE]))
 
     def write(self, data: bytes) -> None:
-        """Hand all of ``data`` to the operating system."""
         super().write(data.replace(_IAC, _IAC + _IAC))
 
 

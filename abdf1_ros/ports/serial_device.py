@@ -127,7 +127,6 @@ class SerialDevice(DescriptorPort):
         self._origin = self._counts()
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
         if self._pieces:
             return self._pieces.popleft()
         data = super().read(timeout, wake)

@@ -91,7 +91,6 @@ class Tap:
                              self._reader(ports[1], Direction.IN, ports[0])]
 
     def __enter__(self) -> Tap:
-        """Begin to read."""
         for reader in self._readers:
             reader.start()
         return self

@@ -74,23 +74,19 @@ class TracedPort:
         self._clock = clock
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes up to ``timeout`` s, or until ``wake`` is readable."""
         data = self._port.read(timeout, wake)
         if data:
             self._note(Direction.IN, data)
         return data
 
     def write(self, data: bytes) -> None:
-        """Send bytes."""
         self._port.write(data)
         self._note(Direction.OUT, data)
 
     def unsent(self) -> int:
-        """Return how many bytes have still to leave."""
         return self._port.unsent()
 
     def close(self) -> None:
-        """Close the port; the trace goes on when it is opened again."""
         self._port.close()
 
     def _note(self, direction: Direction, data: bytes) -> None:

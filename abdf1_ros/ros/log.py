@@ -149,17 +149,14 @@ class LineLog:
         self._subjects: dict[str, _Subject] = {}
 
     def info(self, about: str, text: str) -> None:
-        """Log something normal."""
         if self._may_write(about):
             self._logger.info(self._line(about, text))
 
     def warning(self, about: str, text: str) -> None:
-        """Log what somebody should know."""
         if self._may_write(about):
             self._logger.warning(self._line(about, text))
 
     def error(self, about: str, text: str) -> None:
-        """Log a failure."""
         if self._may_write(about):
             self._logger.error(self._line(about, text))
 

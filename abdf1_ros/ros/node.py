@@ -190,7 +190,6 @@ class BridgeNode(Node):
 
     @property
     def port(self) -> str:
-        """Return the name of the port."""
         return self._configuration.port
 
     def _port_settings(self) -> PortSettings:

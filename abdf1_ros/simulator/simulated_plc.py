@@ -115,7 +115,6 @@ class Sending:
         self._report = report
 
     def reply(self, packet: Packet) -> None:
-        """Take the reply."""
         try:
             check_status(packet)
         except RemoteError as error:
@@ -124,7 +123,6 @@ class Sending:
             self._report('confirmed')
 
     def fail(self, error: LinkError) -> None:
-        """Take note that there will be no reply."""
         self._report(str(error))
 
 

@@ -109,7 +109,6 @@ class CaptureWriter:
         self._put(line)
 
     def close(self) -> None:
-        """End the capture."""
         self._file.close()
 
     def _begin(self) -> TextIO:

@@ -90,7 +90,6 @@ class PcapngWriter:
             + _padded(data) + _option(_FLAGS, flags) + _option(0, b'')))
 
     def close(self) -> None:
-        """End the file."""
         self._file.close()
 
 

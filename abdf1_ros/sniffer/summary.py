@@ -63,7 +63,6 @@ class Counts:
     latency: Latency = field(default_factory=Latency)
 
     def add(self, entry: Entry) -> None:
-        """Count an entry."""
         self.kinds[entry.kind] += 1
         self.marks.update(entry.marks)
         self.noise += entry.size

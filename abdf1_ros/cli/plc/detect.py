@@ -39,7 +39,6 @@ class LineSettings:
     check: str
 
     def __str__(self) -> str:
-        """Return the settings in words."""
         return f'{self.baud} baud, {_WORDS[self.mode]}, {self.check}'
 
 

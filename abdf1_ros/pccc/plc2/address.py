@@ -59,12 +59,10 @@ class _Plc2Addressing(Addressing):
         return Address(self, FileType.BINARY, 0, word, 0, bit)
 
     def show(self, address: Address) -> str:
-        """Return the text that ``parse`` reads."""
         word = show_word(address.element)
         return word if address.bit is None else f'{word}/{address.bit:02o}'
 
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:
-        """Return the last word."""
         return _LAST_WORD
 
 

@@ -41,13 +41,11 @@ class Plc2Dialect:
         self.writes_bits = not self._is_cif
 
     def max_read(self, file_type: FileType) -> int:
-        """Return the most words per read."""
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_READ) // 2
 
     sure_read = max_read
 
     def max_write(self, file_type: FileType) -> int:
-        """Return the most words per write."""
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_WRITE) // 2
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
@@ -55,15 +53,12 @@ class Plc2Dialect:
         return plc2.READ, BasicRead(self._first(address), 2 * words).encode()
 
     def reply_size(self, address: Address, words: int) -> int:
-        """Return the bytes asked for."""
         return words * 2
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
-        """Check the length of the reply and return it."""
         return exactly(words, data)
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
-        """Return a write of whole words."""
         return self._write, BasicWrite(self._first(address), data).encode()
 
     def write_bits(self, address: Address, mask: int, bits: int) -> Request:

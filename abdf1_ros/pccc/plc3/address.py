@@ -83,7 +83,6 @@ class _Plc3Addressing(Addressing):
         return Address(self, kind, file, number, 0, _bit(bit))
 
     def show(self, address: Address) -> str:
-        """Return the text that ``parse`` reads."""
         kind, file = address.file_type, address.file
         number = f'{address.element:04o}' if kind.is_io else str(address.element)
         place = f'{kind.value}{file or ""}:{number}' if kind in _NO_FILE_NEEDED \

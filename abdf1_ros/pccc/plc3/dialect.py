@@ -32,14 +32,12 @@ class _Plc3Range:
     address_size = 11
 
     def address(self, address: Address) -> ExtendedAddress:
-        """Return the extended address."""
         section = SECTIONS[address.file_type]
         if address.file_type.is_structure:
             return ExtendedAddress(section, address.file, address.element, address.word)
         return ExtendedAddress(section, address.file, 0, address.element)
 
     def write_bits(self, address: Address, set_bits: int, reset_bits: int) -> bytes:
-        """Return a bit write."""
         return WordBitWrite(self.address(address), set_bits, reset_bits).encode()
 
 

@@ -39,11 +39,9 @@ class _Plc5Addressing(FileAddressing):
     last_file = 999
 
     def is_octal(self, kind: FileType) -> bool:
-        """Tell whether elements and bits of such a file are octal."""
         return kind.is_io
 
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:
-        """Return the number of the last element that a file of this type can have."""
         return _LAST.get(kind, _LAST_ELEMENT)
 
 

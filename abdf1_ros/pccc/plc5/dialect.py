@@ -38,17 +38,14 @@ class Plc5Dialect:
     writes_bits = True
 
     def max_read(self, file_type: FileType) -> int:
-        """Return the most words per read."""
         return _most_words(file_type, plc5.MAX_REPLY)
 
     sure_read = max_read
 
     def max_write(self, file_type: FileType) -> int:
-        """Return the most words per write."""
         return _most_words(file_type, plc5.MAX_WRITE - plc5.MAX_ELEMENT_ADDRESS)
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
-        """Return a typed read."""
         count = 2 * words // _element(address, words).size
         return plc5.CMD, plc5.TypedRead(_system_address(address, words), count, 0, count).encode()
 
@@ -78,7 +75,6 @@ class Plc5Dialect:
         return b''.join(typed.data[at:at + size] for at in range(0, len(typed.data), step))
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
-        """Return a typed write."""
         words = len(data) // 2
         element = _element(address, words)
         values = element.typed(data)
@@ -119,11 +115,9 @@ class _Plc5Range:
     address_size = 8
 
     def address(self, address: Address) -> plc5.SystemAddress:
-        """Return the system address."""
         return plc5.SystemAddress(address.file, address.element, address.word or None)
 
     def write_bits(self, address: Address, set_bits: int, reset_bits: int) -> bytes:
-        """Return a read-modify-write."""
         change = plc5.BitSet(self.address(address), ~(set_bits | reset_bits) & 0xFFFF, set_bits)
         return plc5.ReadModifyWrite((change,)).encode()
 

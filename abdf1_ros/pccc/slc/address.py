@@ -44,13 +44,11 @@ class _SlcAddressing(FileAddressing):
     last_file = 255
 
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:
-        """Return the number of the last element that a file of this type can have."""
         if not kind.is_io:
             return _LAST_ELEMENT
         return _LAST_FLAT_WORD if is_flat else _LAST_SLOT
 
     def elements_name(self, kind: FileType, is_flat: bool) -> str:
-        """Return what the elements of such a file are called."""
         return 'slots' if kind.is_io and not is_flat else 'elements'
 
     def slot_of(self, address: Address) -> int | None:

@@ -38,7 +38,6 @@ class SlcDialect:
         self._processor = processor
 
     def max_read(self, file_type: FileType) -> int:
-        """Return the most words per read."""
         return _whole_elements(file_type, self._processor.max_read)
 
     def sure_read(self, file_type: FileType) -> int:
@@ -46,23 +45,18 @@ class SlcDialect:
         return _whole_elements(file_type, Processor.SLC_5_01.max_read)
 
     def max_write(self, file_type: FileType) -> int:
-        """Return the most words per write."""
         return _whole_elements(file_type, self._processor.max_write)
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
-        """Return a protected typed logical read."""
         return slc.CMD, slc.LogicalRead(_logical_address(address), words * 2).encode()
 
     def reply_size(self, address: Address, words: int) -> int:
-        """Return the bytes asked for."""
         return words * 2
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
-        """Check the length of the reply and return it."""
         return exactly(words, data)
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
-        """Return a protected typed logical write."""
         return slc.CMD, slc.LogicalWrite(_logical_address(address), data).encode()
 
     def write_bits(self, address: Address, mask: int, bits: int) -> Request:

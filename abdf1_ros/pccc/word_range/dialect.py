@@ -62,26 +62,22 @@ class WordRangeDialect:
         self._family = family
 
     def max_read(self, file_type: FileType) -> int:
-        """Return the most words per read."""
         words = self._family.files[file_type].words
         return word_range.MAX_READ // 2 // words * words
 
     sure_read = max_read
 
     def max_write(self, file_type: FileType) -> int:
-        """Return the most words per write."""
         words = self._family.files[file_type].words
         return (word_range.MAX_WRITE - self._family.address_size) // 2 // words * words
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
-        """Return a word range read."""
         whole = transfer or Transfer(address, words)
         return word_range.CMD, WordRangeRead(
             self._family.address(whole.start), 2 * words, address.offset - whole.start.offset,
             whole.words).encode()
 
     def reply_size(self, address: Address, words: int) -> int:
-        """Return the bytes asked for."""
         return words * 2
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
@@ -89,7 +85,6 @@ class WordRangeDialect:
         return in_line_order(address, exactly(words, data))
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
-        """Return a word range write."""
         whole = transfer or Transfer(address, len(data) // 2)
         return word_range.CMD, WordRangeWrite(
             self._family.address(whole.start), in_line_order(address, data),
