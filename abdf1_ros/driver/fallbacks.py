@@ -71,7 +71,8 @@ class FallbackRow:
         self._due_since = 0.0
         self._next_try = -math.inf
         # Whether a write has ended as unknown since the last message or fallback was confirmed.
-        self._is_unconfirmed = False
+        # What was under way when we began is unknown: a gateway may still hold it.
+        self._is_unconfirmed = mapping.via is not None
         self._again_at = math.inf
 
     def make_due(self, cause: FallbackCause, now: float) -> None:

@@ -125,6 +125,15 @@ def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
     cell.until(lambda: cell.word('N10:0') > last, 'a heartbeat that counts again')
 
 
+def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path) -> None:
+    with Cell(tmp_path, 'use_sim_time:=true') as cell:
+        cell.until_counting()
+        speed = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+        speed.publish(Int16MultiArray(data=[3]))
+        cell.until(lambda: cell.word('N10:1') == 3, 'the value')
+        cell.until(lambda: fallbacks(cell.results) == ['start', 'timeout'], 'the fallback')
+
+
 def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
     cell.until_counting()
     publisher = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
