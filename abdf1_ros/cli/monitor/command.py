@@ -13,11 +13,14 @@
 # limitations under the License.
 
 """
-Show what a running bridge does, from its topics alone.
+Show what a running bridge does, or all of them, from their topics alone.
 
 It shows values and their ages, stations, the load of the line, writes and counters. On a terminal
 the picture is renewed in place, and its last line names the keys. Elsewhere, or with
 --once, plain text is printed.
+
+With --all there is a line for each bridge that is heard, the worst first; Return shows the one
+that is marked, q goes back.
 
 A value is fresh, or STALE when it is older than its topic promises; topics that are published on
 change, or when a PLC writes to us, promise nothing.
@@ -38,6 +41,7 @@ import time
 from types import FrameType
 
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
+from abdf1_ros.cli.monitor.plant import PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
 from abdf1_ros.cli.terminal import command_parser, has_reader_left, prepare_output, seconds_option
 from abdf1_ros.errors import FormatError
@@ -58,8 +62,11 @@ _PROGRESS_PERIOD = 2.0
 # This key draws the whole picture again, for when another program has written to the terminal.
 _CONTROL_L = 12
 
+_RETURN = (curses.KEY_ENTER, ord('\n'), ord('\r'))
+
 _SECTION_KEYS = {ord('l'): 'link', ord('s'): 'stations', ord('v'): 'values',
                  ord('r'): 'reasons', ord('w'): 'writes', ord('c'): 'counters'}
+_PLANT_KEYS = 'q end  arrows, pages  Return shows a line'
 _KEYS = 'q end  arrows, pages  l link  s stations  v values  r reasons  w writes  c counters'
 
 # Colours by the codes of ANSI, which stand for the same colours in curses.
@@ -71,6 +78,8 @@ exit status: 0 at the end, 1 when the node is not found within --wait, 2 for bad
 examples:
   monitor
   monitor --node /cell/line_1
+  monitor --all
+  monitor --all --once | grep -v ' OK '
   monitor --once | grep -E 'STALE|no value'
   monitor --seconds 60 --period 10 > state.txt
 """
@@ -99,12 +108,16 @@ class _Ending:
 class _Screen:
     """A terminal that shows lines in place, for curses.wrapper."""
 
-    def __init__(self, window: curses.window) -> None:
+    def __init__(self, window: curses.window, keys: str = _KEYS, marked: str = '') -> None:
         self._window = window
         self._top = 0
+        self._marked = marked
+        self._step = 0
+        self._chosen = ''
+        self.chosen = ''
         self._sections: dict[str, int] = {}
         self._toggle: Callable[[], None] | None = None
-        self._keys = _KEYS
+        self._keys = keys
         self._colours: dict[Style, int] = {}
         window.nodelay(True)
         try:
@@ -119,28 +132,32 @@ class _Screen:
 
     def offer_toggle(self, toggle: Callable[[], None]) -> None:
         """Let the key t call ``toggle``."""
-        self._toggle, self._keys = toggle, f't toggle  {_KEYS}'
+        self._toggle, self._keys = toggle, f't toggle  {self._keys}'
 
     @property
     def width(self) -> int:
         return self._window.getmaxyx()[1] - 1  # writing into the last corner is an error
 
-    def show(self, lines: Sequence[TextLine]) -> None:
+    def show(self, lines: Sequence[TextLine], heading: int = 0) -> None:
         """Show as many lines as fit, from the first one after scrolling, and the keys below."""
-        height = self._window.getmaxyx()[0] - 1
+        height = self._window.getmaxyx()[0] - 1 - heading
         self._sections = {line.section: row for row, line in enumerate(lines) if line.section}
-        self._top = max(0, min(self._top, len(lines) - height))
+        count = len(lines) - heading
+        self._top = max(0, min(self._top, count - height))
+        last = min(self._top + height, count)
         self._window.erase()
-        for row, line in enumerate(lines[self._top:self._top + height]):
+        shown = [*lines[:heading], *lines[heading + self._top:heading + last]]
+        for row, line in enumerate(shown):
             attributes = self._colours.get(line.style, 0)
             if line.style is Style.TITLE:
                 attributes = curses.A_BOLD
+            if line.section and line.section == self._chosen:
+                attributes |= curses.A_REVERSE
             try:
                 self._window.addnstr(row, 0, line.text, self.width, attributes)
             except curses.error:  # letters of double width, or a window just made smaller
                 pass
-        last = min(self._top + height, len(lines))
-        self._bottom(f'{self._top + 1}-{last} of {len(lines)}  {self._keys}')
+        self._bottom(f'{min(self._top + 1, last)}-{last} of {count}  {self._keys}')
         self._window.refresh()
 
     def _bottom(self, text: str) -> None:
@@ -166,6 +183,38 @@ class _Screen:
             curses.noecho()
             self._window.nodelay(True)
 
+    def show_list(self, lines: Sequence[TextLine]) -> None:
+        """Show lines of which one is marked, each with a ``section`` to know it by."""
+        rows = [row for row, line in enumerate(lines) if line.section] or [0]
+        at = next((row for row in rows if lines[row].section == self._marked), rows[0])
+        if self._step:  # before that it is the first, whatever that is
+            at = min(max(at + self._step, rows[0]), rows[-1])
+            self._marked, self._step = lines[at].section, 0
+        self._chosen = lines[at].section
+        height = self._window.getmaxyx()[0] - 1 - rows[0]
+        self._top = max(min(self._top, at - rows[0]), at - rows[0] - height + 1)
+        self.show(lines, rows[0])
+
+    def wants_other_list(self) -> bool:
+        """Take the keys that have been pressed; tell whether one ends, or chooses a line."""
+        page = self._window.getmaxyx()[0] - 2
+        steps = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
+                 curses.KEY_NPAGE: page, ord(' '): page, curses.KEY_HOME: -1_000_000,
+                 curses.KEY_END: 1_000_000}
+        while (key := self._window.getch()) != -1:
+            if key == ord('q'):
+                return True
+            if key in _RETURN and self._chosen:
+                self.chosen = self._chosen
+                return True
+            self._clear_for(key)
+            self._step += steps.get(key, 0)
+        return False
+
+    def _clear_for(self, key: int) -> None:
+        if key in (_CONTROL_L, curses.KEY_RESIZE):
+            self._window.clearok(True)
+
     def wants_end(self) -> bool:
         """Take the keys that have been pressed; tell whether one of them ends."""
         page = self._window.getmaxyx()[0] - 2
@@ -174,8 +223,7 @@ class _Screen:
         while (key := self._window.getch()) != -1:
             if key == ord('q'):
                 return True
-            if key in (_CONTROL_L, curses.KEY_RESIZE):
-                self._window.clearok(True)
+            self._clear_for(key)
             if key == ord('t') and self._toggle is not None:
                 self._toggle()
             if (section := _SECTION_KEYS.get(key)) in self._sections:
@@ -203,6 +251,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace, words: list[str]) -> int:
     has_ended = _Ending()
+    if options.all:
+        return _run_all(options, words, has_ended)
     with NodeWatch(full_name(options.node), words, options.write) as watch:
         if _find(watch, options.wait, has_ended):
             has_ended.limit(options.seconds)
@@ -213,10 +263,44 @@ def _run(options: argparse.Namespace, words: list[str]) -> int:
     return 0
 
 
+def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) -> int:
+    """Show all bridges, and each that is chosen."""
+    has_ended.limit(options.seconds)
+    marked = ''
+    while True:
+        with PlantWatch(words) as plant:
+            if options.once or not _is_screen():
+                return _print_all(plant, options, has_ended)
+            marked = curses.wrapper(_draw_all, plant, has_ended, marked)
+        if not marked:
+            return 0
+        with NodeWatch(marked, words, options.write) as watch:
+            curses.wrapper(_draw, watch, has_ended)
+
+
+def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Ending) -> int:
+    _spin(plant, options.wait, lambda: has_ended() or bool(plant.lines()))
+    _spin(plant, _COMPLETION, has_ended)  # diagnostics come every second
+    _print(lambda width: render_plant(plant.lines(), time.monotonic(), width))
+    while not options.once and not has_ended():
+        _spin(plant, options.period, has_ended)
+        _print(lambda width: render_plant(plant.lines(), time.monotonic(), width))
+    return 0 if plant.lines() else EXIT_NOT_FOUND
+
+
+def _draw_all(window: curses.window, plant: PlantWatch, has_ended: _Ending, marked: str) -> str:
+    screen = _Screen(window, _PLANT_KEYS, marked)
+    while not has_ended() and not screen.wants_other_list():
+        screen.show_list(render_plant(plant.lines(), time.monotonic(), screen.width))
+        plant.spin(_RENEWAL)
+    return screen.chosen
+
+
 def _parse(args: Sequence[str]) -> argparse.Namespace:
     parser = command_parser('monitor', __doc__, _EPILOG)
     parser.add_argument('--node', default='/abdf1',
                         help='name of the bridge with its namespace (default: %(default)s)')
+    parser.add_argument('--all', action='store_true', help='show a line for each bridge')
     parser.add_argument('--write', action='store_true',
                         help='let the key t toggle a bit, after a question')
     parser.add_argument('--once', action='store_true', help='print one picture and end')
@@ -257,22 +341,25 @@ def _not_found(watch: NodeWatch, seconds: float) -> str:
 def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> None:
     if options.once:
         _complete(watch, has_ended)
-        _print(watch)
-    elif sys.stdout.isatty() and _can_draw():
-        locale.setlocale(locale.LC_ALL, '')  # or curses shows letters of other languages wrong
+        _print_node(watch)
+    elif _is_screen():
         curses.wrapper(_draw, watch, has_ended)
     else:
         _complete(watch, has_ended)
         while not has_ended():
-            _print(watch)
+            _print_node(watch)
             _spin(watch, options.period, has_ended)
 
 
-def _can_draw() -> bool:
+def _is_screen() -> bool:
+    """Tell whether a picture can be renewed in place; make curses ready for that."""
+    if not sys.stdout.isatty():
+        return False
     try:
         curses.setupterm()
     except curses.error:  # TERM names no terminal that is known here
         return False
+    locale.setlocale(locale.LC_ALL, '')  # or curses shows letters of other languages wrong
     return True
 
 
@@ -305,17 +392,21 @@ def _complete(watch: NodeWatch, has_ended: _Ending) -> None:
     _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
 
 
-def _spin(watch: NodeWatch, seconds: float, is_enough: Callable[[], bool]) -> None:
+def _spin(watch: NodeWatch | PlantWatch, seconds: float, is_enough: Callable[[], bool]) -> None:
     end = time.monotonic() + seconds
     while not is_enough() and (left := end - time.monotonic()) > 0:
         watch.spin(min(left, 0.1))
 
 
-def _print(watch: NodeWatch) -> None:
+def _print_node(watch: NodeWatch) -> None:
+    _print(lambda width: render(watch.snapshot(), time.monotonic(), width))
+
+
+def _print(picture: Callable[[int], list[TextLine]]) -> None:
     is_terminal = sys.stdout.isatty()
     colours = is_terminal and 'NO_COLOR' not in os.environ
     width = shutil.get_terminal_size((100, 24)).columns if is_terminal else 200
-    for line in render(watch.snapshot(), time.monotonic(), width):
+    for line in picture(width):
         number = _COLOURS.get(line.style)
         print(f'\x1b[3{number}m{line.text}\x1b[0m' if colours and number else line.text)
     print(flush=True)

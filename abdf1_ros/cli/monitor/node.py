@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, replace
 import time
-from typing import Any
+from typing import Any, Self
 
 from abdf1_ros.cli.monitor.view import Reading, ShownResult, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
@@ -72,7 +72,35 @@ class _Subscription:
     reading: Reading
 
 
-class NodeWatch:
+class Listening:
+    """A node that subscribes, in a ROS context of its own; to be used in a with statement."""
+
+    def __init__(self, ros_arguments: list[str]) -> None:
+        # The caller handles signals; rclpy's handlers would end this node too early.
+        rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node('abdf1_monitor', start_parameter_services=False, enable_rosout=False)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def subscribe(self, message_type: Any, topic: str, callback: Any, qos: Any) -> Any:
+        """Have ``callback`` called with each message."""
+        return self._node.create_subscription(
+            message_type, topic, callback, qos, event_callbacks=_QUIET)
+
+    def spin_once(self, seconds: float) -> None:
+        """Take one message, or wait so long."""
+        self._executor.spin_once(timeout_sec=seconds)
+
+
+class NodeWatch(Listening):
     """
     Listen to the node with the full name ``name`` until it is closed.
 
@@ -82,14 +110,10 @@ class NodeWatch:
     """
 
     def __init__(self, name: str, ros_arguments: list[str], may_write: bool = False) -> None:
-        # The caller handles signals; rclpy's handlers would end this node too early.
-        rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
+        super().__init__(ros_arguments)
         self.name = name
         self.may_write = may_write
         self._writers: dict[str, Any] = {}
-        self._node = Node('abdf1_monitor', start_parameter_services=False, enable_rosout=False)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
         self._subscriptions: dict[str, _Subscription] = {}
         self._statuses: list[Status] = []
         self._told: float | None = None
@@ -102,16 +126,7 @@ class NodeWatch:
                 (DiagnosticStatus, f'{name}/write_results', self._take_result, 100),
                 (UInt16MultiArray, f'{name}/active_stations', self._take_active,
                  latched_qos())):
-            self._node.create_subscription(
-                message_type, topic, callback, qos, event_callbacks=_QUIET)
-
-    def __enter__(self) -> NodeWatch:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._executor.shutdown()
-        self._node.destroy_node()
-        rclpy.try_shutdown()
+            self.subscribe(message_type, topic, callback, qos)
 
     @property
     def is_complete(self) -> bool:
@@ -131,7 +146,7 @@ class NodeWatch:
             if time.monotonic() >= self._next_discovery:
                 self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
                 self._discover()
-            self._executor.spin_once(timeout_sec=min(left, _DISCOVERY_PERIOD))
+            self.spin_once(min(left, _DISCOVERY_PERIOD))
 
     def bridges(self) -> list[str]:
         """Return the full names of the bridges that can be seen."""
@@ -168,7 +183,7 @@ class NodeWatch:
         while not publisher.get_subscription_count():
             if time.monotonic() >= end:
                 return False
-            self._executor.spin_once(timeout_sec=0.05)
+            self.spin_once(0.05)
         publisher.publish(UInt8MultiArray(data=[value]))
         return True
 
@@ -193,9 +208,8 @@ class NodeWatch:
     def _listen(self, topic: str, type_name: str) -> None:
         known = self._subscriptions.get(topic)
         if known is None:
-            handle = self._node.create_subscription(
-                _TYPES[type_name], topic, self._taker(topic), latched_qos(),
-                event_callbacks=_QUIET)
+            handle = self.subscribe(
+                _TYPES[type_name], topic, self._taker(topic), latched_qos())
             known = _Subscription(
                 type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/')))
             self._subscriptions[topic] = known
@@ -223,11 +237,9 @@ class NodeWatch:
         return take
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
-        prefix = f'{self.name.lstrip("/")}: '
-        statuses = [
-            Status(status.name.removeprefix(prefix), _style(status.level), status.message,
-                   {pair.key: pair.value for pair in status.values})
-            for status in message.status if status.name.startswith(prefix)]
+        node = self.name.lstrip('/')
+        statuses = [shown_status(status, node) for status in message.status
+                    if status.name.startswith(f'{node}: ')]
         if statuses:
             self._statuses, self._told = statuses, time.monotonic()
 
@@ -239,6 +251,12 @@ class NodeWatch:
     def _take_active(self, message: UInt16MultiArray) -> None:
         self._active = [16 * word + bit for word, bits in enumerate(message.data)
                         for bit in range(16) if bits >> bit & 1]
+
+
+def shown_status(status: DiagnosticStatus, node: str) -> Status:
+    """Return a status of a node as it is shown."""
+    return Status(status.name.removeprefix(f'{node}: '), _style(status.level), status.message,
+                  {pair.key: pair.value for pair in status.values})
 
 
 def _style(level: bytes) -> Style:

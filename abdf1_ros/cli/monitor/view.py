@@ -29,7 +29,7 @@ import textwrap
 from abdf1_ros.text import printable, value_text
 
 # After so many seconds without diagnostics the picture says so; by default they come every second.
-_SILENCE = 3.0
+SILENCE = 3.0
 
 # Characters that names and addresses get at most; the values have the rest of the line.
 _NAME_WIDTH = 30
@@ -137,14 +137,14 @@ def render(snapshot: Snapshot, now: float, width: int) -> list[TextLine]:
         'stations': _stations(snapshot, width), 'values': _values(snapshot, now, width),
         'reasons': _mappings(snapshot, width), 'writes': _writes(snapshot, now, width),
         'counters': _counters(snapshot, width)}
-    return [TextLine(_cut(line.text, width), line.style, '' if number else name)
+    return [TextLine(cut(line.text, width), line.style, '' if number else name)
             for name, lines in parts.items() for number, line in enumerate(lines)]
 
 
 def show(values: Sequence[float] | str, width: int) -> str:
     """Return values as text of at most ``width`` characters; what is left out is counted."""
     if isinstance(values, str):
-        return _cut(f'"{printable(values)}"', width)
+        return cut(f'"{printable(values)}"', width)
     # An element takes two characters or more: no need to write out what cannot fit.
     texts = [value_text(value) for value in values[:width // 2 + 1]]
     for count in range(len(texts), 0, -1):
@@ -152,7 +152,7 @@ def show(values: Sequence[float] | str, width: int) -> str:
         text = ' '.join(texts[:count]) + (f' and {rest} more' if rest else '')
         if len(text) <= width:
             return text
-    return _cut(' '.join(texts), width)
+    return cut(' '.join(texts), width)
 
 
 def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
@@ -161,7 +161,7 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
         yield TextLine('  the node is gone; these are its last words', Style.BAD)
     if snapshot.told is None:
         yield TextLine('  no diagnostics yet', Style.WARNING)
-    elif now - snapshot.told > _SILENCE:
+    elif now - snapshot.told > SILENCE:
         yield TextLine(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
 
 
@@ -186,7 +186,7 @@ def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
 
 def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
     longest = min(_NAME_WIDTH, width // 3)
-    names = [_cut(printable(reading.topic), longest) for reading in snapshot.readings]
+    names = [cut(printable(reading.topic), longest) for reading in snapshot.readings]
     name_width = max(map(len, ['topic', *names]))
     # The value is kept longest: a narrow terminal first drops the address, then cuts the state.
     left = width - name_width - _AGE_WIDTH - 6
@@ -207,7 +207,7 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
         if reading.values is not None:
             age = f'{now - reading.received:.1f} s'
             value = show(reading.values, value_width)
-        address = _cut(printable(reading.address), _ADDRESS_WIDTH)
+        address = cut(printable(reading.address), _ADDRESS_WIDTH)
         yield TextLine(row(name, age, state, value, address).rstrip(), style)
     if not snapshot.readings:
         yield TextLine('  no read topic found', Style.WARNING)
@@ -258,5 +258,6 @@ def _pairs(values: Mapping[str, str], keys: Sequence[str]) -> str:
     return ', '.join(f'{key} {values[key]}' for key in keys if key in values)
 
 
-def _cut(text: str, width: int) -> str:
+def cut(text: str, width: int) -> str:
+    """Return text of at most ``width`` characters."""
     return text if len(text) <= width else text[:max(0, width - 3)] + '...'

@@ -223,6 +223,19 @@ def test_keys_lead_to_the_parts_of_the_picture(simulator: Process) -> None:
         assert screen.result() == 0
 
 
+def test_line_is_chosen_from_all_and_q_leads_back(simulator: Process) -> None:
+    with terminal('--all') as screen:
+        screen.wait_for(f'{NODE} ')
+        screen.press('\r')
+        screen.wait_for('settings 115200 baud')
+        screen.press('q')
+        screen.wait_for('Return shows a line')
+        screen.wait_for(f'{NODE} ')
+        screen.press('q')
+        assert screen.result() == 0
+        assert 'Traceback' not in screen.drawn
+
+
 def test_bit_is_toggled_after_a_question(simulator: Process) -> None:
     with terminal('--node', NODE, '--write') as screen:
         screen.wait_for('t toggle')

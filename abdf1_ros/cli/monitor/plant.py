@@ -1,0 +1,121 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A line of text for each bridge that tells its state on /diagnostics, the worst first.
+
+``PlantWatch`` listens, and ``render_plant`` knows neither ROS nor a terminal.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import time
+
+from abdf1_ros.cli.monitor.node import Listening, shown_status
+from abdf1_ros.cli.monitor.view import cut, SILENCE, Status, Style, TextLine
+from abdf1_ros.text import printable
+from diagnostic_msgs.msg import DiagnosticArray
+
+_WORDS = {Style.GOOD: 'OK', Style.WARNING: 'WARN', Style.BAD: 'ERROR'}
+_RANKS = [Style.BAD, Style.WARNING, Style.GOOD]
+
+_NAME_WIDTH = 34
+_COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll cycle')
+
+
+@dataclass(frozen=True, slots=True)
+class LineState:
+    """What a bridge has told of itself last, at the clock value ``told`` (s)."""
+
+    name: str
+    told: float
+    statuses: Sequence[Status]
+
+    def worst(self, now: float) -> Status:
+        """Return the status that says most at the clock value ``now`` (s)."""
+        if now - self.told > SILENCE:
+            return Status('', Style.BAD, f'no diagnostics for {now - self.told:.0f} s')
+        # Among equals that of the mappings: what it says of a good line is worth most.
+        return min(self.statuses, key=lambda status: (
+            _RANKS.index(status.style), status.section != 'mappings'))
+
+    def values(self) -> dict[str, str]:
+        """Return what the link tells."""
+        return {key: value for status in self.statuses if status.section == 'link'
+                for key, value in status.values.items()}
+
+
+class PlantWatch(Listening):
+    """Listen to all bridges until it is closed."""
+
+    def __init__(self, ros_arguments: list[str]) -> None:
+        super().__init__(ros_arguments)
+        self._lines: dict[str, LineState] = {}
+        self.subscribe(DiagnosticArray, '/diagnostics', self._take, 1000)
+
+    def spin(self, seconds: float) -> None:
+        """Listen for so many seconds."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.spin_once(left)
+
+    def lines(self) -> list[LineState]:
+        """Return all that have been heard."""
+        return [*self._lines.values()]
+
+    def _take(self, message: DiagnosticArray) -> None:
+        node = message.status[0].name.partition(': ')[0] if message.status else ''
+        statuses = [shown_status(status, node) for status in message.status
+                    if status.name.startswith(f'{node}: ')]
+        sections = {status.section: status for status in statuses}
+        now = time.monotonic()
+        if 'lines' in sections:  # the process of many, which knows of those that do not run
+            for name, reason in sections['lines'].values.items():
+                if name.startswith('/'):
+                    self._lines[name] = LineState(
+                        name, now, [Status('', Style.BAD, f'does not run: {reason}')])
+        elif 'link' in sections and 'mappings' in sections:
+            self._lines[f'/{node}'] = LineState(f'/{node}', now, statuses)
+
+
+def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[TextLine]:
+    """Return two lines of heading, and one for each bridge, whose ``section`` is its name."""
+    found = sorted(((line.worst(now), line) for line in lines),
+                   key=lambda pair: (_RANKS.index(pair[0].style), pair[1].name))
+    counts = Counter(status.style for status, _ in found)
+    told = ', '.join(f'{counts[style]} {_WORDS[style]}' for style in reversed(_RANKS)
+                     if counts[style])
+    longest = min(_NAME_WIDTH, width // 3)
+    names = [cut(printable(line.name), longest) for _, line in found]
+    name_width = max(map(len, ['line', *names]))
+
+    def row(name: str, values: dict[str, str], text: str) -> str:
+        cells = '  '.join(f'{printable(values.get(key, "")):>{size}}' for _, size, key in _COLUMNS)
+        return cut(f'  {name:<{name_width}}  {cells}  {printable(text)}'.rstrip(), width)
+
+    titles = {key: title for title, _, key in _COLUMNS}
+    return [TextLine(cut(f'{len(found)} lines: {told}' if found else 'no line is heard', width),
+                     Style.TITLE),
+            TextLine(row('line', titles, ''), Style.TITLE),
+            *(TextLine(row(name, {**line.values(), 'state': _WORDS[status.style]},
+                           _text(status)), status.style, line.name)
+              for name, (status, line) in zip(names, found, strict=True))]
+
+
+def _text(status: Status) -> str:
+    text = status.message.removeprefix(f'{_WORDS[status.style]}: ')
+    return text if status.section in ('', 'link', 'mappings') else f'{status.section}: {text}'

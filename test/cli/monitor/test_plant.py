@@ -1,0 +1,112 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A line of text for each bridge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from abdf1_ros.cli.monitor.command import main
+from abdf1_ros.cli.monitor.plant import LineState, PlantWatch, render_plant
+from abdf1_ros.cli.monitor.view import Status, Style
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import pytest
+from rclpy.node import Node
+from support.commands import call
+from support.ros import ERROR, Observer, OK
+
+NOW = 1000.0
+LINK = Status('link', Style.GOOD, 'OK: port open', {'line load': '93 %', 'poll cycle': '34 ms'})
+FRESH = Status('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh')
+SILENT = Status('station 3', Style.BAD, 'ERROR: station 3 inactive since 4.0 s')
+REFUSED = Status('writes', Style.WARNING, 'WARN: 3 of 4 writes confirmed')
+
+
+def line(name: str, *statuses: Status, told: float = NOW) -> LineState:
+    return LineState(name, told, (LINK, *statuses, FRESH))
+
+
+def texts(*lines: LineState, width: int = 80) -> list[str]:
+    return [' '.join(found.text.split()) for found in render_plant(lines, NOW, width)]
+
+
+def test_worst_come_first_and_say_why() -> None:
+    assert texts(line('/a'), line('/b', SILENT, REFUSED), line('/c', REFUSED), line('/0')) == [
+        '4 lines: 2 OK, 1 WARN, 1 ERROR', 'line state load cycle',
+        '/b ERROR 93 % 34 ms station 3: station 3 inactive since 4.0 s',
+        '/c WARN 93 % 34 ms writes: 3 of 4 writes confirmed',
+        '/0 OK 93 % 34 ms of 10 mappings 10 fresh', '/a OK 93 % 34 ms of 10 mappings 10 fresh']
+
+
+def test_line_that_is_not_heard_any_more_is_bad() -> None:
+    assert texts(line('/a', told=NOW - 5.0))[2] == '/a ERROR 93 % 34 ms no diagnostics for 5 s'
+
+
+def test_no_line_at_all() -> None:
+    assert texts() == ['no line is heard', 'line state load cycle']
+
+
+@pytest.mark.parametrize('width', [20, 40, 80])
+def test_lines_fit(width: int) -> None:
+    found = render_plant([line('/a_hall_of_some_size/and_a_press_of_a_name', SILENT)], NOW, width)
+    assert max(len(shown.text) for shown in found) <= width
+    assert found[-1].section == '/a_hall_of_some_size/and_a_press_of_a_name'
+
+
+def array(node: str, **sections: bytes) -> DiagnosticArray:
+    """Return diagnostics of a node."""
+    return DiagnosticArray(status=[DiagnosticStatus(name=f'{node}: {section}', level=level)
+                                   for section, level in sections.items()])
+
+
+Publish = Callable[..., None]
+
+
+@pytest.fixture
+def publish() -> Iterator[Publish]:
+    """Publish diagnostics until a watch has told what a test waits for."""
+    with Observer() as observer:
+        node = Node('bridges', context=observer.context)
+        publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+
+        def until(watch: PlantWatch, condition: Callable[[dict[str, LineState]], bool],
+                  *arrays: DiagnosticArray) -> None:
+            def look() -> bool:
+                for message in arrays:
+                    publisher.publish(message)
+                watch.spin(0.05)
+                return condition({line.name: line for line in watch.lines()})
+
+            observer.until(look, lambda: str(watch.lines()))
+
+        yield until
+        node.destroy_node()
+
+
+def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
+    down = array('lines', lines=ERROR)
+    down.status[0].values = [KeyValue(key='running', value='1'),
+                             KeyValue(key='/hall/b', value='b_net.csv:2:1: Baud')]
+    with PlantWatch([]) as watch:
+        publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b'},
+                array('battery', state=OK), array('hall/a', link=OK, mappings=ERROR), down)
+        lines = {line.name: line.worst(line.told) for line in watch.lines()}
+    assert lines['/hall/a'] == Status('mappings', Style.BAD, '')
+    assert lines['/hall/b'] == Status('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
+
+
+def test_nobody_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
+    said = call(main, capsys, '--all', '--once', '--wait', '0.1', '--seconds', '0.2')
+    assert (said.status, said.out.splitlines()[0]) == (1, 'no line is heard')
