@@ -30,9 +30,12 @@ import subprocess
 import sys
 from xml.sax.saxutils import escape
 
+from abdf1_ros.cli.terminal import cut
+
 _CHARACTER = 7.25  # width of one in the font below, in pixels
 _LINE = 16
 _MARGIN = 14
+_COLUMNS = 132  # longer lines are cut
 _COLOURS = (
     (re.compile(r'^\$ '), '#8bd5ca'),
     (re.compile(r'^\[ERROR\]|ERROR:'), '#ed8796'),
@@ -45,7 +48,8 @@ _STAMP = re.compile(r'^(\[(?:INFO|WARN|ERROR)\]) \[\d+\.\d+\]')
 
 def picture(title: str, text: str) -> str:
     """Return an SVG of a terminal with ``text`` on it; times of log lines are left out."""
-    lines = [f'$ {title}', *(_STAMP.sub(r'\1', line) for line in text.splitlines())]
+    lines = [f'$ {title}',
+             *(cut(_STAMP.sub(r'\1', line), _COLUMNS) for line in text.splitlines())]
     width = round(max(map(len, lines)) * _CHARACTER + 2 * _MARGIN)
     height = len(lines) * _LINE + 2 * _MARGIN
     rows = [

@@ -44,6 +44,10 @@ def test_times_of_the_log_are_left_out() -> None:
     assert lines(svg)[1] == '[WARN] [abdf1]: late'
 
 
+def test_long_lines_are_cut() -> None:
+    assert lines(picture.picture('x', 'long ' * 40))[1] == ('long ' * 40)[:129] + '...'
+
+
 def test_errors_have_a_colour_of_their_own() -> None:
     svg = picture.picture('x', 'link ERROR: closed\nlink WARN: slow\n  plain')
     fills = [entry.get('fill') for entry in ElementTree.fromstring(svg).iter(TEXT)]
