@@ -27,6 +27,7 @@ from abdf1_ros.ros.parameters import Configuration, configure, Parameters
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.network import Network
 import pytest
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -138,6 +139,16 @@ def test_every_parameter_is_declared_read_only_with_a_description(
         next(column.description for column in MAP_COLUMNS if column.name == 'PLC_Type')
 
 
+def test_rows_are_shown_without_an_event_for_each_cell(
+        make_node: Nodes, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    node = make_node(files)
+    events: list[ParameterEvent] = []
+    monkeypatch.setattr(node._parameter_event_publisher, 'publish', events.append)
+    configure(node)
+    told = {parameter.name for event in events for parameter in event.new_parameters}
+    assert 'net.baud' in told and not any(name.startswith('map.') for name in told)
+
+
 def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) -> None:
     network = configured().network
     assert network == Network(baud=9600, com_port='3')
@@ -193,9 +204,11 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
     ('strict_map', 'on', "strict_map = 'on' should be true or false"),
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
     ('port', 'ttyUSB0', 'Com_Port = "ttyUSB0" should be a number from 1, a device path such as '
-     '/dev/ttyUSB0, socket://host:port, or rfc2217://host:port'),
+     '/dev/ttyUSB0, socket://host:port, or rfc2217://host:port; "plc ports" '
+     'lists the devices'),
     ('port', 'sokket://plc:4001', 'Com_Port = "sokket://plc:4001" should be a number from 1, a '
-     'device path such as /dev/ttyUSB0, socket://host:port, or rfc2217://host:port'),
+     'device path such as /dev/ttyUSB0, socket://host:port, or rfc2217://host:port; "plc ports" '
+     'lists the devices'),
     ('net.station', 255,
      '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
      'Station = "255" should be a whole number from 0 to 254'),
@@ -211,7 +224,8 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
     ('net.baud', 9601, 'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, '
                        '57600, 115200'),
     ('net.com_port', 0, 'Com_Port = "0" should be a number from 1, a device path such as '
-                        '/dev/ttyUSB0, socket://host:port, or rfc2217://host:port'),
+                        '/dev/ttyUSB0, socket://host:port, or rfc2217://host:port; "plc ports" '
+     'lists the devices'),
     ('net.handshake', 1, 'Handshake = "1" should be one of Yes, No')])
 def test_faulty_value_is_a_problem_that_says_what_would_be_right(
         make_node: Nodes, files: dict[str, str], name: str, value: Any, expected: str) -> None:
