@@ -59,12 +59,16 @@ def _table_entry(value: int) -> int:
 
 
 _CRC_TABLE = tuple(_table_entry(value) for value in range(256))
+_CRC_LOW = tuple(entry & 0xFF for entry in _CRC_TABLE)
+_CRC_HIGH = tuple(entry >> 8 for entry in _CRC_TABLE)
 
 
 def crc16(data: bytes | bytearray, start: int = 0) -> int:
     """Return CRC-16 x^16+x^15+x^2+1, reflected (A001), continued from ``start`` (M 5-6)."""
-    crc = start
-    table = _CRC_TABLE
+    # Byte by byte: Python makes no new objects of small numbers.
+    low, high = start & 0xFF, start >> 8
     for byte in data:
-        crc = crc >> 8 ^ table[(crc ^ byte) & 0xFF]
-    return crc
+        index = low ^ byte
+        low = high ^ _CRC_LOW[index]
+        high = _CRC_HIGH[index]
+    return high << 8 | low
