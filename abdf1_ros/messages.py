@@ -21,9 +21,8 @@ Messages". The texts are an interface: people search their logs for them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 
 class Severity(Enum):
@@ -115,8 +114,7 @@ class Message(Enum):
         return f'{self.number} {self.name}: {self.text(*args)}'
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """
     One occurrence of a numbered message while the driver runs.
 

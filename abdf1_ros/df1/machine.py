@@ -368,8 +368,7 @@ class Machine:
         here = 0 if self._is_half_duplex else self._still_here
         if not here:
             self.rate.answered(self.counters.chars_received, self.now)
-        left = self.now + here * self._timing.char_time
-        self._line_free = min(self._line_free, left)
+        self._line_free = min(self._line_free, self.now + here * self._timing.char_time)
 
     def _resume(self, heard: Heard | None, error: CommandExpired | None = None) -> None:
         """Run the procedure up to a step that has to wait; None starts it."""

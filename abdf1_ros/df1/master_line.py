@@ -62,9 +62,10 @@ MAX_KEPT = 2 * MAX_FORWARDS
 # older one for ever.
 MOST_QUEUED = 8
 
-# What answers a message and a poll, but for the frames that answer a poll too.
 _LISTEN_ON_ECHOED = LISTEN_ON._replace(is_echoed=True)
+_ACKNOWLEDGE = Step(frames.ACK, 0)
 
+# What answers a message and a poll, but for the frames that answer a poll too.
 _MESSAGE_ANSWERS = (Control.ACK, Control.NAK)
 _POLL_ANSWERS = (Control.EOT, Control.NAK)
 
@@ -289,7 +290,7 @@ class MasterLine:
         take that for its own message. So the message comes again, and is then a repetition.
         """
         src = source(frame.data)
-        if src not in self.stations or self._speaks_for(number, src):
+        if self._speaks_for(number, src) or src not in self.stations:
             return False
         packet = Packet.decode(frame.data)
         station = self.stations[self.stations.via(packet.src)]
@@ -332,13 +333,13 @@ class MasterLine:
                 self._report(wrong_message(packet, number))
                 return None
             self.counters.acks_sent += 1
-            yield Step(frames.ACK, 0)
+            yield _ACKNOWLEDGE
             return None
         is_to_keep = not packet.is_reply and self.settings.accept_slave_messages
         if is_to_keep and self.is_full and not station.repeats(packet):
             return None  # not acknowledged: the slave keeps it; replies make room and go on
         self.counters.acks_sent += 1
-        yield Step(frames.ACK, 0)
+        yield _ACKNOWLEDGE
         if not station.accepts(packet):
             self.counters.duplicate_messages += 1
             self.note(Message.NTC_DUPLICATE_MSG_RCVD, number, station=number)

@@ -73,6 +73,8 @@ class Agenda:
     def next(self, now: float, busy: Container[int] = (),  # noqa: A003
              ) -> OwnWrite | JobTask | Write | Check | ReadJob | None:
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
+        if self.interlocks is None:
+            return self._usual(now, busy)
         if self._own_in_a_row < MAX_OWN_IN_A_ROW:
             return self._own(now, busy) or self._usual(now, busy)
         self._own_in_a_row = 0
@@ -80,7 +82,7 @@ class Agenda:
 
     def _own(self, now: float, busy: Container[int]) -> OwnWrite | None:
         """Return a heartbeat or fallback; these do not count as writes in a row (rule 11)."""
-        own = self.interlocks.next(now, busy) if self.interlocks is not None else None
+        own = self.interlocks.next(now, busy) if self.interlocks else None
         if own is not None:
             self.writes.begin_own(own.write)
             self._own_in_a_row += 1

@@ -51,7 +51,7 @@ class WriteQueue:
 
     ``report`` gets the results of those that end here. A write to a silent station is a probe;
     one that ``stations.probes`` does not admit ends unsent. Another thread may only ask for the
-    length.
+    length. ``next_expiry`` is when ``expire`` has something to do (clock value in s).
     """
 
     def __init__(self, stations: ActiveStationList, patience: float,
@@ -61,7 +61,7 @@ class WriteQueue:
         self._report = report
         self._waiting: deque[Write] = deque()
         self._under_way: list[Write] = []
-        self._next_expiry = math.inf
+        self.next_expiry = math.inf
 
     def __len__(self) -> int:
         """Return how many wait."""
@@ -76,7 +76,7 @@ class WriteQueue:
         that case the older value is sent as well, or two such topics would delay each other for
         ever.
         """
-        self._next_expiry = min(self._next_expiry, self._expiry(write))
+        self.next_expiry = min(self.next_expiry, self._expiry(write))
         older = [] if write.is_pulse else [
             old for old in self._waiting if old.mapping is write.mapping]
         if not older:
@@ -148,18 +148,14 @@ class WriteQueue:
 
     def expire(self, now: float) -> None:
         """End the writes that are not to be sent any more."""
-        self._next_expiry = math.inf
+        self.next_expiry = math.inf
         for write in list(self._waiting):
             reason = self._reject_reason(write, now)
             if reason:
                 self._waiting.remove(write)
                 self._report(write.result(Outcome.NOT_SENT, reason, now))
             else:
-                self._next_expiry = min(self._next_expiry, self._expiry(write))
-
-    def next_expiry(self) -> float:
-        """Return when ``expire`` has something to do (clock value in s), infinite for never."""
-        return self._next_expiry
+                self.next_expiry = min(self.next_expiry, self._expiry(write))
 
     def drop(self, reason: str, now: float, mapping: Mapping | None = None) -> None:
         """End the waiting writes, of one mapping or all, without sending them."""

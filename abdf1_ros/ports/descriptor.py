@@ -62,10 +62,13 @@ class DescriptorPort:
         self._close = close
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
+        self._wake = -1
         os.set_blocking(descriptor, False)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        self._poll.register(wake, select.POLLIN)  # has no effect from the second call on
+        if wake != self._wake:
+            self._poll.register(wake, select.POLLIN)
+            self._wake = wake
         milliseconds = None if timeout is None else math.ceil(timeout * 1000)
         for descriptor, _ in self._poll.poll(milliseconds):
             if descriptor == self._descriptor:
