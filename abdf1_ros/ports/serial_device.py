@@ -25,6 +25,7 @@ from collections.abc import Callable
 from contextlib import suppress
 import errno
 import fcntl
+import os
 import struct
 import termios
 import time
@@ -47,12 +48,19 @@ _TIOCGICOUNT = 0x545D
 _ICOUNTER = struct.Struct('20i')
 _FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
 
+_PSEUDO_TERMINALS = '/dev/pts/'
+
 # How long (s) a close waits for the last bytes, and in which steps.
 _LAST_BYTES = 1.0
 _LOOK = 0.005
 
 # What the system puts before a damaged character, and doubles where it is one itself (PARMRK).
 _MARK = 0xFF
+
+
+def is_pseudo_terminal(name: str) -> bool:
+    """Tell whether ``name``, or what it leads to, is a device without speed and parity."""
+    return os.path.realpath(name).startswith(_PSEUDO_TERMINALS)
 
 
 def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDevice:
@@ -68,6 +76,8 @@ def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDe
             parity=_PARITIES[settings.parity], stopbits=settings.stop_bits,
             rtscts=settings.handshake, exclusive=True)
     except (OSError, ValueError, termios.error) as error:  # the last: not every device has parity
+        if settings.parity != 'None' and is_pseudo_terminal(settings.name):
+            raise OSError(errno.EINVAL, 'a pseudo-terminal has no parity: Parity None') from error
         raise OSError(*_plain(error)) from error
     _set_options(port, settings, tell)
     has_parity = settings.parity != 'None'

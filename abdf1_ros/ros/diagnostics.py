@@ -30,6 +30,7 @@ from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
+from abdf1_ros.ports.serial_device import is_pseudo_terminal
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
@@ -219,7 +220,7 @@ class Diagnostics:
         values = {
             'port': f'{"open" if state and state.is_open else "closed"}',
             'settings': f'{network.baud} baud, {network.error_code}',
-            'speed seen': speed_seen(self._driver),
+            'speed seen': speed_seen(self._driver, self._port),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
             'poll cycle': _milliseconds(self._driver.poll_cycle),
@@ -500,8 +501,10 @@ def _rounded(rate: float) -> int:
     return int(float(f'{rate:.1e}'))
 
 
-def speed_seen(driver: Driver) -> str:
-    """Return the measured speed of the line."""
+def speed_seen(driver: Driver, port: str) -> str:
+    """Return the measured speed of the line on a port."""
+    if is_pseudo_terminal(port):
+        return 'a pseudo-terminal has none'
     seen = driver.machine.rate.seen
     if seen is None:
         return 'nothing speaks against the set one'

@@ -38,6 +38,7 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.serial_device import is_pseudo_terminal
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import (
@@ -418,11 +419,12 @@ class BridgeNode(Node):
 
     def _tell_speed(self, seen: float | None) -> None:
         """Log once that the line is faster, or slower, than it is set."""
-        if seen is None or self._told_speed is not None and (seen > 1) is (self._told_speed > 1):
+        if seen is None or self._told_speed is not None and (seen > 1) is (self._told_speed > 1) \
+                or is_pseudo_terminal(self.port):
             return
         self._told_speed = seen
         text = f'{self.port}: Baud is {self.driver.network.baud}, ' \
-               f'but the line shows {speed_seen(self.driver)}'
+               f'but the line shows {speed_seen(self.driver, self.port)}'
         if seen > 1:
             self._lines.info('the speed', text)
         else:

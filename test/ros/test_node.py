@@ -498,16 +498,21 @@ def test_duplicate_name_is_told_and_forgotten(
     assert 'no other node is called /abdf1 any more' in told
 
 
-def test_line_that_is_faster_than_baud_says_so_once(
-        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str]) -> None:
-    bench = make_bench(SPEED)  # on a pseudo-terminal, which has no speed
-    observer.until(lambda: any(
-        value.value.startswith('at least') for message in bench.diagnostics
-        for status in message.status for value in status.values
-        if value.key == 'speed seen'), 'the speed')
+@pytest.mark.parametrize('has_speed', [True, False])
+def test_line_that_is_faster_than_baud_says_so_once_unless_it_has_no_speed(
+        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch, has_speed: bool) -> None:
+    if has_speed:
+        for module in ('node', 'diagnostics'):
+            monkeypatch.setattr(f'abdf1_ros.ros.{module}.is_pseudo_terminal', lambda name: False)
+    bench = make_bench(SPEED)
+    observer.until(lambda: bench.node.driver.machine.rate.seen is not None, 'the speed')
+    bench.diagnostics.clear()
+    link = until_status(bench.diagnostics, 'link', OK)
+    assert details(link)['speed seen'].startswith('at least' if has_speed else 'a pseudo-terminal')
     bench.node._tell_speed(3.0)  # another figure, and no news
     told = ''.join(capfd.readouterr())
-    assert told.count(', but the line shows at least ') == 1
+    assert told.count(', but the line shows at least ') == has_speed
 
 
 def test_plc_of_another_family_than_the_map_says_is_named_in_log_and_diagnostics(
