@@ -86,7 +86,10 @@ test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
 .PHONY: ros-tools
 ros-tools: $(INSTALLED) ## Get ros2 launch, topic, security and the linters of ament into .venv
 	$(PY) -m pip install --quiet -r requirements/ros_tools_needs.txt
-	$(PY) -m pip install --quiet --no-deps --no-build-isolation -r requirements/ros_tools.txt
+	@$(PY) -m pip install --quiet --no-deps --no-build-isolation -r requirements/ros_tools.txt || { \
+	    echo 'These are sources from github.com. Without them "ros2 ..." is missing and its tests are'; \
+	    echo 'skipped; all else works: $(VENV)/bin/node, check, monitor, plc, simulator, make test.'; \
+	    exit 1; }
 	@$(PY) -c 'import composition_interfaces' 2>/dev/null || { \
 	    folder=$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
 	    mkdir -p "$$folder/composition_interfaces"; \

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 import difflib
+import os
 from pathlib import Path
 import random
 from typing import Any
@@ -316,8 +317,9 @@ def _declare(node: Node, name: str, default: Any, description: str, low: float |
     given = _overrides(node).get(name)
     if name in _PATHS and given is not None and isinstance(given.value, str):
         descriptor = ParameterDescriptor(description=description, read_only=True)
-        node.declare_parameter(name, _resolved(given.value), descriptor, ignore_override=True)
-        return given.value
+        path = os.path.expanduser(given.value)  # in net_file:=~/net.csv the shell leaves it
+        node.declare_parameter(name, _resolved(path), descriptor, ignore_override=True)
+        return path
     descriptor = ParameterDescriptor(
         description=description, read_only=True, dynamic_typing=True)
     if low is not None and high is not None:

@@ -187,6 +187,11 @@ def read_publish_while(row: Row, command: str, publishes_always: bool,
         fault('Publish_While', 'Publish_While needs Publish Always: with Change a silent topic '
                                'would look normal')
     if condition.upper() != RUN:
+        if not timeout:
+            fault('Heartbeat_Timeout', 'Heartbeat_Timeout is missing: ms that the counter '
+                  f'"{condition}" may stand still; for the mode of the processor Publish_While '
+                  f'is {RUN}')
+            return PublishWhile(condition, None)
         return PublishWhile(condition, number_in(row, 'Heartbeat_Timeout', _TIMEOUTS, fault))
     if timeout:
         fault('Heartbeat_Timeout', 'RUN has no Heartbeat_Timeout: the age of the mode is bounded '

@@ -98,7 +98,8 @@ def test_files_are_shown_as_resolved_paths(
         tmp_path: Path) -> None:
     (tmp_path / 'elsewhere').mkdir()
     monkeypatch.chdir(tmp_path / 'elsewhere')
-    node = make_node({'net_file': '../net.csv', 'map_file': files['map_file']})
+    monkeypatch.setenv('HOME', str(tmp_path))
+    node = make_node({'net_file': '../net.csv', 'map_file': '~/map.csv'})
     configure(node)
     assert node.get_parameter('net_file').value == files['net_file']
     assert node.get_parameter('map_file').value == files['map_file']

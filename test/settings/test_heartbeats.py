@@ -171,8 +171,9 @@ def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
 
 
 def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
-    assert 'Heartbeat_Timeout is missing' in faults(
-        row(**DOORS | {'Heartbeat_Timeout': ''}), row(**COUNTER))[0]
+    text, = faults(row(**DOORS | {'Heartbeat_Timeout': '', 'Publish_While': 'PROG'}))
+    assert 'Heartbeat_Timeout is missing: ms that the counter "PROG" may stand still; for the ' \
+        'mode of the processor Publish_While is RUN' in text
     assert faults(row(**DOORS | {'Heartbeat_Timeout': '299'}), row(**COUNTER)) == [
         '2:23 (Heartbeat_Timeout): Item: 1, Heartbeat_Timeout 299 is less than 3 x 100 ms, the '
         'Period of counter']
