@@ -85,7 +85,7 @@ MESSAGES: dict[Message, Cause] = {
         'A message with a good check has less than the six bytes of a header.',
         'Record with `sniff`; something on the line speaks another protocol.'),
     Message.NTC_INVALID_SYMBOL: Cause(
-        'Behind a DLE came a byte that makes no control symbol: noise or a wrong baud rate.',
+        'After a DLE came a byte that is not a control symbol: noise or a wrong baud rate.',
         'As for 2506. From the start and all the time: Baud, Parity, Data_Bits.'),
     Message.NTC_ACK_EXPECTED: Cause(
         'A command got no DLE ACK within Timeout; the text names the last symbol heard, 0x00 for '
@@ -129,11 +129,12 @@ MESSAGES: dict[Message, Cause] = {
         'Mode of the net file is none of Master, Slave and Peer.',
         'Master for half duplex, Peer for full duplex.'),
     Message.CRT_UNSUPPORTED_MODE: Cause(
-        'Mode is known, but this version does not have it. At present it has all of them.',
+        'Mode is known, but this version does not have it. This version has all of them.',
         'Choose one that the text names.'),
     Message.CRT_BAD_PLC_TYPE: Cause(
         'PLC_Type of the net file is none of PLC2, PLC3, PLC5 and SLC.',
-        'What we are to PLCs that write to us; without Serve rows, leave the cell empty.'),
+        'The family that PLCs take us for when they write to us; without Serve rows, leave the '
+        'cell empty.'),
     Message.CRT_BAD_ERROR_CODE: Cause(
         'Error_Code of the net file is neither BCC nor CRC.',
         "What the PLC's channel is set to; CRC where there is a choice."),
@@ -151,19 +152,19 @@ MESSAGES: dict[Message, Cause] = {
 COUNTERS: dict[str, str] = {
     'messages_sent': 'Grows with every transaction. Much faster than CNT_CMD_MSGS_SENT: '
                      'repetitions.',
-    'messages_received': 'Stands still while commands go out: nobody answers.',
+    'messages_received': 'Stays the same while commands are sent: no station answers.',
     'commands_sent': 'Transactions begun.',
     'commands_received': 'PLCs send by themselves: messages for `Serve` rows, or to be passed on.',
-    'replies_sent': 'What we have answered to them.',
+    'replies_sent': 'Our replies to these commands.',
     'replies_received': 'Should keep up with CNT_CMD_MSGS_SENT.',
     'polls_sent': 'Masters only. Many for one reply: the PLC needs long, which costs line time.',
-    'polls_received': 'Mode Slave only. Stands still: the master does not poll us.',
+    'polls_received': 'Mode Slave only. Stays the same: the master does not poll us.',
     'naks_sent': 'Masters: one for each 2508 with `nak_on_command_timeout`. Peer: damaged '
                  'messages.',
     'naks_received': 'Peer: our messages arrive damaged, or the PLC has no room. Masters: 2511.',
-    'acks_sent': 'Messages we took.',
-    'acks_received': 'Messages the others took.',
-    'eots_sent': 'Mode Slave: polls when we had nothing to say.',
+    'acks_sent': 'Good messages that we have received.',
+    'acks_received': 'Messages that others have received from us.',
+    'eots_sent': 'Mode Slave: polls when we had nothing to send.',
     'eots_received': 'Polls that came before the reply was ready.',
     'error_messages_sent': 'PLCs ask for words that no `Serve` row has.',
     'error_messages_received': "PLCs refuse commands: the mappings' status names tag and STS.",
@@ -179,19 +180,19 @@ COUNTERS: dict[str, str] = {
     'stale_messages': 'See 2510.',
     'duplicate_messages': 'See 2524.',
     'invalid_messages': 'See 2505, 2512, 2513 and 2518.',
-    'read_errors': 'The adapter was unplugged, or the device server hung up. The port is opened '
-                   'again by itself.',
-    'chars_sent': 'Stands still: the port is closed, or there is nothing to do.',
-    'chars_received': '0 while characters go out: cable, power, or the wrong port. Grows without '
-                      'messages: baud rate or parity.',
+    'read_errors': 'The adapter was unplugged, or the device server has closed the connection. '
+                   'The port is opened again by itself.',
+    'chars_sent': 'Stays the same: the port is closed, or there is nothing to send.',
+    'chars_received': '0 while characters are sent: cable, power, or the wrong port. Grows '
+                      'without messages: baud rate or parity.',
 }
-"""What a growing (or resting) counter tells, by the name of its field."""
+"""What a counter tells when it grows or stays the same, by the name of its field."""
 
 OUTCOMES: dict[Outcome, str] = {
     Outcome.WRITTEN: 'The PLC has confirmed it. Bits of an SLC without masked write (5/01, 5/02, '
                      'ML1000) are written `by reading the word and writing it back`, in three '
                      'commands; what the program changes in that word in between is lost.',
-    Outcome.BROADCAST: 'Station 255. It counts as accepted, and as nothing else.',
+    Outcome.BROADCAST: 'Station 255. It counts as accepted only, as no station confirms it.',
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
                      'open: nothing was sent. The reason follows.',
@@ -201,9 +202,9 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.FAILED: "The PLC's own error follows, as STS and in words.",
     Outcome.PARTLY: 'A write of several packets failed between them. Where a reply is missing, it '
                     'is read back, as the next one is.',
-    Outcome.UNKNOWN: 'Sent, but no reply came, or a node on the way has lost it. Behind it stands '
-                     'what the next read has found, within `write_timeout`: `read back: the PLC '
-                     'holds the value`, `... another value`, or why nothing was read.',
+    Outcome.UNKNOWN: 'Sent, but no reply came, or a node on the way has lost it. The message ends '
+                     'with the finding of the next read, within `write_timeout`: `read back: the '
+                     'PLC holds the value`, `... another value`, or why nothing was read.',
     Outcome.FALLBACK: 'No message has asked for it: `timeout` where none came in time, `start`, '
                       '`return` of the station, its change to `run`, or our own `end`.',
 }

@@ -35,7 +35,7 @@ MAP_COLUMNS = (
     Column('Tag', None, 'unique name'),
     Column('Command', None,
            'Read, Write, ReadWrite; Serve: words of ours that PLCs read and write; Heartbeat: a '
-           'word that counts while all is well'),
+           'word that counts while its conditions hold'),
     Column('Address', None, 'PLC address of the first element'),
     Column('Station', None,
            '0-254; of a Write also 255, all stations, none of which confirms; of a Serve our own'),
@@ -71,13 +71,13 @@ MAP_COLUMNS = (
            'message has come for Fallback_After; of a bool 0'),
     Column('Fallback_After', 'none', 'ms, 200-60000'),
     Column('Requires', 'none',
-           'of a Heartbeat: write topics, separated by spaces, whose messages it vouches for'),
+           'of a Heartbeat: write topics, separated by spaces, that must have messages'),
     Column('Requires_Timeout', 'none', 'ms that the last good message of each may be old'),
     Column('Publish_While', 'none',
            'of a Read: RUN, or the tag of a counter that the program of the PLC runs; values are '
            'published only while it holds'),
     Column('Heartbeat_Timeout', 'none',
-           'ms that the counter of Publish_While may stand still'),
+           'ms that the counter of Publish_While may stay unchanged'),
     Column('Via', 'Station',
            'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
            'Station is'),
