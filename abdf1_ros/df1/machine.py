@@ -108,6 +108,8 @@ _LONGEST = 2 * MAX_LINK_DATA
 # Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
 _LAST_CHARACTERS = 16
 
+_HEAD = 2  # bytes of a frame that tell what it is
+
 # What nobody says in full duplex before he has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
 
@@ -204,7 +206,8 @@ class Machine:
         self._reply_size = 0
         self._last_heard = -math.inf
         self._echoes = False
-        self._echo_due = 0
+        self._echo_due: list[bytes] = []  # come back before anything else does
+        self._echo_at = 0  # so much of the first of them has come
         self._due = -math.inf  # the deadline, before a message was heard out
         self._message = _Incoming()
 
@@ -278,7 +281,7 @@ class Machine:
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
         self._is_listening = False
-        self._echoes, self._echo_due = False, 0
+        self._forget_echo()
         if procedure is None:
             return
         if error is not None:
@@ -330,7 +333,8 @@ class Machine:
         if self._pending is not None:
             self._transmit(self._pending)
         else:
-            self._echoes = self._echoes and not self._echo_due
+            if self._echo_due:
+                self._forget_echo()
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
@@ -350,9 +354,27 @@ class Machine:
         return data
 
     def _without_echo(self, data: bytes) -> bytes:
-        count = min(self._echo_due, len(data))
-        self._echo_due -= count
-        return data[count:]
+        """
+        Take the echo off.
+
+        Its first two bytes tell it from an answer: what comes in their place shows that the line
+        does not echo any more. Damage in the rest is passed over.
+        """
+        while self._echo_due and data:
+            frame, at = self._echo_due[0], self._echo_at
+            if not data.startswith(frame[at:_HEAD][:len(data)]):
+                self._forget_echo()
+                return frame[:at] + data
+            self._echo_at = min(at + len(data), len(frame))
+            data = data[self._echo_at - at:]
+            if self._echo_at == len(frame):
+                del self._echo_due[0]
+                self._echo_at = 0
+        return data
+
+    def _forget_echo(self) -> None:
+        self._echoes, self._echo_at = False, 0
+        self._echo_due.clear()
 
     def _deliver_symbols(self) -> None:
         while self._is_listening and (symbol := self.decoder.next_symbol()) is not None:
@@ -390,8 +412,8 @@ class Machine:
     def _take_step(self, step: Step) -> bool:
         """Carry out a step; return whether the procedure goes on at once."""
         self._resting = step.frame is None
-        if step.is_echoed and not self._echoes:
-            self._echoes, self._echo_due = True, 0
+        if step.is_echoed:
+            self._echoes = True
         if self._resting:
             self._is_listening = not self._forget_on_send
             self._set_deadline(step, self.now)
@@ -413,7 +435,8 @@ class Machine:
             self.counters.chars_sent += size
             self.position += size
             self._line_free = free = free + size * self._timing.char_time
-            self._echo_due += size
+            if self._echoes:
+                self._echo_due.append(step.frame)
             if self._forget_on_send:
                 self.decoder.reset()
         self._set_deadline(step, free)

@@ -695,6 +695,31 @@ def test_line_that_stops_echoing_is_heard_again_after_one_retry() -> None:
                       SAYS_REPLY, ACKED) == REPLY
 
 
+@pytest.mark.parametrize('size', [1, 3, 1000])
+def test_answer_in_place_of_the_echo_is_heard(size: int) -> None:
+    """An adapter ceases to echo between two frames, whatever bytes come at a time."""
+    script = MasterScript(SETTINGS)
+    reply = SAYS_REPLY.data
+    parts = [Answer(reply[at:at + size]) for at in range(0, len(reply), size)]
+    assert script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, *parts,
+                      ACKED) == REPLY
+    assert script.numbers() == [(2523, SLAVE)]
+
+
+@pytest.mark.parametrize('at', [2, 10])
+def test_echo_that_is_damaged_is_still_passed_over(at: int) -> None:
+    script = MasterScript(SETTINGS)
+    damaged = bytearray(SENT.data)
+    damaged[at] ^= 0x08
+    command = replace(COMMAND, tns=0x0103)
+    sent = master_frame(SLAVE, command.encode(), Checksum.CRC)
+    script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data),
+               Answer(SAYS_REPLY.data), ACKED)
+    echo = bytes(damaged[:4]) + sent[4:]
+    assert script.run(command, Expect(sent), Answer(ACK), Answer(echo), SAYS_ACK, POLLED,
+                      Answer(POLLED.data), says(command.reply()), ACKED) == command.reply()
+
+
 def test_echo_alone_is_silence() -> None:
     script = MasterScript(SETTINGS)
     error = script.run(COMMAND, *(SENT, Answer(SENT.data), TIMEOUT) * 3)
