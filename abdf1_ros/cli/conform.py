@@ -67,7 +67,7 @@ _INTERRUPTED = 130
 
 _MODULES = (slave, master, peer, client, data, asking)  # importing them enters their cases
 
-_NOBODY = 'not one byte came: is anybody there? cable, port, speed, power'
+_NOBODY = 'no byte was received: check cable, port, speed and power'
 
 _EPILOG = """\
 exit status: 0 when no case failed, 1 when one did or nothing was ever heard, 2 for bad options and

@@ -40,7 +40,7 @@ _BURST = 8
 def poll_idle(end: MasterEnd) -> None:
     symbol = end.poll()
     if symbol is None:
-        raise Skipped('silence: EOT suppression may be on, or nobody is there')
+        raise Skipped('silence: EOT suppression may be on, or there is no station')
     if symbol.kind is not SymbolKind.EOT:
         raise Failed('DLE EOT', str(symbol))
 

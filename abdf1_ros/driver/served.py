@@ -159,8 +159,8 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
         elif mapping.station == BROADCAST and network.mode == 'Peer':
             text = 'Station 255 is for a line with many stations, not for Mode Peer'
         elif mapping.station == network.station and network.mode != 'Peer':
-            text = (f'Station {mapping.station} is our own in the net file, and nobody asks '
-                    'himself; the station to read or write belongs here')
+            text = (f'Station {mapping.station} is our own in the net file; here belongs the '
+                    'station to read or write')
         elif mapping.via == network.station and network.mode == 'Master':
             text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
         if text is not None:

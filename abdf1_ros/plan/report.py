@@ -193,7 +193,7 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
         if station == network.station:
             yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)} is our own Station in the net file; '
-                'two nodes of one address cannot talk'), station)
+                'two nodes of one address cannot communicate'), station)
         types: dict[str, list[Mapping]] = {}
         for mapping in mappings:
             if mapping.access is Access.CIF:

@@ -105,7 +105,7 @@ class LinkCounterService:
         self._asked = [station.number for station in self._driver.stations if station.active]
         if not self._driver.is_online or not self._asked:
             what = 'no station is active' if self._driver.is_online else 'the port is not open'
-            response.success, response.message = False, f'nobody to ask: {what}'
+            response.success, response.message = False, f'no station to ask: {what}'
             return response
         for station in self._asked:
             self._driver.request_counters(station)

@@ -249,5 +249,5 @@ def _check_cells(place: Place, cells: list[str], names: list[str], columns: dict
                              f'{_DELIMITERS[delimiter]} between them, outside of quotes')
     for number, cell in enumerate(cells, 1):
         if cell and number not in columns.values():
-            raise Problem(replace(place, cell=number), f'"{shown(cell)}" stands in no column; '
+            raise Problem(replace(place, cell=number), f'"{shown(cell)}" has no column; '
                                                        'quote a cell that contains the delimiter')

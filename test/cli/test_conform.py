@@ -81,7 +81,7 @@ def test_nobody_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     dead = Pty(tmp_path / 'dead')
     assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
                  'poll-idle']) == 1
-    assert 'not one byte came' in capsys.readouterr().err
+    assert 'no byte was received' in capsys.readouterr().err
     dead.close()
 
 

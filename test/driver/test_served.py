@@ -506,8 +506,8 @@ def test_full_duplex_line_has_no_broadcast() -> None:
 def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> None:
     ours = [make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', station=1)]
     assert texts(*ours, network=network) == [
-        'map.csv:2: Item: 1, Station 1 is our own in the net file, and nobody asks himself; '
-        'the station to read or write belongs here'] * 2 * is_wrong
+        'map.csv:2: Item: 1, Station 1 is our own in the net file; here belongs the '
+        'station to read or write'] * 2 * is_wrong
 
 
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:

@@ -178,7 +178,7 @@ def test_our_own_station_is_mapped() -> None:
     mapping = make_mapping('N7:0', station=5, tag='speed')
     assert texts(report_of(mapping), RemarkKind.STATION) == [
         'station 5 of speed is our own Station in the net file; '
-        'two nodes of one address cannot talk']
+        'two nodes of one address cannot communicate']
     assert texts(report_of(mapping, station=6), RemarkKind.STATION) == []
 
 

@@ -279,4 +279,4 @@ def test_service_without_a_port(tmp_path: Path) -> None:
         response = observer.call(Trigger, '/alone/read_link_counters', Trigger.Request())
         node.end()
     assert (response.success, response.message) == (
-        False, 'nobody to ask: the port is not open')
+        False, 'no station to ask: the port is not open')

@@ -214,7 +214,7 @@ def test_file_of_which_most_rows_are_shifted_is_refused_as_a_whole(path: Path) -
 ])
 def test_cell_outside_the_columns(path: Path, content: str, places: list[str]) -> None:
     assert problems_of(path, content) == [
-        f'FILE:{place}: "5" stands in no column; quote a cell that contains the delimiter'
+        f'FILE:{place}: "5" has no column; quote a cell that contains the delimiter'
         for place in places]
 
 
@@ -303,8 +303,8 @@ def test_line_that_is_much_too_long_is_refused(path: Path) -> None:
 def test_long_cell_is_shown_without_its_end(path: Path) -> None:
     cell = 'x' * 101
     assert problems_of(path, f'Tag\na,{cell}\nb,{cell[1:]}\n') == [
-        f'FILE:2:2: "{cell[1:]}..." stands in no column; quote a cell that contains the delimiter',
-        f'FILE:3:2: "{cell[1:]}" stands in no column; quote a cell that contains the delimiter']
+        f'FILE:2:2: "{cell[1:]}..." has no column; quote a cell that contains the delimiter',
+        f'FILE:3:2: "{cell[1:]}" has no column; quote a cell that contains the delimiter']
     assert problems_of(path, f'Tag,{cell}\n') == [
         f'FILE:1:2: unknown column "{cell[1:]}..."; known: Tag, Address, Length']
 

@@ -53,6 +53,6 @@ def network_of(options: argparse.Namespace) -> Network:
     mode = MODES[options.duplex] if options.duplex else network.mode
     if mode == 'Slave':
         raise ConfigurationError([Problem(
-            options.net, 'Mode Slave: somebody else is the master of this line; plc can only '
+            options.net, 'Mode Slave: another node is the master of this line; plc can only '
             'be a master (--duplex half) or have the PLC for itself (--duplex full)')])
     return replace(network, mode=mode, polling=DEFAULTS.polling)

@@ -57,7 +57,7 @@ def test_options_go_before_the_file(tmp_path: Path) -> None:
 
 def test_somebody_elses_line(tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'net.csv', 'Mode,Com_Port', ['Slave,/dev/ttyS7'])
-    with pytest.raises(ConfigurationError, match='Mode Slave: somebody else is the master'):
+    with pytest.raises(ConfigurationError, match='Mode Slave: another node is the master'):
         line_of('--net', str(path))
     assert line_of('--net', str(path), '--duplex', 'half').mode == 'Master'
 
