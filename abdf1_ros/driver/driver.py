@@ -440,10 +440,19 @@ class Driver:
             if not reason:
                 self._update(point, data[place])
             elif point.withhold(reason, now):
-                self._listener.unreadable(point.mapping, f'withheld: {reason}')
+                self._tell_withheld(point, reason)
         job.done(now)
         if has_recovered:
             self._change(self._refusals.recovered(job.block, self.blocks))
+
+    def _tell_withheld(self, point: ReadPoint, reason: str) -> None:
+        """Tell that a row is withheld, once for all that depend on the same (rule 15)."""
+        condition = _condition(point.mapping)
+        same = [other for mapping, other in self.points.items()
+                if _condition(mapping) == condition]
+        if not any(other.is_withheld for other in same if other is not point):
+            more = f'; so are all {len(same)} rows that depend on it' if len(same) > 1 else ''
+            self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
 
     def _update(self, point: ReadPoint, words: bytes) -> None:
         try:
@@ -529,3 +538,8 @@ class Driver:
             self.stations[station].remote_errors += 1
         elif error is not None and not isinstance(error, CommandExpired):
             self._link_failed(station, (), error)
+
+
+def _condition(mapping: Mapping) -> tuple[int, str]:
+    """Return what the values of a row depend on: the mode or a counter of its station."""
+    return mapping.station, mapping.publish_while.text if mapping.publish_while else ''

@@ -56,6 +56,13 @@ class HeartbeatRow:
         self._must_begin = True  # 0 has to be confirmed before it counts (rule 2)
         self._next = -math.inf
 
+    def why_not(self, now: float) -> str:
+        """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
+        if self.reason or self.confirmed is None:
+            return self.reason or 'the PLC has not confirmed it yet'
+        silent = now - self.confirmed
+        return f'not confirmed for {silent:.1f} s' if silent > 3 * self._period else ''
+
     @property
     def is_at_rest(self) -> bool:
         """Tell whether the PLC has confirmed 0."""

@@ -126,6 +126,11 @@ class ReadPoint:
             self.withholdings += 1
         return is_news
 
+    @property
+    def is_withheld(self) -> bool:
+        """Tell whether its values are read and not published, and that has been told."""
+        return bool(self.withheld) and self._is_told and self.error is None
+
     def is_due(self, now: float, block_period: float) -> bool:
         """
         Tell whether a read that is made now is for this point.
@@ -144,7 +149,7 @@ class ReadPoint:
         """Judge the last value."""
         if self.error is not None:
             return Freshness.FAILED
-        if self.withheld and self._is_told:
+        if self.is_withheld:
             return Freshness.WITHHELD
         if self.last_good is None:
             return Freshness.WAITING

@@ -121,7 +121,7 @@ class Diagnostics:
         """Return the level of writes; a heartbeat that does not count is a WARN."""
         level, text = self.writes.judge(now)
         interlocks = self._driver.interlocks
-        at_rest = [row.mapping.tag for row in interlocks.heartbeats if row.reason]
+        at_rest = [row.mapping.tag for row in interlocks.heartbeats if row.why_not(now)]
         due = [row.mapping.tag for row in interlocks.fallbacks if row.cause is not None]
         notes = [f'{", ".join(tags)}: {what}' for tags, what in (
             (at_rest, 'heartbeat does not count'), (due, 'fallback value is due'),
@@ -133,7 +133,8 @@ class Diagnostics:
         values = self.writes.values(now)
         for beat in self._driver.interlocks.heartbeats:
             age = '' if beat.confirmed is None else f', {now - beat.confirmed:.1f} s ago'
-            state = f'does not count: {beat.reason}' if beat.reason else 'counts'
+            reason = beat.why_not(now)
+            state = f'does not count: {reason}' if reason else 'counts'
             values[beat.mapping.tag] = f'heartbeat {beat.value}{age}; {state}'
         for row in self._driver.interlocks.fallbacks:
             state = 'a message stands' if not row.stands else 'the fallback value stands'

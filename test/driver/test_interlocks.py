@@ -540,6 +540,21 @@ def test_rule_15_withholding_is_counted_and_told_once_a_cause() -> None:
     assert cell.bench.driver.points[read].withholdings == len(withheld(cell)) == 3
 
 
+def test_rule_15_rows_of_one_cause_are_told_together() -> None:
+    counter = make_mapping('N11:3', tag='alive', period=100)
+    reads = [make_mapping(text, period=period, publish_while=PublishWhile('alive', 500))
+             for text, period in (('N7:0', 100), ('N7:5', 150), ('B3:0', 300))]
+    cell = Cell(counter, *reads)
+    for _ in range(2):
+        count(cell, 10)
+        cell.run(3.0)
+    assert withheld(cell) == 2 * [
+        'withheld: alive has not changed twice within 0.5 s; so are all 3 rows that depend on it']
+    points = [cell.bench.driver.points[read] for read in reads]
+    assert [point.freshness(cell.now) for point in points] == 3 * [Freshness.WITHHELD]
+    assert [point.withholdings for point in points] == [2, 2, 2]
+
+
 def test_rule_15_start_is_told_when_the_program_has_had_its_time_to_count() -> None:
     cell, read = counter_cell()
     cell.run(0.4)

@@ -478,6 +478,18 @@ def test_fallback_value_is_no_message_and_usual_at_start_and_end(
     assert '0 of 0 writes confirmed' in text
 
 
+def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
+        make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
+    assert bench.says('writes')[1].endswith('alive: heartbeat does not count')
+    beat = bench.driver.interlocks.heartbeats[0]
+    beat.confirmed = NOW
+    assert bench.says('writes', NOW + 1.5) == (OK, 'OK: 0 of 0 writes confirmed')
+    assert bench.says('writes', NOW + 1.6)[0] == WARN
+    assert details(bench.status('writes', NOW + 4))['alive'] == \
+        'heartbeat 0, 4.0 s ago; does not count: not confirmed for 4.0 s'
+
+
 def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> None:
     bench.diagnostics.lost('level', 3, NOW)
     bench.diagnostics.lost('pulses', 1, NOW + 1)
