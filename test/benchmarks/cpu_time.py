@@ -22,8 +22,10 @@ a warm-up --seconds are measured: transactions, and the processor time of this p
 (``time.process_time``, which does not see what else runs on the machine, unlike the rate).
 "system calls" does nothing but what a transaction asks of the operating system (two writes, two
 polls, two reads), with frames made beforehand: the time that no driver in Python can go below, on
-this machine in this minute. "driver" has a listener that only counts; "driver and publish"
-publishes every value with rclpy, as the node does, and is left out where there is no ROS.
+this machine in this minute. "calls and publish" publishes a message encoded beforehand after each
+of them: what rclpy and DDS take when they are woken from time to time. "driver" has a listener
+that only counts; "driver and publish" publishes every value with rclpy, as the node does. Both
+rows with "publish" are left out where there is no ROS.
 They take turns, as the machine is faster in some seconds than in others: the last columns are
 the median and the least of what each round has shown as a multiple of its own system calls.
 
@@ -37,10 +39,11 @@ Run it as "python test/benchmarks/cpu_time.py"; without ROS it needs nothing but
 from __future__ import annotations
 
 import argparse
+from array import array
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
 import itertools
 import os
@@ -89,9 +92,21 @@ class Publisher(Listener):
             node_messages.MESSAGES[MAPPING.type], 'words', node_messages.read_qos(MAPPING, 1.0),
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
 
+        self._message = self._encode(array('h', range(WORDS)))
+
+    def publish(self) -> None:
+        """Publish the same again."""
+        self._publisher.publish(self._message)
+
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish values."""
         self._publisher.publish(self._encode(values))
+
+
+@cache
+def _all_frames() -> list[tuple[bytes, bytes]]:
+    """Return the frames of each transaction number."""
+    return list(map(_frames, range(TRANSACTIONS)))
 
 
 def _frames(tns: int) -> tuple[bytes, bytes]:
@@ -105,7 +120,7 @@ def _frames(tns: int) -> tuple[bytes, bytes]:
 
 def _respond(descriptor: int) -> None:
     """Answer command after command, poll after poll, for ever."""
-    talk = [(len(command), reply) for command, reply in map(_frames, range(TRANSACTIONS))]
+    talk = [(len(command), reply) for command, reply in _all_frames()]
     first = talk.pop(0)  # a driver begins with 1
     poll = len(frames.poll_frame(STATION))
     acknowledged = 0
@@ -120,29 +135,36 @@ def _respond(descriptor: int) -> None:
         talk = [first, *talk] if len(talk) < TRANSACTIONS else talk
 
 
-def measure_system_calls(warm_up: float, seconds: float) -> tuple[float, float]:
-    """Return what ``measure`` does, of a master that knows beforehand what will be said."""
+def measure_system_calls(warm_up: float, seconds: float,
+                         after: Callable[[], None] = lambda: None) -> tuple[float, float]:
+    """
+    Return what ``measure`` does, of a master that knows beforehand what will be said.
+
+    ``after`` is called after each transaction.
+    """
     poll = frames.poll_frame(STATION)
-    known = list(map(_frames, [*range(1, TRANSACTIONS), 0]))
+    first, *known = _all_frames()
+    known.append(first)
     talk = itertools.cycle([
         [(poll, len(reply)), (frames.ACK + following, len(frames.ACK))]
         for (_, reply), (following, _) in zip(known, known[1:] + known[:1], strict=True)])
     with responder() as descriptor:
         line = BareLine(descriptor)
         line.ask(known[0][0], len(frames.ACK))
-        _take_turns(line, talk, warm_up)
+        _take_turns(line, talk, after, warm_up)
         used = time.process_time()
-        done, passed = _take_turns(line, talk, seconds)
+        done, passed = _take_turns(line, talk, after, seconds)
         return done / passed, (time.process_time() - used) / done
 
 
 def _take_turns(line: BareLine, talk: Iterator[list[tuple[bytes, int]]],
-                seconds: float) -> tuple[int, float]:
+                after: Callable[[], None], seconds: float) -> tuple[int, float]:
     """Carry out transactions for a time; return how many, and the time."""
     begun, done = time.monotonic(), 0
     while time.monotonic() < begun + seconds:
         for sent, expected in next(talk):
             line.ask(sent, expected)
+        after()
         done += 1
     return done, time.monotonic() - begun
 
@@ -232,11 +254,14 @@ def main() -> None:
     used, calls, c_calls = measure_without_waiting()
     print(f'without waiting: {1e6 * used:.1f} us, {calls:.0f} calls of Python functions and '
           f'{c_calls:.0f} of C functions')
-    listeners = {'driver': Listener()}
+    listeners = [Listener()]
+    kinds: dict[str, Callable[[float, float], tuple[float, float]]] = {
+        'system calls': measure_system_calls, 'driver': partial(measure, listeners[0])}
     if find_spec('rclpy') is not None:
-        listeners['driver and publish'] = Publisher()
-    kinds = {'system calls': measure_system_calls}
-    kinds |= {name: partial(measure, listener) for name, listener in listeners.items()}
+        publisher = Publisher()
+        listeners.append(publisher)
+        kinds['calls and publish'] = partial(measure_system_calls, after=publisher.publish)
+        kinds['driver and publish'] = partial(measure, publisher)
     rounds = [{name: kind(options.warm_up, options.seconds) for name, kind in kinds.items()}
               for _ in range(options.rounds)]
     print('                     transactions/s  processor time of each  median ratio   least')
@@ -245,7 +270,7 @@ def main() -> None:
         ratios = [one[name][1] / one['system calls'][1] for one in rounds]
         print(f'{name:19}  {rate:14.0f}  {1e6 * used:19.1f} us  {median(ratios):12.2f}'
               f'  {min(ratios):6.2f}')
-    print('troubles:', sum(listener.troubles for listener in listeners.values()))
+    print('troubles:', sum(listener.troubles for listener in listeners))
 
 
 if __name__ == '__main__':
