@@ -32,14 +32,15 @@ class Probes:
 
     def __init__(self, usual: float) -> None:
         self.usual, self.pause = usual, _OTHERS_SHARE * usual
-        self._free = 0.0
+        self._free = self._put_off = 0.0
         self._is_kept_for_message = False
         self._was_message = False
 
     @property
     def next(self) -> float:  # noqa: A003
         """Return from when on (clock value, s) silent stations may be asked in their order."""
-        return self._free + self.pause if self._is_kept_for_message else self._free
+        free = self._free + self.pause if self._is_kept_for_message else self._free
+        return max(free, self._put_off)
 
     def admits_message(self, now: float) -> bool:
         """Tell whether a message may go to a silent station now."""
@@ -53,9 +54,10 @@ class Probes:
         self._is_kept_for_message, self._was_message = False, is_message
 
     def died(self, now: float) -> None:
-        """Take note that a station does not answer any more: it may have a moment to come back."""
-        self._free = max(self._free, now + self.pause)
+        """Take note that a station does not answer any more; only a message asks it at once."""
+        self._put_off = now + self.pause
 
     def nobody_waits(self, now: float) -> None:
         """Take note that there is nobody whom probes keep waiting."""
-        self._free, self._is_kept_for_message, self._was_message = now, False, False
+        self._free = self._put_off = now
+        self._is_kept_for_message = self._was_message = False

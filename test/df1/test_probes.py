@@ -29,11 +29,14 @@ def test_seven_times_as_long_is_left_to_others() -> None:
     assert probes.next == 31.0
 
 
-def test_stations_that_die_one_after_the_other_are_not_added_up() -> None:
+def test_station_that_has_just_died_is_asked_at_once_for_a_message_only() -> None:
     probes = Probes(1.0)
     for now in (0.0, 4.0, 8.0):
         probes.died(now)
     assert probes.next == 15.0
+    assert probes.admits_message(8.0)
+    probes.spent(1.0, 9.0, is_message=True)
+    assert probes.next == 16.0 and not probes.admits_message(16.0)
 
 
 def test_message_that_came_too_early_has_the_next_turn_and_the_round_the_one_after() -> None:
@@ -55,9 +58,10 @@ def test_where_nobody_waits_nobody_is_put_off() -> None:
     stations = ActiveStationList((1, 2), probe_time=1.0)
     stations.lost(1, 0.0)
     stations.tried(1, 0.0, probe_begun=None)
-    assert not stations.admits_message(1, 1.0) and stations.admits_message(2, 1.0)
+    assert stations.probes.next == 7.0
     stations.lost(2, 2.0)
     stations.tried(2, 2.0, probe_begun=None)
+    assert stations.probes.next == 2.0
     assert stations.admits_message(1, 2.0) and stations.admits_message(2, 2.0)
 
 
