@@ -289,7 +289,9 @@ class BridgeNode(Node):
         self._opener.close()
         self._publish_diagnostics(line_time())
         # Messages that are still under way would be lost with their publisher.
-        self._diagnostics_publisher.wait_for_all_acked(patience)
+        give_up = time.monotonic() + patience.nanoseconds / 1e9
+        for publisher in (self._results, self._diagnostics_publisher):
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, give_up - time.monotonic())))
 
     def _lost(self, topic: str, count: int) -> None:
         self._diagnostics.lost(topic, count, line_time())

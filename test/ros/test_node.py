@@ -33,7 +33,9 @@ from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.node import BridgeNode, main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
+from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from std_msgs.msg import (  # noqa: I101
     Float32MultiArray,
     Int16MultiArray,
@@ -355,6 +357,23 @@ def test_loss_of_the_port_leaves_no_write_without_a_result(make_bench: Benches) 
     until_status(bench.diagnostics, 'link', ERROR)
     publish(*8 * [0])
     assert bench.until_results(4)[-1].message == 'not written: refused: the port is not open'
+
+
+def test_end_waits_until_results_and_diagnostics_have_arrived(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make_bench(PULSES)
+    waits: list[tuple[str, float]] = []
+
+    def wait(publisher: Publisher, timeout: Duration) -> bool:
+        waits.append((publisher.topic_name, timeout.nanoseconds / 1e9))
+        time.sleep(0.1)
+        return False
+
+    monkeypatch.setattr(Publisher, 'wait_for_all_acked', wait)
+    bench.node.stop(Duration(seconds=0.3))
+    (first, patience), (second, rest) = waits
+    assert (first, second) == ('/abdf1/write_results', '/diagnostics')
+    assert patience <= 0.3 and 0.0 <= rest <= 0.2  # of a subscriber that is stuck, for both
 
 
 def test_read_only_node_refuses_every_write(make_bench: Benches) -> None:
