@@ -69,6 +69,8 @@ $(INSTALLED): setup.py requirements/ros.txt requirements/test.txt requirements/t
 	    $(PY) -m pip install --quiet --no-build-isolation --no-deps --editable .; \
 	fi; \
 	touch $@
+	@# Compiles all tests once; the workers of "make test" would do it at the same time, each alone.
+	@$(TEST_ENV) $(PY) -m pytest --collect-only -q >/dev/null || true
 
 .PHONY: demo
 demo: $(INSTALLED) ## Run bridge and simulated PLC for DEMO_SECONDS (30; 0: until Ctrl-C)
