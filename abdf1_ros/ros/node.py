@@ -62,6 +62,7 @@ from abdf1_ros.ros.process import (
 )
 from abdf1_ros.ros.reads import ReadTopics
 from abdf1_ros.ros.station_health import LinkCounterService
+from abdf1_ros.ros.type_watch import TypeWatch
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
@@ -178,6 +179,8 @@ class BridgeNode(Node):
         self._writes.use(self.driver)
         self._interlocks = InterlockWatch(self)
         self._interlocks.use(self.driver)
+        self._type_watch = TypeWatch(self)
+        self._type_watch.use(self.driver.mappings)
         self._link_counters = LinkCounterService(self.driver, self.link, self._wake_executor)
         self._create_services()
         if has_timer:
@@ -377,6 +380,8 @@ class BridgeNode(Node):
         if self._duplicate_names.look(now):
             self._duplicate_name_came_or_went(self._duplicate_names.has_found)
         self._tell_speed(self.driver.machine.rate.seen)
+        for text in self._type_watch.look(now):
+            self._lines.warning('types of topics', text)
         if self._interlocks.look(now):
             self._tell_crowd()
         wrong_types = self._diagnostics.wrong_types()
@@ -491,6 +496,7 @@ class BridgeNode(Node):
         self._writes.use(driver)
         old_reads.end(reads)
         self._interlocks.use(driver)
+        self._type_watch.use(driver.mappings)
         self._log.forget_all()
         if before.stations.words() != driver.stations.words():
             self._publish_active()
