@@ -25,7 +25,8 @@ bridge in --seconds, as part of one core, diagnostics included; nobody listens. 
 number of lines that said at the end that all their mappings were fresh.
 
 --ways: "one" is one process for all lines, "four" four with a quarter of them each, "each" a
-process (the command "node") a line.
+process (the command "node") a line. "bare" is one process that does the same without this
+package (bare_lines.py); "fresh" means nothing there.
 
 Run it as "python test/benchmarks/many_lines.py"; it needs ROS, or the wheels of it.
 """
@@ -188,7 +189,7 @@ class Figures:
                 f'{self.transactions:8.0f}  {acks:>20} ms {self.fresh:6d} {self.end:6.1f} s')
 
 
-def measure(rig: Rig, commands: Sequence[tuple[str, Sequence[str], str]],
+def measure(rig: Rig, commands: Sequence[tuple[str | Path, Sequence[str], str]],
             options: argparse.Namespace) -> Figures:
     """Run ``commands`` (name, arguments, what they say when they run), and look at them."""
     with Observer() as observer, ExitStack() as stack:
@@ -238,13 +239,18 @@ def fresh_lines(observer: Observer) -> int:
     return sum(level == OK for level in levels.values())
 
 
-def commands_of(way: str, rig: Rig, count: int) -> list[tuple[str, list[str], str]]:
+def commands_of(way: str, rig: Rig, count: int) -> list[tuple[str | Path, list[str], str]]:
     """Return what is to be run."""
     numbers = list(range(count))
     if way == 'each':
         return [('node', ['--ros-args', '-r', f'__node:=line_{number}', '-r', '__ns:=/plant',
                           '--params-file', rig.parameters([number], f'{number}.yaml')],
                  f'{rig.ports[number]}: open') for number in numbers]
+    if way == 'bare':
+        return [(Path(__file__).with_name('bare_lines.py'),
+                 [word for number in numbers
+                  for word in (rig.ports[number], str(rig.files(number)[1]))],
+                 f'{count} of {count} lines run')]
     parts = 4 if way == 'four' else 1
     shares = [numbers[part::parts] for part in range(parts)]
     return [('lines', ['--ros-args', '--params-file',
@@ -258,7 +264,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--lines', type=int, nargs='+', default=[1, 10, 25, 50, 100])
-    parser.add_argument('--ways', nargs='+', default=['one'], choices=['one', 'four', 'each'])
+    parser.add_argument('--ways', nargs='+', default=['one'],
+                        choices=['one', 'four', 'each', 'bare'])
     parser.add_argument('--baud', type=int, default=19200)
     parser.add_argument('--settle', type=float, default=5.0)
     parser.add_argument('--seconds', type=float, default=20.0)
