@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-import select
+import math
 import socket
 import struct
 import time
@@ -167,7 +167,7 @@ class Rfc2217Port(DescriptorPort):
             left = give_up - time.monotonic()
             if left <= 0:
                 raise OSError(failure)
-            if select.select([self._descriptor], [], [], left)[0]:
+            if self._poll.poll(math.ceil(left * 1000)):
                 self._take()
 
     def _take(self) -> bytes:

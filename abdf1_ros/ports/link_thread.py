@@ -20,6 +20,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+import math
 import os
 import select
 import threading
@@ -38,6 +39,7 @@ _MAX_FAULTS = 3
 _FAULT_WINDOW = 60.0
 
 _WAKES = 4096  # read at a time
+_POLL_STEP = 0.001  # poll(2) counts milliseconds
 
 # Where bytes come faster than they can be worked on, so many are at a time (symbols that nobody
 # wants take up to 18 us a byte), and the others have so many times as long before the next.
@@ -159,6 +161,8 @@ class LinkThread(threading.Thread):
         self._closing = threading.Lock()
         self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
         self._wake_reader, self._wake_writer = os.pipe()
+        self._wakes = select.poll()  # not select(): that knows no descriptor from 1024 on
+        self._wakes.register(self._wake_reader, select.POLLIN)
         os.set_blocking(self._wake_reader, False)
         os.set_blocking(self._wake_writer, False)
 
@@ -347,7 +351,7 @@ class LinkThread(threading.Thread):
 
     def _wait(self) -> None:
         """Wait for a wake."""
-        select.select([self._wake_reader], [], [])
+        self._wakes.poll()
         self._take_wake()
 
     def _take_portion(self, data: bytes, begun: float) -> bytes:
@@ -368,14 +372,17 @@ class LinkThread(threading.Thread):
         deadline = self._machine.next_call
         if deadline is not None:
             seconds = max(0.0, min(seconds, deadline - self._clock()))
-        select.select([self._wake_reader], [], [], seconds)
+        self._wakes.poll(math.ceil(seconds * 1000))
 
     def _pause(self, seconds: float) -> None:
         """Wait, but not when the port has to be closed or another one opened."""
         end = self._clock() + seconds
         while not self._is_interrupted and (left := end - self._clock()) > 0:
-            select.select([self._wake_reader], [], [], left)
-            self._take_wake()
+            if left < _POLL_STEP:
+                time.sleep(left)
+            else:
+                self._wakes.poll(int(left / _POLL_STEP))
+                self._take_wake()
 
     def _set_state(self, is_open: bool, text: str) -> None:
         self.state = PortState(is_open, text)

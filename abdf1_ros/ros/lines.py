@@ -29,6 +29,7 @@ from dataclasses import dataclass
 import difflib
 import os
 from pathlib import Path
+import resource
 import sys
 import threading
 import time
@@ -454,12 +455,20 @@ def main(args: Sequence[str] | None = None) -> int:
     return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _run, args)
 
 
+def _allow_files() -> None:
+    """Let this process open as many files as it may: a line takes 7, and 1024 is usual."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(OSError, ValueError):  # then it stays as it is
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
 def _run(given: Sequence[str], ended: threading.Event) -> int:
     if any(word in text for text in given for word in ('__node:=', '__name:=', '__ns:=')):
         raise ConfigurationError([Problem('arguments', (
             'the sections of the parameter file name the nodes; __node and __ns would give all '
             'of them one name'))])
     names = dict.fromkeys(name for path in parameter_files(given) for name in sections(path))
+    _allow_files()
     node = LinesNode()
     lines = Lines(chosen([*names], node.wanted), node)
     lines.start(ended.is_set)

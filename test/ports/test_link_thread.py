@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import itertools
+import os
 from pathlib import Path
 import queue
+import resource
 import socket
 import threading
 import time
@@ -205,6 +207,28 @@ def test_attempts_to_open_do_not_end_and_are_half_a_second_apart() -> None:
     assert thread.pauses == [0.5, 0.5, 0.5, 0.5]
     assert set(states) == {PortState(False, 'cannot open the port: Device or resource busy')}
     thread.stop()
+
+
+def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 1100:
+        pytest.skip('the system does not allow so many files')
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1100), hard))
+    many = [os.dup(0) for _ in range(1024)]
+    try:
+        script = Script(Step(None, None), Step(b'awake', None))
+        thread = link.start(script.machine, pty.name)
+        assert link.state().is_open
+        assert pty.read(5) == READY
+        thread.wake()
+        assert pty.read(5) == b'awake'
+        assert thread.release()
+        thread.stop()
+        assert not thread.has_failed
+    finally:
+        for descriptor in many:
+            os.close(descriptor)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def test_stop_before_start() -> None:

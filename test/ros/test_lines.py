@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+import resource
 import signal
 import threading
 import time
@@ -207,6 +208,16 @@ def test_each_line_is_a_node_of_its_own(
     assert response.success
     assert plant.end(handlers) == 0
     assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
+
+
+def test_process_may_open_as_many_files_as_the_system_allows(
+        plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
+    limits: list[tuple[int, int]] = []
+    monkeypatch.setattr(resource, 'getrlimit', lambda number: (1024, 5000))
+    monkeypatch.setattr(resource, 'setrlimit', lambda number, pair: limits.append(pair))
+    plant.start('-p', 'lines:=[a]')
+    assert plant.speeds('a') == [7, 8]
+    assert limits == [(5000, 5000)]
 
 
 def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None:
