@@ -23,12 +23,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 import errno
 from pathlib import Path
 import sys
 
 from abdf1_ros.cli.plc import data, detect, files, init, presence
-from abdf1_ros.cli.plc.line import MODES, network_of
+from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION, make_parser, RADIXES
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
@@ -135,11 +136,16 @@ def _line(options: argparse.Namespace) -> Network:
             '--station', 'say which station to write to: a half-duplex line may have several')])
     if options.station is None:
         options.station = DEFAULT_STATION
-    if is_half and options.station == network.station:
+    if not is_half or options.station != network.station:
+        return network
+    if options.is_assumed:
+        raise ConfigurationError([Problem(
+            '--station', f'say which station to ask; {options.station} is our own')])
+    if options.net or options.own_station is not None:
         raise ConfigurationError([Problem('--own-station', (
             f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
             'give us a number that no PLC of the line has'))])
-    return network
+    return replace(network, station=free_station(network.station, [options.station]))
 
 
 def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
@@ -323,8 +329,10 @@ def _detect(options: argparse.Namespace) -> int:
         return EXIT_FAILED
     there = found.presence
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
-    station = f' --station {there.station}' if found.settings.mode == MODES['half'] else ''
-    print(f'next: {called("plc")} read N7:0{station} --net net.csv')
+    settings = found.settings
+    whom = f'--station {there.station}' if settings.mode == MODES['half'] else '--peer'
+    print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
+          f'--check {settings.check}')
     print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
     return 0
 

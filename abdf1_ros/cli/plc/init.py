@@ -54,10 +54,11 @@ class Files:
         return self.folder / 'map.csv'
 
     def check(self) -> None:
-        """Raise Problem where a file is there already, or has no folder."""
-        if not self.folder.is_dir():
-            raise Problem(str(self.folder), 'there is no such folder; make it, or name another '
-                                            'with --into')
+        """Raise Problem where a file is there already; make the folder where there is none."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise Problem(str(self.folder), f'cannot be made: {error.strerror}') from None
         for path in (self.net, self.map):
             if path.exists() and path.stat().st_size:  # a pipe that failed leaves an empty one
                 raise Problem(str(path), 'is there already and stays as it is; name another '

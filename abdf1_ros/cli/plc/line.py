@@ -28,6 +28,9 @@ from abdf1_ros.settings.network import load_network, make_network, Network
 # A Timeout of 1000 ms, the default of a net CSV, is long for a person who waits.
 DEFAULTS = Network(timeout=300)
 
+# PLCs mostly have small numbers, and 1 is asked where nobody says which.
+_FIRST_SPARE = 10
+
 MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer'}
 
 # Options that stand for a column of the net CSV.
@@ -37,7 +40,8 @@ _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity':
 
 def free_station(own: int, taken: Collection[int]) -> int:
     """Return an address for us that no station of a half-duplex line has: ``own`` if it can be."""
-    return next((number for number in (own, *range(1, MAX_STATION)) if number not in taken), own)
+    candidates = (own, *range(_FIRST_SPARE, MAX_STATION))
+    return next((number for number in candidates if number not in taken), own)
 
 
 def network_of(options: argparse.Namespace) -> Network:

@@ -114,11 +114,18 @@ def test_silence_of_a_station_that_nobody_named(plc: Plc, simulator: Process) ->
 
 
 @pytest.mark.parametrize('args', [
-    ('read', 'N7:0'), ('status', '1'), ('ping', '1'), ('write', 'N7:0', '1', '--station', '1')])
+    ('read', 'N7:0', '--station', '1'), ('status', '1'), ('ping', '1'),
+    ('write', 'N7:0', '1', '--station', '1')])
 def test_own_station_is_not_asked(plc: Plc, args: tuple[str, ...]) -> None:
     said = plc(*args, '--own-station', '1')
     assert said.status == 2
     assert said.err.startswith('plc: --own-station: 1 is our own Station, so no PLC can answer')
+
+
+def test_own_station_is_not_taken_for_one_that_nobody_named(plc: Plc) -> None:
+    said = plc('read', 'N7:0', '--own-station', '1')
+    assert (said.status, said.err) == (
+        2, 'plc: --station: say which station to ask; 1 is our own\n')
 
 
 def test_scan_asks_a_plc_that_has_our_number(plc: Plc) -> None:
@@ -381,7 +388,8 @@ def test_detect_tries_in_order_and_stops_at_the_first_answer(
     assert said.status == 0
     assert said.lines[0].startswith('19200 baud, half duplex, BCC: station 2 SLC 5/03')
     assert said.lines[1].startswith('next: ')
-    assert said.lines[1].endswith('plc read N7:0 --station 2 --net net.csv')
+    assert said.lines[1].endswith(
+        f'plc read N7:0 --station 2 --port {port} --baud 19200 --check BCC')
     assert said.lines[2:] == [
         'net.csv:', 'Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout',
         f'5,Master,BCC,{port},19200,None,300']

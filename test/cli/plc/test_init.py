@@ -77,7 +77,8 @@ def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) 
     (tmp_path / 'net.csv').touch()  # as a pipe that failed leaves it
     with plc_line(tmp_path / 'plc', simulated_plc(5, 'SLC', time.monotonic, *SLC)) as name:
         assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200']) == 0
-    assert 'station 5: SLC 5/03' in capsys.readouterr().out
+        assert 'station 5: SLC 5/03' in capsys.readouterr().out
+        assert main(['read', 'N7:1', '--station', '5', '--port', name]) == 0
     assert load_network(str(tmp_path / 'net.csv')).station != 5
 
 
@@ -87,8 +88,8 @@ def test_init_leaves_files_alone_that_are_there(
     assert main(['init', '--port', port, '--into', str(tmp_path)]) == 2
     assert 'map.csv: is there already' in capsys.readouterr().err
     assert not (tmp_path / 'net.csv').exists()
-    assert main(['init', '--port', port, '--into', str(tmp_path / 'nowhere')]) == 2
-    assert 'there is no such folder' in capsys.readouterr().err
+    assert main(['init', '--port', port, '--into', str(tmp_path / 'map.csv')]) == 2
+    assert 'map.csv: cannot be made: File exists' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(('station', 'found'), [
