@@ -48,7 +48,6 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 import math
 
-from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
@@ -131,6 +130,7 @@ class FullDuplexPeer:
                  serve: Callable[[Packet], Packet],
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self._machine = machine
+        self._counters = machine.counters
         self._settings = settings
         self._stations = stations
         self._serve = serve
@@ -139,10 +139,6 @@ class FullDuplexPeer:
         self._note = self._accounting.note
         self._timeout = max(settings.timeout, _MIN_RESPONSE_TIME)
         self._forget()
-
-    @property
-    def _counters(self) -> Counters:
-        return self._machine.counters
 
     def status(self) -> LinkStatus:
         """Return that there are no details."""
