@@ -525,6 +525,11 @@ class Driver:
             self._writes.ended(write)
             self.interlocks.ended(own, outcome, self.machine.now)
         self._write_failed(own.station, result.error)
+        refusal = '' if outcome is Outcome.WRITTEN else str(result.error)
+        if isinstance(result.error, RemoteError) and refusal != own.row.refusal:
+            self._listener.unreadable(write.mapping, f'not written: {refusal}')
+        if outcome is not Outcome.NOT_SENT:
+            own.row.refusal = refusal
         if own.urgency is Urgency.FALLBACK and (result.packets_done or result.is_unconfirmed):
             self._reads.refresh(write, self.machine.now)
 

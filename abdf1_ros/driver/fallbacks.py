@@ -48,7 +48,8 @@ class FallbackRow:
     confirmed it. ``refreshed`` is when the last confirmed message was published, ``sent`` when the
     fallback was last sent: a message published before that is not sent any more. Both are clock
     values (s). ``stands`` tells that the PLC holds the fallback and no message was sent since,
-    ``is_held_up`` that the fallback waits for a message that is under way.
+    ``is_held_up`` that the fallback waits for a message that is under way, ``refusal`` why its
+    last write was not confirmed.
     """
 
     def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
@@ -58,6 +59,7 @@ class FallbackRow:
         self.refreshed = -math.inf
         self.sent = -math.inf
         self.cause: FallbackCause | None = None
+        self.refusal = ''
         self.is_under_way = False
         self.is_held_up = False
         self.stands = False

@@ -37,7 +37,7 @@ class HeartbeatRow:
 
     ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
     one. ``reason`` says why it does not count, empty while it does; ``is_held`` tells that the PLC
-    has to get 0.
+    has to get 0. ``refusal`` says why the last write was not confirmed.
     """
 
     def __init__(self, mapping: Mapping) -> None:
@@ -47,6 +47,7 @@ class HeartbeatRow:
         self.value = 0
         self.confirmed: float | None = None
         self.reason = ''
+        self.refusal = ''
         self.is_held = False
         self.is_under_way = False
         self._period = mapping.period / 1000
@@ -59,9 +60,10 @@ class HeartbeatRow:
     def why_not(self, now: float) -> str:
         """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
         if self.reason or self.confirmed is None:
-            return self.reason or 'the PLC has not confirmed it yet'
+            return self.reason or self.refusal or 'the PLC has not confirmed it yet'
         silent = now - self.confirmed
-        return f'not confirmed for {silent:.1f} s' if silent > 3 * self._period else ''
+        why = f': {self.refusal}' if self.refusal else ''
+        return f'not confirmed for {silent:.1f} s{why}' if silent > 3 * self._period else ''
 
     @property
     def is_at_rest(self) -> bool:

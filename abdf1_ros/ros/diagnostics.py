@@ -140,6 +140,7 @@ class Diagnostics:
             state = 'a message stands' if not row.stands else 'the fallback value stands'
             if row.cause is not None:
                 state = f'the fallback value is due ({row.cause.value})'
+                state += f': {row.refusal}' if row.refusal else ''
             values[row.mapping.tag] = state
         return values
 

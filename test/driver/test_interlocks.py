@@ -426,6 +426,20 @@ def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
     assert len([result for result in cell.results() if result.startswith('fallback')]) == 2
 
 
+def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
+    cell = Cell(beat_row(), speed_row())
+    cell.refused = {'N7:0', 'N10:0'}
+    cell.run(5.0)
+    reasons = cell.bench.listener.reasons
+    assert sorted(address for address, _ in reasons) == ['N10:0', 'N7:0']
+    assert all(reason.startswith('not written: STS 10: ') for _, reason in reasons)
+    interlocks = cell.bench.driver.interlocks
+    assert interlocks.fallbacks[0].refusal.startswith('STS 10: ')
+    cell.refused = set()
+    cell.run(2.0)
+    assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
+
+
 def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
     bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
     cell = Cell(beat_row(period=200), bit, read)
