@@ -155,6 +155,7 @@ class BridgeNode(Node):
         self._wrong_types: list[str] = []
         self._deaf_stations: list[int] = []
         self._has_told_tools = False
+        self._may_have_left_over: set[int | None] = set()
         # Every node has this service under this name.
         service = f'{self.get_fully_qualified_name()}/get_parameters'
         self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
@@ -325,11 +326,25 @@ class BridgeNode(Node):
 
     def happened(self, event: Event) -> None:
         """Log a numbered event and remember it for the diagnostics."""
+        if self._may_have_left_over and self._is_left_over(event):
+            self._lines.info(
+                f'station {event.station}', f'station {event.station}: a reply to a command from '
+                'before the port was opened is dropped')
+            return
         self._diagnostics.happened(event, line_time())
         is_change = event.message is Message.ERR_INACTIVE_STATION \
             and event.station in self.driver.stations
         if not is_change:  # that is logged by station_changed
             self._log.add(event)
+
+    def _is_left_over(self, event: Event) -> bool:
+        """Tell whether a station gives us, first of all, what it had ready for an earlier run."""
+        is_wrong = event.message is Message.ERR_WRONG_MESSAGE
+        if event.station not in self._may_have_left_over or not (
+                is_wrong or event.message is Message.NTC_REPLY_MSG_RCVD):
+            return False
+        self._may_have_left_over.discard(event.station)
+        return is_wrong
 
     def station_changed(self, station: Station) -> None:
         """Publish the Active Node Table and log the change."""
@@ -364,6 +379,7 @@ class BridgeNode(Node):
         if state.text == self._port_text:
             return  # an attempt that failed like the one before
         self._port_text = state.text
+        self._may_have_left_over = {station.number for station in self.driver.stations}
         self._publish_active()
         is_meant = state.is_open or self.link.is_released
         tell = self._lines.info if is_meant else self._lines.error

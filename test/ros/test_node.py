@@ -27,6 +27,7 @@ from typing import Any
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.writes import MAX_WAITING_WRITES
+from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
@@ -303,6 +304,20 @@ def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
     publish(*8 * [1])
     assert bench.until_results(1)[0].message == 'written'
     assert bench.words('B3:1') == [255]
+
+
+def test_reply_to_a_command_of_an_earlier_run_is_no_error(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(SPEED)
+    left_over = Event(Message.ERR_WRONG_MESSAGE, (1, 0, 7), 1)
+    bench.node._may_have_left_over = {1}
+    bench.node.link.stop()  # nothing else comes
+    for _ in range(2):
+        bench.node.happened(left_over)
+    lines = [line.partition('[abdf1]: ')[2]
+             for line in ''.join(capfd.readouterr()).splitlines()]
+    assert 'station 1: a reply to a command from before the port was opened is dropped' in lines
+    assert sum('2510' in line for line in lines) == 1
 
 
 def test_station_with_another_error_code_is_told_once(
