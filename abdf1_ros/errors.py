@@ -44,7 +44,7 @@ class LinkError(Abdf1Error):
 
     def __str__(self) -> str:
         """Return the numbered text."""
-        return self.message.line(*self.args)
+        return self.message.entry(*self.args)
 
 
 class CommandTimeout(LinkError):
@@ -134,7 +134,7 @@ class Problem(Abdf1Error):
 
     def __init__(self, where: Place | str, text: str, message: Message | None = None,
                  args: tuple[Any, ...] = ()) -> None:
-        head = f'{message.line(*args)}; ' if message else ''
+        head = f'{message.entry(*args)}; ' if message else ''
         super().__init__(printable(f'{where}: {head}{text}'))
         self.place = where if isinstance(where, Place) else Place(where)
         self.text = text

@@ -109,7 +109,7 @@ class Message(Enum):
         """
         return self.template.replace('%d', '%s') % args
 
-    def line(self, *args: Any) -> str:
+    def entry(self, *args: Any) -> str:
         """Return number, mnemonic and text, as logs and diagnostics show them."""
         return f'{self.number} {self.name}: {self.text(*args)}'
 
@@ -128,4 +128,4 @@ class Event(NamedTuple):
     def __str__(self) -> str:
         """Return the numbered text, with the station where the text itself does not name it."""
         where = '' if self.station is None else f' [station {self.station}]'
-        return self.message.line(*self.args) + where
+        return self.message.entry(*self.args) + where

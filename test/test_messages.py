@@ -65,7 +65,7 @@ def test_number_place_shows_what_a_user_typed() -> None:
 
 
 def test_line_carries_number_and_mnemonic() -> None:
-    assert Message.ERR_COMMAND_TIMEOUT.line() == '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+    assert Message.ERR_COMMAND_TIMEOUT.entry() == '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
 
 
 def test_event_names_its_station() -> None:

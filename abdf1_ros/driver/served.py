@@ -164,7 +164,7 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
         elif mapping.via == network.station and network.mode == 'Master':
             text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
         if text is not None:
-            where = Place(path, mapping.line)
+            where = Place(path, mapping.file_line)
             found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
     return found
 
@@ -186,7 +186,7 @@ def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: f
               for mapping, text in guard_faults(left, blocks)] or _broken(left)
     while faults:
         for mapping, column, text in faults:
-            where = Place(path, mapping.line, column=column)
+            where = Place(path, mapping.file_line, column=column)
             problems.append(Problem(where, f'Item: {mapping.item}, {text}'))
             left = [other for other in left if other is not mapping]
         faults = _broken(left)

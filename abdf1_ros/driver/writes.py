@@ -176,5 +176,5 @@ class WriteQueue:
         if self._stations.admits_message(station, now):
             return ''
         is_late = self._stations[station].active
-        return (Message.ERR_COMMAND_TIMEOUT.line() if is_late
-                else Message.ERR_INACTIVE_STATION.line(station))
+        return (Message.ERR_COMMAND_TIMEOUT.entry() if is_late
+                else Message.ERR_INACTIVE_STATION.entry(station))

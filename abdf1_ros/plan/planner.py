@@ -123,7 +123,7 @@ class Planner:
     """
 
     def __init__(self, line: LineModel, default_period: float) -> None:
-        self.line = line
+        self.line_model = line
         self.processors: dict[int, Processor] = {}
         self._default_period = default_period
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
@@ -227,11 +227,11 @@ class Planner:
         start, per_element = example.address.at_offset(0), _per_element(example)
         costs = [0.0] * (self._max_words(example) + 1)
         for words in {1, *range(per_element, len(costs), per_element)}:
-            costs[words] = self.line.read_time(example.dialect, ReadRequest(start, words))
+            costs[words] = self.line_model.read_time(example.dialect, ReadRequest(start, words))
         value = next((place for place in map(start.at_offset, range(per_element))
                       if place.is_value(2)), None)
         if value is not None:  # a float32 within a structure is read by itself
-            costs[2] = self.line.read_time(example.dialect, ReadRequest(value, 2))
+            costs[2] = self.line_model.read_time(example.dialect, ReadRequest(value, 2))
         return costs
 
     def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
@@ -243,7 +243,7 @@ class Planner:
         requests = tuple(
             ReadRequest(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))
-        line_time = sum(self.line.read_time(first.dialect, request, first.station)
+        line_time = sum(self.line_model.read_time(first.dialect, request, first.station)
                         for request in requests)
         period = min(map(self._period, mappings))
         return Block(first.station, requests, tuple(mappings), period, line_time)

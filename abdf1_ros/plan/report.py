@@ -165,9 +165,9 @@ def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
                   if mapping.shares_words(other)}
         if others:
             yield Remark(RemarkKind.SETTING, (
-                f'line {mapping.line} of the map: {mapping.tag} writes {mapping.address}, which '
-                f'{_tags(tuple(others.values()))} reads, so a message sets what the PLC is to '
-                'tell; ReadWrite in one row if that is meant, otherwise another address'),
+                f'line {mapping.file_line} of the map: {mapping.tag} writes {mapping.address}, '
+                f'which {_tags(tuple(others.values()))} reads, so a message sets what the PLC is '
+                'to tell; ReadWrite in one row if that is meant, otherwise another address'),
                 mapping.station)
 
 

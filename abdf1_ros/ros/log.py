@@ -43,7 +43,7 @@ _REMINDER = 600.0
 MOST_CAUSES = 1000
 
 # Entries about one subject in a minute.
-MOST_LINES = 10
+MOST_ENTRIES = 10
 _MINUTE = 60.0
 
 # Events of every transaction, and those that come with another event that is logged.
@@ -56,12 +56,12 @@ _ROUTINE = (
 class _Subject:
     """A subject: when (s) its latest entries were written, and how many were left out."""
 
-    written: deque[float] = field(default_factory=lambda: deque(maxlen=MOST_LINES))
+    written: deque[float] = field(default_factory=lambda: deque(maxlen=MOST_ENTRIES))
     left_out: int = 0
 
     def has_enough(self, now: float) -> bool:
         """Tell whether this minute has had all its entries."""
-        return len(self.written) == MOST_LINES and now - self.written[0] < _MINUTE
+        return len(self.written) == MOST_ENTRIES and now - self.written[0] < _MINUTE
 
 
 @dataclass(slots=True)
@@ -135,9 +135,9 @@ class EventLog:
                 cause.is_news = True
 
 
-class LineLog:
+class LimitedLog:
     """
-    Write entries to ``logger``, at most ``MOST_LINES`` a minute about one subject.
+    Write entries to ``logger``, at most ``MOST_ENTRIES`` a minute about one subject.
 
     ``about`` names the subject; use only names of the configuration, whose number is limited.
     ``clock`` gives seconds.

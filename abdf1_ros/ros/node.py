@@ -50,7 +50,7 @@ from abdf1_ros.ros.diagnostics import (
     speed_seen,
 )
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
-from abdf1_ros.ros.log import EventLog, LineLog
+from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
 from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
 from abdf1_ros.ros.process import (
@@ -143,7 +143,7 @@ class BridgeNode(Node):
     def _set_up(self, configuration: Configuration, has_timer: bool) -> None:
         self._tell(configuration)
         self._log = EventLog(self.get_logger(), line_time)
-        self._lines = LineLog(self.get_logger(), line_time)
+        self._notes = LimitedLog(self.get_logger(), line_time)
         # All writes that wait can end at once, faster than a subscriber takes their results.
         self._results = self.create_publisher(
             DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES)
@@ -170,7 +170,7 @@ class BridgeNode(Node):
             self._opener.trace(
                 parameters.trace_file, parameters.trace_limit * 1e6,
                 {'check': network.checksum.value, 'duplex': network.duplex.name.lower()},
-                lambda text: self._lines.error('trace_file', f'trace_file: {text}'))
+                lambda text: self._notes.error('trace_file', f'trace_file: {text}'))
         self.driver, self._reads = self._make_driver(None)
         self.link = LinkThread(
             self.driver.machine, self._opener.open, on_state=self._port_changed,
@@ -299,13 +299,13 @@ class BridgeNode(Node):
 
     def _lost(self, topic: str, count: int) -> None:
         self._diagnostics.lost(topic, count, line_time())
-        self._lines.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
+        self._notes.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
                             'lost on their way here, and have no result: they come faster than '
                             'they can be taken')
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Log why a read of a station that answers has no value."""
-        self._lines.error(mapping.tag, f'{mapping.tag} ({mapping.address} at station '
+        self._notes.error(mapping.tag, f'{mapping.tag} ({mapping.address} at station '
                                        f'{mapping.station}): {reason}')
 
     def written(self, result: WriteResult) -> None:
@@ -314,7 +314,7 @@ class BridgeNode(Node):
         mapping = result.mapping
         level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
         if level == DiagnosticStatus.ERROR or result.outcome is Outcome.FALLBACK:
-            tell = self._lines.info if is_usual_fallback(result) else self._lines.warning
+            tell = self._notes.info if is_usual_fallback(result) else self._notes.warning
             tell(f'writes to {mapping.tag}', f'write to {mapping.tag} {result.value}: {result}')
         values = {'address': str(mapping.address), 'station': str(mapping.station),
                   'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}',
@@ -327,7 +327,7 @@ class BridgeNode(Node):
     def happened(self, event: Event) -> None:
         """Log a numbered event and remember it for the diagnostics."""
         if self._may_have_left_over and self._is_left_over(event):
-            self._lines.info(
+            self._notes.info(
                 f'station {event.station}', f'station {event.station}: a reply to a command from '
                 'before the port was opened is dropped')
             return
@@ -354,9 +354,9 @@ class BridgeNode(Node):
         self._log.forget(station.number)
         about = f'station {station.number}'
         if station.active:
-            self._lines.info(about, f'{about} answers again')
+            self._notes.info(about, f'{about} answers again')
         else:
-            self._lines.error(about, Message.ERR_INACTIVE_STATION.line(station.number))
+            self._notes.error(about, Message.ERR_INACTIVE_STATION.entry(station.number))
             if station.last_heard is None:
                 self._tell_tools(about)
 
@@ -382,7 +382,7 @@ class BridgeNode(Node):
         self._may_have_left_over = {station.number for station in self.driver.stations}
         self._publish_active()
         is_meant = state.is_open or self.link.is_released
-        tell = self._lines.info if is_meant else self._lines.error
+        tell = self._notes.info if is_meant else self._notes.error
         tell('the port', f'{self.port}: {state.text}')
 
     def _fault(self, error: Exception) -> None:
@@ -397,13 +397,13 @@ class BridgeNode(Node):
             self._duplicate_name_came_or_went(self._duplicate_names.has_found)
         self._tell_speed(self.driver.machine.rate.seen)
         for text in self._type_watch.look(now):
-            self._lines.warning('types of topics', text)
+            self._notes.warning('types of topics', text)
         if self._interlocks.look(now):
             self._tell_crowd()
         wrong_types = self._diagnostics.wrong_types()
         for text in wrong_types:
             if text not in self._wrong_types:
-                self._lines.warning('types of PLCs', text)
+                self._notes.warning('types of PLCs', text)
         self._wrong_types = wrong_types
         self._tell_deaf_stations(self._diagnostics.deaf_stations(now))
         levels = self._diagnostics.levels(now)
@@ -415,11 +415,11 @@ class BridgeNode(Node):
         """Log once that a station takes no commands, and once that it does again."""
         for number in numbers:
             if number not in self._deaf_stations:
-                self._lines.warning(f'commands to {number}', f'{deaf_text(number)} "plc detect" '
+                self._notes.warning(f'commands to {number}', f'{deaf_text(number)} "plc detect" '
                                     'finds it, with the node stopped')
         for number in self._deaf_stations:
             if number not in numbers and self.driver.stations[number].active:
-                self._lines.info(f'commands to {number}', f'station {number} answers commands')
+                self._notes.info(f'commands to {number}', f'station {number} answers commands')
         self._deaf_stations = numbers
 
     def _look_at_files(self, now: float) -> None:
@@ -429,14 +429,14 @@ class BridgeNode(Node):
         self._next_look = now + _FILE_PERIOD
         names = self._configuration.files.changed()
         if names and not self._diagnostics.changed_files:
-            self._lines.warning('the files', changed_text(names))
+            self._notes.warning('the files', changed_text(names))
         self._diagnostics.changed_files = names
 
     def _tell_crowd(self) -> None:
         """Warn of topics with a Fallback that more than one publisher feeds (rule 17)."""
         self._diagnostics.crowded = self._interlocks.crowded
         for topic in self._interlocks.crowded:
-            self._lines.warning(f'publishers of {topic}', (
+            self._notes.warning(f'publishers of {topic}', (
                 f'~/write/{topic} has more than one publisher: its fallback value is not written '
                 'while any of them goes on (a forgotten "ros2 topic pub -r"?)'))
 
@@ -449,19 +449,19 @@ class BridgeNode(Node):
         text = f'{self.port}: Baud is {self.driver.network.baud}, ' \
                f'but the line shows {speed_seen(self.driver, self.port)}'
         if seen > 1:
-            self._lines.info('the speed', text)
+            self._notes.info('the speed', text)
         else:
-            self._lines.warning('the speed', f'{text}: time-outs begin before frames have left')
+            self._notes.warning('the speed', f'{text}: time-outs begin before frames have left')
 
     def _duplicate_name_came_or_went(self, is_there: bool) -> None:
         self._diagnostics.has_duplicate_name = is_there
         name = self.get_fully_qualified_name()
         if is_there:
-            self._lines.warning(
+            self._notes.warning(
                 'the name', f'another node is called {name} too: both publish and take the same '
                             'topics; give one another name, as in -r __node:=line_2')
         else:
-            self._lines.info('the name', f'no other node is called {name} any more')
+            self._notes.info('the name', f'no other node is called {name} any more')
 
     def _publish_diagnostics(self, now: float) -> None:
         self._next_diagnostics = now + self._configuration.parameters.diagnostics_period

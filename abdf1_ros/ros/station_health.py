@@ -61,7 +61,8 @@ def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping],
         else:
             continue
         article = 'an' if identity.model.startswith('SLC') else 'a'
-        return f'station {station} is {article} {identity.model}, {file}:{row.line} says {said}'
+        return (f'station {station} is {article} {identity.model}, '
+                f'{file}:{row.file_line} says {said}')
     return None
 
 

@@ -139,8 +139,9 @@ class _Clashes:
         faults: list[CellFault] = []
 
         def clash(column: str, other: Mapping, text: str) -> None:
-            faults.append(CellFault(column, f'{text} of item {other.item} (line {other.line}, tag '
-                                            f'"{shown(other.tag)}")'))
+            faults.append(CellFault(column, (
+                f'{text} of item {other.item} (line {other.file_line}, tag '
+                f'"{shown(other.tag)}")')))
 
         if other := self._names.get(mapping.name):
             same = 'is already the tag' if mapping.tag == other.tag \

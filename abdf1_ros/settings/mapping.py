@@ -74,7 +74,7 @@ class Mapping:
     """
     One checked row.
 
-    ``item`` counts data rows from 1, ``line`` lines of the file. ``name`` is the tag and
+    ``item`` counts data rows from 1, ``file_line`` lines of the file. ``name`` is the tag and
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
@@ -85,7 +85,7 @@ class Mapping:
     """
 
     item: int
-    line: int
+    file_line: int
     tag: str
     name: str
     command: Command

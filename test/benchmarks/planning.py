@@ -121,7 +121,7 @@ class Search:
         self._element = example.address.layout.words
         self._limit = example.dialect.max_read(example.address.file_type)
         start = example.address.at_offset(0)
-        self._costs = {words: planner.line.read_time(
+        self._costs = {words: planner.line_model.read_time(
             example.dialect, ReadRequest(start, words), example.station)
             for words in {1, *range(self._element, self._limit + 1, self._element)}}
         self._needed: dict[Span, float] = {}

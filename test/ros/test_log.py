@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.ros.log import EventLog, LineLog, MOST_CAUSES, MOST_LINES
+from abdf1_ros.ros.log import EventLog, LimitedLog, MOST_CAUSES, MOST_ENTRIES
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
 from support.clock import Clock
@@ -137,7 +137,7 @@ def test_station_that_comes_and_goes_does_not_fill_the_log(
         log.forget(2)
         log.add(event(Message.NTC_NAK_LIMIT_EXCEEDED))
         clock.now += 1.0
-    assert len(logged()) == MOST_LINES
+    assert len(logged()) == MOST_ENTRIES
     log.add(event(Message.NTC_NAK_LIMIT_EXCEEDED))
     ((_, text),) = logged()
     assert text.endswith('[station 2] (50 more like it were not logged)')
@@ -195,12 +195,12 @@ def test_forged_senders_neither_fill_the_memory_nor_the_log(
 
 
 @pytest.fixture
-def lines(clock: Clock) -> LineLog:
-    return LineLog(get_logger('log_test'), clock)
+def lines(clock: Clock) -> LimitedLog:
+    return LimitedLog(get_logger('log_test'), clock)
 
 
 def test_lines_have_the_level_they_are_given(
-        lines: LineLog, logged: Callable[[], Lines]) -> None:
+        lines: LimitedLog, logged: Callable[[], Lines]) -> None:
     lines.info('a', 'one')
     lines.warning('a', 'two')
     lines.error('a', 'three')
@@ -209,7 +209,7 @@ def test_lines_have_the_level_they_are_given(
 
 @pytest.mark.parametrize('level', ['info', 'warning', 'error'])
 def test_line_cannot_pass_for_another(
-        lines: LineLog, logged: Callable[[], Lines], level: str) -> None:
+        lines: LimitedLog, logged: Callable[[], Lines], level: str) -> None:
     forged = 'tag\n[FATAL] [1.0] [log_test]: \x1b[31mall is lost\u2028'
     getattr(lines, level)('a', forged)
     ((_, text),) = logged()
@@ -218,14 +218,14 @@ def test_line_cannot_pass_for_another(
 
 @pytest.mark.parametrize('level', ['info', 'warning', 'error'])
 def test_only_a_few_lines_a_minute_are_about_one_thing(
-        lines: LineLog, clock: Clock, logged: Callable[[], Lines], level: str) -> None:
+        lines: LimitedLog, clock: Clock, logged: Callable[[], Lines], level: str) -> None:
     write = getattr(lines, level)
-    for number in range(MOST_LINES + 5):
+    for number in range(MOST_ENTRIES + 5):
         write('one\n', str(number))
         clock.now += 1.0
     write('other', 'word')
-    assert [text for _, text in logged()] == [*map(str, range(MOST_LINES)), 'word']
-    clock.now += 60.0 - MOST_LINES - 5
+    assert [text for _, text in logged()] == [*map(str, range(MOST_ENTRIES)), 'word']
+    clock.now += 60.0 - MOST_ENTRIES - 5
     write('one\n', 'first again')
     write('one\n', 'next')
     clock.now += 1.0

@@ -34,7 +34,7 @@ from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.ros.diagnostics import Diagnostics
-from abdf1_ros.ros.log import EventLog, LineLog
+from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import Values
@@ -81,7 +81,7 @@ class Ear:
         self.diagnostics: Diagnostics | None = None
         self._clock = clock
         self._event_log = EventLog(self.log, clock)  # type: ignore[arg-type]
-        self._lines = LineLog(self.log, clock)  # type: ignore[arg-type]
+        self._lines = LimitedLog(self.log, clock)  # type: ignore[arg-type]
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Count a value."""
