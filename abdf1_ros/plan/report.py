@@ -117,9 +117,14 @@ class Report:
         found = list(interlocks.costs(
             self.network, self.mappings, self.default_period, self.response_time))
         bits = [mapping for mapping in self.mappings if mapping.command is Command.READ
-                and mapping.type is ValueType.BOOL and mapping.publish_while is None]
-        if bits:
-            found.append(f'bits without Publish_While: {_tags(bits)}; their values go on when the '
+                and mapping.type is ValueType.BOOL]
+        silent = [mapping for mapping in bits if mapping.publish is Publish.CHANGE]
+        if silent:
+            found.append(f'bits with Publish Change: {_tags(silent)}; their topics promise '
+                         'nothing, so a subscriber with a deadline gets no values')
+        free = [mapping for mapping in bits if mapping.publish_while is None]
+        if free:
+            found.append(f'bits without Publish_While: {_tags(free)}; their values go on when the '
                          'program of the PLC stops')
         return found
 
