@@ -22,11 +22,12 @@ from pathlib import Path
 from hypothesis import HealthCheck, settings
 import pytest
 
-# Files that wait for other processes, the longest first. Tests that only compute come after them:
-# several workers then share the processors better, and end together.
+# Files that wait for other processes, the longest first. Tests that only compute come after them,
+# also the longest first: several workers then share the processors better, and end together.
 _FIRST = (
     'ros/test_process.py', 'faults/', 'cli/monitor/', 'examples/', 'ros/', 'test_docs', 'test_',
-    'cli/')
+    'cli/', 'noise/', 'df1/test_multidrop_line.py', 'soak/', 'df1/test_peer_line.py', 'driver/',
+    'df1/', 'fuzz/')
 
 _HERE = Path(__file__).parent
 
