@@ -277,6 +277,7 @@ def test_internal_error_at_the_start_of_a_line(
 
 def test_line_that_ends_slowly_does_not_hold_up_the_others(
         plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
     def stop(node: BridgeNode, patience: Any) -> None:
@@ -352,9 +353,8 @@ def test_one_name_for_all_lines_is_refused(
     ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
     ('line:=[a]', 'there is no such parameter; did you mean lines?')])
 def test_options_that_cannot_be_meant(
-        plant: Plant, option: str, text: str, handlers: dict[int, Callable[..., None]],
+        tmp_path: Path, option: str, text: str, handlers: dict[int, Callable[..., None]],
         capfd: pytest.CaptureFixture[str]) -> None:
-    plant.start('-p', option)
-    plant._thread.join(PATIENCE)
-    assert plant.end(handlers) == 2
+    path = yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')
+    assert main(['lines', '--ros-args', '--params-file', path, '-p', option]) == 2
     assert text in capfd.readouterr().err
