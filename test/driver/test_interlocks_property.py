@@ -161,6 +161,8 @@ class World:
                 rates = [self.dice.choice([0.0, 0.2, 0.9, 4.0]) for _ in range(2)]
                 until = self.line.now + self.dice.uniform(1.0, 4.0)
                 self._trouble()
+                if self.refuses_messages:  # long enough to see who keeps an output alive
+                    rates, until = [0.9, 4.0], until + 2.0
             for turn in range(TURNS):
                 for row, rate in zip(self.rows, rates, strict=True):
                     if turn < rate and self.dice.random() < rate:
@@ -192,9 +194,9 @@ class World:
             self.is_alive = False
         elif what == 7:
             self.plc.processor.setting = Setting.PROGRAM
-        elif what == 8:
+        elif what in (8, 9):
             self.refuses_messages = True
-        elif what == 9:
+        elif what == 10:
             self.swallows_replies = True
 
     @property
