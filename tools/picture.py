@@ -74,7 +74,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog='picture', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('file', type=Path, help='SVG to write')
-    parser.add_argument('title', help='what the first line shows behind "$ "')
+    parser.add_argument('title', help='what the first line shows after "$ "')
     parser.add_argument('command', nargs=argparse.REMAINDER, help='what is run')
     options = parser.parse_args(args)
     done = subprocess.run(options.command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

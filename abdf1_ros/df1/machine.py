@@ -451,7 +451,7 @@ class Machine:
     def _given_out(self, frame: bytes, free: float) -> bytes:
         """Return what goes out at once of a frame; the line is busy until ``free``."""
         if self._outgoing.can_embed and frame in (ACK, NAK):
-            return frame  # behind what is on the line of our message, before the rest of it
+            return frame  # after the portion of our message on the line, before the rest of it
         return self._outgoing.put(frame, free)
 
     def _transmit(self, step: Step) -> None:

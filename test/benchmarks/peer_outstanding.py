@@ -76,7 +76,7 @@ class ThinkingPort:
         return self._port.read(timeout, wake)
 
     def write(self, data: bytes) -> None:
-        """Send the responses, and put the message behind them aside."""
+        """Send the responses, and put the message after them aside."""
         start = data.find(STX)
         start = len(data) if start < 0 or not self._think else start
         if start:

@@ -99,7 +99,7 @@ _OWN = [_Own(plc_type) for plc_type in (PlcType.PLC5, PlcType.SLC)]
 
 
 def one_input(data: bytes) -> None:
-    """Check the reply to a command: CMD, and what stands behind TNS."""
+    """Check the reply to a command: CMD, and what stands after TNS."""
     if not data:
         return
     command = Packet(_STATION, 1, data[0] & ~REPLY_BIT, 0, 0x0102, data[1:MAX_LINK_DATA - 5])

@@ -28,7 +28,7 @@ from support.vectors import pair
 
 
 def parameters(data: bytes, fnc: int) -> Reader:
-    """Return a reader behind the FNC."""
+    """Return a reader after the FNC."""
     reader = Reader(data)
     assert reader.byte() == fnc
     return reader

@@ -56,7 +56,7 @@ def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
 
 def test_help_tells_where_such_a_value_goes(capsys: pytest.CaptureFixture[str]) -> None:
     text = help_of(capsys, 'write')
-    assert 'one such as -1.5e3 goes last, behind all options and --' in text
+    assert 'one such as -1.5e3 goes last, after all options and --' in text
     assert 'plc write F8:2 --station 1 --yes --net net.csv -- -1.5e3' in text
 
 
