@@ -88,6 +88,7 @@ class World:
         self.stood = [0.0, 0.0]  # from when each output's time counts
         self.troubled = 0.0  # when something was wrong last
         self.seen = 0  # results
+        self.swallowed = -math.inf  # when a reply was lost last
         self._values = itertools.count(1)
         self._outputs = parse_address('N7:0', self.plc.table.plc_type)
 
@@ -125,6 +126,7 @@ class World:
                 if before[number] in (SAFE, 0):
                     self.stood[number] = self.published.get(after[number], math.inf)
         if changed and self.swallows_replies and SAFE not in changed:
+            self.swallowed = self.line.now
             reply = dataclasses.replace(reply, tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
 
@@ -217,7 +219,9 @@ class World:
         if not self.is_sound:
             self.troubled = self.line.now
             return
-        bound = AFTER + longest_transaction(self.network) + STEP
+        # Where replies are lost, a message of each row may wait for that of the other.
+        turns = 2 if self.line.now < self.swallowed + 5 * AFTER else 1
+        bound = AFTER + turns * longest_transaction(self.network) + STEP
         if self.line.now < self.troubled + bound:
             return
         for number, value in enumerate(self.words()[:2]):
