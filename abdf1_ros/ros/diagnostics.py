@@ -16,31 +16,26 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from statistics import fmean
 
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.fallbacks import FallbackCause
-from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, WriteResult
+from abdf1_ros.driver.points import Freshness, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
-from abdf1_ros.ports.serial_device import is_pseudo_terminal
+from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
+from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
+from abdf1_ros.ros.write_log import WriteLog
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 _WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR'}
-
-# How long a failed write keeps its status at WARN, in seconds.
-_WRITE_MEMORY = 10.0
 
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
@@ -48,20 +43,12 @@ _LONGEST_UNPOLLED = 5.0
 # A station that takes no commands and has not been heard for so long (s) is silent.
 _HEARD_LATELY = 10.0
 
-# A node that was killed stays visible for up to 20 s, the lease of its DDS participant. A node of
-# our name that is seen in so many looks in a row, a second apart, is not an earlier run of ours.
-_LOOKS_FOR_DUPLICATES = 30
-
 # So many faults of rows that were left out are repeated with every status; check has them all.
 _MOST_LEFT_OUT = 20
-
-_FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
 
 _FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
     Freshness.STALE: ERROR, Freshness.FAILED: ERROR, Freshness.WITHHELD: ERROR}
-
-Judgement = tuple[bytes, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +88,13 @@ class Diagnostics:
         self._port = port
         self._link: LinkThread | None = None
         self._port_errors: Callable[[], dict[str, int]] = dict
-        self._last_error: _Moment | None = None
-        self._last_events: dict[int | None, _Moment] = {}
+        self._last_error: Moment | None = None
+        self._last_events: dict[int | None, Moment] = {}
         self.writes = writes or WriteLog()
         self.changed_files: list[str] = []
         self.crowded: tuple[str, ...] = ()
         self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
-        self._rate = _Rate()
+        self._rate = LoadMeter()
         self._sections = [
             Section('link', port, self._judge_link, self._link_values),
             Section('counters', port, self._judge_counters, lambda now: self._counters()),
@@ -225,14 +212,14 @@ class Diagnostics:
             'speed seen': speed_seen(self._driver, self._port),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
-            'poll cycle': _milliseconds(self._driver.poll_cycle),
-            'longest poll cycle': _milliseconds(self._driver.longest_poll_cycle),
-            'expected poll cycle': _milliseconds(self._driver.expected_poll_cycle),
-            **_periods(self._driver.points.values()),
-            **_poll_scans(self._driver),
+            'poll cycle': milliseconds(self._driver.poll_cycle),
+            'longest poll cycle': milliseconds(self._driver.longest_poll_cycle),
+            'expected poll cycle': milliseconds(self._driver.expected_poll_cycle),
+            **paces(self._driver.points.values()),
+            **poll_scans(self._driver),
             **{name: str(count) for name, count in self._port_errors().items()},
             'files': changed_text(self.changed_files) or 'as read',
-            'last error': _with_age(self._last_error, now),
+            'last error': with_age(self._last_error, now),
         }
         return values
 
@@ -301,7 +288,7 @@ class Diagnostics:
             'replies': str(station.replies),
             'transactions without reply': str(station.failures),
             'error replies': str(station.remote_errors),
-            'last event': _with_age(self._last_events.get(station.number), now),
+            'last event': with_age(self._last_events.get(station.number), now),
             **health_values(self._driver.health.known(station.number), now),
         }
 
@@ -360,169 +347,6 @@ def deaf_text(station: int) -> str:
 def changed_text(names: Sequence[str]) -> str:
     """Return a text about files that have changed, empty where none has."""
     return f'{", ".join(names)} changed since read; ~/reload takes it' if names else ''
-
-
-_Moment = tuple[Event | str, float]
-"""What has happened, and when (clock value in s)."""
-
-
-def _with_age(moment: _Moment | None, now: float) -> str:
-    """Return the last event, and how long ago it was."""
-    return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
-
-
-class DuplicateNameWatch:
-    """
-    Find out when another node has our name, so that topics and services of both are one.
-
-    ``count`` tells how many nodes of the name there are; ours is one of them.
-    """
-
-    def __init__(self, count: Callable[[], int]) -> None:
-        self.has_found = False
-        self._count = count
-        self._looks = 0
-        self._next_look = 0.0
-
-    def look(self, now: float) -> bool:
-        """Look once a second; return whether ``has_found`` has changed."""
-        if now < self._next_look:
-            return False
-        self._next_look = now + 1.0
-        self._looks = self._looks + 1 if self._count() > 1 else 0
-        before, self.has_found = self.has_found, self._looks >= _LOOKS_FOR_DUPLICATES
-        return self.has_found != before
-
-
-def is_usual_fallback(result: WriteResult) -> bool:
-    """Tell whether a fallback value was written for a start or an end, as always."""
-    return result.outcome is Outcome.FALLBACK and \
-        result.detail in (FallbackCause.START.value, FallbackCause.END.value)
-
-
-class WriteLog:
-    """
-    Counts of writes by how they ended.
-
-    Refusals and lost messages are counted in the thread of the requests, all others in that of
-    the link, so no count has two writers.
-    """
-
-    def __init__(self) -> None:
-        self._counts: Counter[Outcome] = Counter()
-        self._lost = 0
-        self._last_loss: tuple[str, float] | None = None
-        self._last_failure: tuple[WriteResult, float] | None = None
-
-    def add(self, result: WriteResult, now: float) -> None:
-        """Count a result."""
-        self._counts[result.outcome] += 1
-        is_good = result.outcome in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED)
-        if not is_good and not is_usual_fallback(result):
-            self._last_failure = result, now
-
-    def lost(self, topic: str, count: int, now: float) -> None:
-        """Count messages that never came."""
-        self._lost += count
-        self._last_loss = f'{count} to ~/write/{topic}', now
-
-    def _messages(self) -> int:
-        """Return the number of results of messages; fallback values do not count."""
-        return self._counts.total() - self._counts[Outcome.FALLBACK]
-
-    def judge(self, now: float) -> Judgement:
-        """Return WARN for a while after a write that was not confirmed, or a lost message."""
-        total = self._messages()
-        summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
-        if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
-            result = self._last_failure[0]
-            return WARN, f'{summary}; {result.mapping.tag} {result}'
-        if self._last_loss and now - self._last_loss[1] < _WRITE_MEMORY:
-            return WARN, f'{summary}; {self._lost} messages were lost on their way here'
-        return OK, summary
-
-    def values(self, now: float) -> dict[str, str]:
-        """Return the counts and the last failure."""
-        counts = self._counts
-        failed = sum(counts[outcome] for outcome in _FAILURES)
-        last = None
-        if self._last_failure is not None:
-            result, when = self._last_failure
-            last = f'{result.mapping.tag} {result}', when
-        return {
-            'accepted': str(self._messages() - counts[Outcome.REFUSED]),
-            'confirmed': str(counts[Outcome.WRITTEN]),
-            'failed': str(failed),
-            'unknown': str(counts[Outcome.UNKNOWN]),
-            'superseded': str(counts[Outcome.SUPERSEDED]),
-            'refused': str(counts[Outcome.REFUSED]),
-            'fallback values': str(counts[Outcome.FALLBACK]),
-            'lost on their way': str(self._lost),
-            'last loss': _with_age(self._last_loss, now),
-            'last failure': _with_age(last, now),
-        }
-
-
-class _Rate:
-    """Transactions a second and line load since the last look."""
-
-    def __init__(self) -> None:
-        self.transactions = 0.0
-        self.load = 0.0
-        self._seen = (line_time(), 0, 0)
-
-    def update(self, driver: Driver, now: float) -> None:
-        before, transactions, characters = self._seen
-        total = driver.counters.chars_sent + driver.counters.chars_received
-        if now > before:
-            self.transactions = (driver.transactions - transactions) / (now - before)
-            on_line = (total - characters) * driver.network.timing.char_time
-            self.load = min(100.0, 100 * on_line / (now - before))
-            self._seen = now, driver.transactions, total
-
-
-def _periods(points: Iterable[ReadPoint]) -> dict[str, str]:
-    """Return how late the reads of each period are; Serve rows do not count."""
-    found: defaultdict[float, list[float]] = defaultdict(list)
-    for point in points:
-        if point.mapping.polls:
-            found[point.period] += [] if point.interval is None else [point.interval]
-    return {f'period {_milliseconds(period)}': _pace(period, found[period])
-            for period in sorted(found)}
-
-
-def _pace(period: float, intervals: Sequence[float]) -> str:
-    wanted = f'wanted {_milliseconds(period)}' if period else 'as often as the line allows'
-    if not intervals:
-        return f'{wanted}, not yet read twice'
-    return f'{wanted}, reads every {_milliseconds(fmean(intervals))}'
-
-
-def _rounded(rate: float) -> int:
-    """Return a rate rounded to two digits."""
-    return int(float(f'{rate:.1e}'))
-
-
-def speed_seen(driver: Driver, port: str) -> str:
-    """Return the measured speed of the line on a port."""
-    if is_pseudo_terminal(port):
-        return 'a pseudo-terminal has none'
-    seen = driver.machine.rate.seen
-    if seen is None:
-        return 'nothing speaks against the set one'
-    return f'{"at least" if seen > 1 else "about"} {_rounded(driver.network.baud * seen)} baud'
-
-
-def _poll_scans(driver: Driver) -> dict[str, str]:
-    """Return last and longest poll cycles of the poll lists, where there are any."""
-    return {
-        f'{name} poll scan': f'last {_milliseconds(times.last)}, '
-                             f'longest {_milliseconds(times.longest)}'
-        for name, times in driver.link.status().scans.items() if times.last is not None}
-
-
-def _milliseconds(seconds: float | None) -> str:
-    return 'unknown' if seconds is None else f'{seconds * 1000:.0f} ms'
 
 
 def _describe(point: ReadPoint, now: float) -> str:

@@ -41,17 +41,12 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.serial_device import is_pseudo_terminal
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import (
-    changed_text,
-    deaf_text,
-    Diagnostics,
-    DuplicateNameWatch,
-    is_usual_fallback,
-    speed_seen,
-)
+from abdf1_ros.ros.diagnostics import changed_text, deaf_text, Diagnostics
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
+from abdf1_ros.ros.line_figures import speed_seen
 from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
+from abdf1_ros.ros.name_watch import DuplicateNameWatch
 from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
 from abdf1_ros.ros.process import (
     EXIT_FAULT,
@@ -63,6 +58,7 @@ from abdf1_ros.ros.process import (
 from abdf1_ros.ros.reads import ReadTopics
 from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.ros.type_watch import TypeWatch
+from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values

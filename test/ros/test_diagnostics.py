@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 import time
@@ -30,7 +30,8 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.ports.link_thread import LinkThread, PortState
-from abdf1_ros.ros.diagnostics import Diagnostics, DuplicateNameWatch, WriteLog
+from abdf1_ros.ros.diagnostics import Diagnostics
+from abdf1_ros.ros.write_log import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
@@ -158,23 +159,6 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
                                         'another node is called line_a too')
     bench.set_port(False, 'gone')
     assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called line_a too')
-
-
-def changes_of(counts: Sequence[int]) -> list[tuple[int, bool]]:
-    """Return when a watch that counts these nodes, one a second, changes its mind."""
-    rest = iter(counts)
-    watch = DuplicateNameWatch(lambda: next(rest))
-    return [(now, watch.has_found) for now in range(len(counts))
-            if any([watch.look(now), watch.look(now + 0.9)])]
-
-
-def test_duplicate_name_is_found_when_it_stays() -> None:
-    assert changes_of([1] * 5 + [2] * 40 + [1] * 5) == [(34, True), (45, False)]
-    assert changes_of([3] * 30) == [(29, True)]
-
-
-def test_earlier_run_that_was_killed_is_not_a_duplicate() -> None:
-    assert changes_of([2] * 25 + [1] + [2] * 25 + [0] + [2] * 29) == []
 
 
 def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:

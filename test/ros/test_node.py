@@ -518,7 +518,7 @@ def test_third_internal_error_ends_the_node_with_status_1(
 def test_duplicate_name_is_told_and_forgotten(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.diagnostics._LOOKS_FOR_DUPLICATES', 1)
+    monkeypatch.setattr('abdf1_ros.ros.name_watch._LOOKS_FOR_DUPLICATES', 1)
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
     other = Node('abdf1', context=observer.context, use_global_arguments=False)

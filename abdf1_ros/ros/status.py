@@ -1,0 +1,38 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the statuses of /diagnostics are made of: levels, and texts of times."""
+
+from __future__ import annotations
+
+from abdf1_ros.messages import Event
+from diagnostic_msgs.msg import DiagnosticStatus
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+Judgement = tuple[bytes, str]
+"""Level and text of a status."""
+
+Moment = tuple[Event | str, float]
+"""What has happened, and when (clock value in s)."""
+
+
+def with_age(moment: Moment | None, now: float) -> str:
+    """Return the last event, and how long ago it was."""
+    return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
+
+
+def milliseconds(seconds: float | None) -> str:
+    """Return a time (s) in whole ms, None as unknown."""
+    return 'unknown' if seconds is None else f'{seconds * 1000:.0f} ms'
