@@ -507,6 +507,7 @@ class BridgeNode(Node):
         self._link_counters.use(driver)
         self._writes.use(driver)
         old_reads.end(reads)
+        reads.complete()
         self._interlocks.use(driver)
         self._type_watch.use(driver.mappings)
         self._log.forget_all()

@@ -63,7 +63,7 @@ class ReadTopics:
     Publish values in the link thread; made and ended in the thread of the executor.
 
     ``open`` has to come before the driver runs; what ``before`` has is used again where it fits.
-    ``end`` closes the rest of that.
+    ``end`` closes the rest of that, then ``complete`` makes what was waiting for it.
     """
 
     def __init__(self, node: Node) -> None:
@@ -71,13 +71,33 @@ class ReadTopics:
         self._at_once = _VALUES_AT_ONCE
         self._later: deque[tuple[Any, Any]] = deque()
         self._topics: dict[str, _ReadTopic] = {}
+        self._to_come: list[tuple[Mapping, ReadPoint]] = []
+        self._kept_back: dict[Mapping, Values] = {}
 
     def open(self, points: MappingType[Mapping, ReadPoint],  # noqa: A003
              before: ReadTopics | None = None) -> None:
         """Have a publisher for each mapping that is read."""
         old = {} if before is None else before._topics
         for mapping, point in points.items():
-            self._topics[mapping.topic] = self._topic(mapping, point, old.get(mapping.topic))
+            earlier = old.get(mapping.topic)
+            # DDS has one type for a topic, so a publisher of another one has to end first.
+            if earlier is not None and earlier.shape[0] is not mapping.message_type:
+                self._to_come.append((mapping, point))
+            else:
+                self._topics[mapping.topic] = self._topic(mapping, point, earlier)
+
+    def complete(self) -> None:
+        """Make the publishers whose topics had another message type before."""
+        for mapping, point in self._to_come:
+            self._topics[mapping.topic] = self._topic(mapping, point, None)
+            self._publish_kept_back(mapping)
+        self._to_come = []
+
+    def _publish_kept_back(self, mapping: Mapping) -> None:
+        values = self._kept_back.pop(mapping, None)
+        if values is not None:
+            topic = self._topics[mapping.topic]
+            topic.publisher.publish(topic.encode(values))
 
     def _topic(self, mapping: Mapping, point: ReadPoint, old: _ReadTopic | None) -> _ReadTopic:
         shape = mapping.message_type, str(mapping.address), mapping.length
@@ -93,8 +113,12 @@ class ReadTopics:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""
-        topic = self._topics[mapping.topic]
-        if self._at_once:
+        topic = self._topics.get(mapping.topic)
+        if topic is None:
+            self._kept_back[mapping] = values
+            if mapping.topic in self._topics:  # it came in this moment
+                self._publish_kept_back(mapping)
+        elif self._at_once:
             self._at_once -= 1
             topic.publisher.publish(topic.encode(values))
         else:

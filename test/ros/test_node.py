@@ -537,7 +537,7 @@ def test_line_that_is_faster_than_baud_says_so_once_unless_it_has_no_speed(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch, has_speed: bool) -> None:
     if has_speed:
-        for module in ('node', 'diagnostics'):
+        for module in ('node', 'line_figures'):
             monkeypatch.setattr(f'abdf1_ros.ros.{module}.is_pseudo_terminal', lambda name: False)
     bench = make_bench(SPEED)
     observer.until(lambda: bench.node.driver.machine.rate.seen is not None, 'the speed')
