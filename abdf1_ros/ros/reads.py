@@ -71,8 +71,8 @@ class ReadTopics:
         self._at_once = _VALUES_AT_ONCE
         self._later: deque[tuple[Any, Any]] = deque()
         self._topics: dict[str, _ReadTopic] = {}
-        self._to_come: list[tuple[Mapping, ReadPoint]] = []
-        self._kept_back: dict[Mapping, Values] = {}
+        self._to_come: dict[str, tuple[Mapping, ReadPoint]] = {}
+        self._kept_back: dict[str, Values] = {}
 
     def open(self, points: MappingType[Mapping, ReadPoint],  # noqa: A003
              before: ReadTopics | None = None) -> None:
@@ -82,21 +82,21 @@ class ReadTopics:
             earlier = old.get(mapping.topic)
             # DDS has one type for a topic, so a publisher of another one has to end first.
             if earlier is not None and earlier.shape[0] is not mapping.message_type:
-                self._to_come.append((mapping, point))
+                self._to_come[mapping.topic] = mapping, point
             else:
                 self._topics[mapping.topic] = self._topic(mapping, point, earlier)
 
     def complete(self) -> None:
         """Make the publishers whose topics had another message type before."""
-        for mapping, point in self._to_come:
-            self._topics[mapping.topic] = self._topic(mapping, point, None)
-            self._publish_kept_back(mapping)
-        self._to_come = []
+        for name, (mapping, point) in [*self._to_come.items()]:
+            self._topics[name] = self._topic(mapping, point, None)
+            del self._to_come[name]
+            self._publish_kept_back(name)
 
-    def _publish_kept_back(self, mapping: Mapping) -> None:
-        values = self._kept_back.pop(mapping, None)
+    def _publish_kept_back(self, name: str) -> None:
+        values = self._kept_back.pop(name, None)
         if values is not None:
-            topic = self._topics[mapping.topic]
+            topic = self._topics[name]
             topic.publisher.publish(topic.encode(values))
 
     def _topic(self, mapping: Mapping, point: ReadPoint, old: _ReadTopic | None) -> _ReadTopic:
@@ -113,12 +113,14 @@ class ReadTopics:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""
-        topic = self._topics.get(mapping.topic)
-        if topic is None:
-            self._kept_back[mapping] = values
-            if mapping.topic in self._topics:  # it came in this moment
-                self._publish_kept_back(mapping)
-        elif self._at_once:
+        name = mapping.topic
+        if name in self._to_come:
+            self._kept_back[name] = values
+            if name not in self._to_come:  # it came in this moment
+                self._publish_kept_back(name)
+            return
+        topic = self._topics[name]
+        if self._at_once:
             self._at_once -= 1
             topic.publisher.publish(topic.encode(values))
         else:
