@@ -14,15 +14,16 @@
 # limitations under the License.
 
 """
-A robot cell that reads one interlock and decides "not permitted" unless it knows better.
+A robot cell that reads interlock bits and decides "not permitted" unless it knows better.
 
 Run it beside the bridge; it prints every change of its decision::
 
-    python3 examples/interlock_consumer.py --topic /abdf1/read/cell_interlocks --bit 0
+    python3 examples/interlock_consumer.py --topic /abdf1/read/cell_interlocks --bits 0,1,2
     ros2 service call /interlock_consumer/reset std_srvs/srv/Trigger
 
-At the start, and whenever values have stopped, a person has to reset. It is not a safety function:
-emergency stops and guards stay hard-wired or safety-rated.
+All bits have to be 1. At the start, and whenever values have stopped, a person has to reset; with
+--latch also after a bit has been 0. It is not a safety function: emergency stops and guards stay
+hard-wired or safety-rated.
 
 Exit status: 0 after Ctrl-C or SIGTERM, 2 for bad arguments.
 """
@@ -30,6 +31,7 @@ Exit status: 0 after Ctrl-C or SIGTERM, 2 for bad arguments.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 import math
 import signal
 import sys
@@ -51,19 +53,25 @@ from std_srvs.srv import Trigger
 
 class InterlockConsumer(Node):
     """
-    Permit motion only while a fresh value says so, and a person has reset since values stopped.
+    Permit motion only while fresh values say so, and a person has reset since values stopped.
 
-    ``patience`` (s) is what the cell can live without a value; it is at least the stale time that
-    the bridge promises (``check`` prints it), or nothing is received at all.
+    All of ``bits`` of the array have to be 1; with ``latches`` a 0 takes a reset as well.
+    ``address`` is where in the PLC the topic has to come from, where that is given. ``patience``
+    (s) is what the cell can live without a value; it is at least the stale time that the bridge
+    promises (``check`` prints it), or nothing is received at all.
     """
 
-    def __init__(self, topic: str, bit: int, patience: float) -> None:
+    def __init__(self, topic: str, bits: Sequence[int], patience: float, *, latches: bool = False,
+                 address: str = '') -> None:
         super().__init__('interlock_consumer')
-        self._bit = bit
+        self._bits = bits
+        self._latches = latches
+        self._address = address
         self._patience = patience
         self._text = ''
         self._is_fresh = False
         self._is_reset = False
+        self._why_not = 'no value yet'  # what the PLC has against it, empty for nothing
         self.permitted = False
         time = Duration(seconds=patience)
         qos = QoSProfile(
@@ -81,19 +89,31 @@ class InterlockConsumer(Node):
         self._start_timer = self.create_timer(
             patience, self._still_silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, '~/reset', self._reset)
-        self._decide(False, 'no value yet')
+        self._decide(False, self._why_not)
 
     def _received(self, message: UInt8MultiArray) -> None:
         self._start_timer.cancel()
         self._is_fresh = True
-        if len(message.data) <= self._bit:
-            self._decide(False, f'the message has no bit {self._bit}; is its Length right?')
-        elif message.data[self._bit] != 1:
-            self._decide(False, 'the PLC does not permit')
+        self._why_not = self._missing_in(message)
+        if self._why_not:
+            self._is_reset = self._is_reset and not self._latches
+            self._decide(False, self._why_not)
         elif not self._is_reset:
             self._decide(False, 'the PLC permits; waiting for a reset')
         else:
             self._decide(True, 'the PLC permits')
+
+    def _missing_in(self, message: UInt8MultiArray) -> str:
+        """Return why a message is not a permit, empty where it is one."""
+        address = message.layout.dim[0].label if message.layout.dim else ''
+        if self._address and address != self._address:
+            return f'the topic comes from {address or "nowhere"}, not from {self._address}'
+        for bit in self._bits:
+            if bit >= len(message.data):
+                return f'the message has no bit {bit}; is its Length right?'
+            if message.data[bit] != 1:
+                return f'bit {bit} is 0'
+        return ''
 
     def _liveliness(self, event: Any) -> None:
         if event.alive_count == 0:
@@ -115,9 +135,13 @@ class InterlockConsumer(Node):
             self._decide(False, 'nothing heard since the start')
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Take the reset of a person, who sees the cell; it counts from the next value on."""
-        response.success = self._is_reset = self._is_fresh
-        response.message = '' if self._is_fresh else f'not reset: {self._text}'
+        """
+        Take the reset of a person, who sees the cell; it counts from the next value on.
+
+        Before all bits are 1 it is refused, or the cell would start later by itself.
+        """
+        response.success = self._is_reset = self._is_fresh and not self._why_not
+        response.message = '' if response.success else f'not reset: {self._text}'
         return response
 
     def _decide(self, permitted: bool, text: str) -> None:
@@ -126,11 +150,11 @@ class InterlockConsumer(Node):
             print(f'{"PERMITTED" if permitted else "not permitted"}: {text}', flush=True)
 
 
-def index(text: str) -> int:
-    """Return an index; Python would take -1 for the last bit."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f'"{text}" should be a whole number from 0')
-    return int(text)
+def indexes(text: str) -> list[int]:
+    """Return indexes; Python would take -1 for the last bit."""
+    if not all(part.isdecimal() for part in text.split(',')):
+        raise argparse.ArgumentTypeError(f'"{text}" should be whole numbers from 0, as in 0,1,2')
+    return [int(part) for part in text.split(',')]
 
 
 def seconds(text: str) -> float:
@@ -149,7 +173,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--topic', default='/abdf1/read/cell_interlocks')
-    parser.add_argument('--bit', type=index, default=0, help='index in the array, from 0')
+    parser.add_argument('--bits', type=indexes, default=[0],
+                        help='indexes in the array, from 0, as in 0,1,2')
+    parser.add_argument('--address', default='', help='where the topic has to come from: B3:0/0')
+    parser.add_argument('--latch', action='store_true',
+                        help='a person has to reset also after a bit has been 0')
     parser.add_argument('--patience', type=seconds, default=2.0,
                         help='seconds without a value after which motion is not permitted')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
@@ -159,7 +187,8 @@ def main() -> int:
         signal.signal(number, lambda *_: ended.set())
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = InterlockConsumer(options.topic, options.bit, options.patience)
+        node = InterlockConsumer(options.topic, options.bits, options.patience,
+                                 latches=options.latch, address=options.address)
     except InvalidTopicNameException as error:
         parser.error(' '.join(str(error).split()))
     while not ended.is_set():

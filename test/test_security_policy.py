@@ -162,7 +162,7 @@ def test_consumer_can_do_what_the_example_does() -> None:
     spec.loader.exec_module(example)
     rclpy.init(args=[])
     try:
-        node = example.InterlockConsumer('/abdf1/read/cell_interlocks', 0, 2.0)
+        node = example.InterlockConsumer('/abdf1/read/cell_interlocks', [0], 2.0)
         for what, kind, qualifier in (
                 ('publisher', 'topics', 'publish'), ('subscriber', 'topics', 'subscribe'),
                 ('service', 'services', 'reply'), ('client', 'services', 'request')):

@@ -105,8 +105,10 @@ def _ending_quietly(status: int = 0) -> Iterator[None]:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith('abdf1_ros'):
             raise
-        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; '
-              'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?', file=sys.stderr)
+        cure = '"pip install pyserial", or "make setup" in a checkout' if error.name == 'serial' \
+            else 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'
+        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; {cure}',
+              file=sys.stderr)
         sys.exit(_NOT_INSTALLED)
     for number, handler in usual.items():
         signal.signal(number, handler)

@@ -17,21 +17,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import importlib.util
 from pathlib import Path
 import signal
 
 import pytest
+import rclpy
+from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 from std_srvs.srv import Trigger
 from support.ros import Observer, Process, write_csv
 from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files
 
 EXAMPLE = SOURCE / 'examples' / 'interlock_consumer.py'
+_SPEC = importlib.util.spec_from_file_location('interlock_consumer', EXAMPLE)
+assert _SPEC is not None and _SPEC.loader is not None
+EXAMPLE_MODULE = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(EXAMPLE_MODULE)
 PATIENCE_ARGUMENTS = ('--patience', '1.5')
 
 PERMITTED = 'PERMITTED: the PLC permits'
 WAITING = 'not permitted: the PLC permits; waiting for a reset'
-REFUSED = 'not permitted: the PLC does not permit'
+REFUSED = 'not permitted: bit 1 is 0'
 STARTING = 'not permitted: no value yet'
 SILENT = 'not permitted: nothing heard since the start'
 STOPPED = 'not permitted: values have stopped'
@@ -48,8 +55,8 @@ def simulator(files: Files) -> Iterator[Process]:
         yield simulator
 
 
-def consumer(topic: str, bit: int, name: str = 'cell', *more: str) -> Process:
-    return Process(EXAMPLE, '--topic', topic, '--bit', str(bit), *PATIENCE_ARGUMENTS,
+def consumer(topic: str, bits: str = '0', name: str = 'cell', *more: str) -> Process:
+    return Process(EXAMPLE, '--topic', topic, '--bits', bits, *PATIENCE_ARGUMENTS,
                    '--ros-args', '-r', f'__node:={name}', *more)
 
 
@@ -61,7 +68,7 @@ def reset(observer: Observer, name: str = 'cell') -> tuple[bool, str]:
 # A simulation's clock that does not run holds up nothing.
 @pytest.mark.parametrize('more', [(), ('-p', 'use_sim_time:=true')])
 def test_nothing_is_permitted_while_there_is_no_bridge(more: tuple[str, ...]) -> None:
-    with Observer() as observer, consumer('/nobody/read/bits', 0, 'cell', *more) as cell:
+    with Observer() as observer, consumer('/nobody/read/bits', '0', 'cell', *more) as cell:
         cell.wait_for(SILENT)
         assert reset(observer) == (False, 'not reset: nothing heard since the start')
         cell.end(signal.SIGTERM)
@@ -71,20 +78,47 @@ def test_nothing_is_permitted_while_there_is_no_bridge(more: tuple[str, ...]) ->
 def test_bit_of_the_plc_decides(files: Files, simulator: Process) -> None:
     with Observer() as observer, \
             Process('node', *files.args(), '-r', '__node:=deciding') as node, \
-            consumer('/deciding/read/bits', 0, 'set') as set_bit, \
-            consumer('/deciding/read/bits', 1, 'clear') as clear_bit, \
-            consumer('/deciding/read/bits', 6, 'beyond') as beyond:
+            consumer('/deciding/read/bits', '0', 'set') as set_bit, \
+            consumer('/deciding/read/bits', '0,1', 'clear') as clear_bit, \
+            consumer('/deciding/read/bits', '0,6', 'beyond') as beyond:
         set_bit.wait_for(WAITING)
         clear_bit.wait_for(REFUSED)
         beyond.wait_for('not permitted: the message has no bit 6; is its Length right?')
-        for name in ('set', 'clear', 'beyond'):
-            assert reset(observer, name) == (True, '')
+        assert reset(observer, 'clear') == (False, 'not reset: bit 1 is 0')
+        assert not reset(observer, 'beyond')[0]
+        assert reset(observer, 'set') == (True, '')
         set_bit.wait_for(PERMITTED)
         for cell in (set_bit, clear_bit, beyond):
             cell.end()
             assert cell.lines[0] == STARTING
         node.end()
     assert PERMITTED not in clear_bit.lines + beyond.lines
+
+
+def bits_of(*values: int, address: str = 'B3:0/0') -> UInt8MultiArray:
+    dimension = MultiArrayDimension(label=address)
+    return UInt8MultiArray(layout=MultiArrayLayout(dim=[dimension]), data=values)
+
+
+@pytest.mark.parametrize('latches', [False, True])
+def test_permit_comes_back_by_itself_only_where_that_is_wanted(latches: bool) -> None:
+    rclpy.init(args=[])
+    try:
+        cell = EXAMPLE_MODULE.InterlockConsumer(
+            '/nobody/read/bits', [0, 1], 2.0, latches=latches, address='B3:0/0')
+        cell._received(bits_of(1, 1))
+        assert cell._reset(Trigger.Request(), Trigger.Response()).success
+        cell._received(bits_of(1, 1))
+        assert cell.permitted
+        cell._received(bits_of(1, 0))
+        assert not cell.permitted
+        cell._received(bits_of(1, 1, address='B3:20/0'))
+        assert not cell.permitted
+        cell._received(bits_of(1, 1))
+        assert cell.permitted is not latches
+        cell.destroy_node()
+    finally:
+        rclpy.shutdown()
 
 
 # A guarded topic is silent while the program is stopped.
@@ -95,7 +129,7 @@ def test_loss_of_the_plc_takes_the_permit_until_a_person_resets(
               ['bits,Read,B3:0/2,1,PLC5,6,RUN'])
     with Observer() as observer, \
             Process('node', *files.args(), '-r', '__node:=losing') as node, \
-            consumer('/losing/read/bits', 0) as cell:
+            consumer('/losing/read/bits') as cell:
         cell.wait_for(WAITING)
         assert reset(observer) == (True, '')
         cell.wait_for(PERMITTED)
@@ -114,7 +148,7 @@ def test_loss_of_the_plc_takes_the_permit_until_a_person_resets(
 def test_end_of_the_bridge_takes_the_permit(
         files: Files, simulator: Process, number: signal.Signals) -> None:
     with Observer() as observer, Process('node', *files.args(), '-r', '__node:=dying') as node, \
-            consumer('/dying/read/bits', 0) as cell:
+            consumer('/dying/read/bits') as cell:
         cell.wait_for(WAITING)
         reset(observer)
         cell.wait_for(PERMITTED)
@@ -127,7 +161,7 @@ def test_end_of_the_bridge_takes_the_permit(
 
 def test_restart_of_the_bridge_gives_no_permit_back(files: Files, simulator: Process) -> None:
     arguments = (*files.args(), '-r', '__node:=restarted')
-    with Observer() as observer, consumer('/restarted/read/bits', 0) as cell:
+    with Observer() as observer, consumer('/restarted/read/bits') as cell:
         with Process('node', *arguments) as node:
             cell.wait_for(WAITING)
             reset(observer)
@@ -144,7 +178,7 @@ def test_restart_of_the_bridge_gives_no_permit_back(files: Files, simulator: Pro
 def test_bridge_that_does_not_promise_enough_permits_nothing(
         files: Files, simulator: Process) -> None:
     with Process('node', *files.args('stale_after:=30'), '-r', '__node:=slow') as node, \
-            consumer('/slow/read/bits', 0) as cell:
+            consumer('/slow/read/bits') as cell:
         reason = cell.wait_for('not permitted: the bridge does not promise a value every 1.5 s')
         cell.end()
         node.end()
@@ -152,7 +186,7 @@ def test_bridge_that_does_not_promise_enough_permits_nothing(
 
 
 @pytest.mark.parametrize(('args', 'text'), [
-    (('--bit', '-1'), '"-1" should be a whole number from 0'),
+    (('--bits', '0,-1'), '"0,-1" should be whole numbers from 0, as in 0,1,2'),
     (('--patience', '0'), '"0" should be a number of seconds above 0'),
     (('--topic', 'a b'), 'topic name must not contain'),
 ])
