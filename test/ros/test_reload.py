@@ -150,7 +150,7 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
 def test_row_of_another_message_type_has_a_new_topic(bench: Bench) -> None:
     for address, kind, values in (
             ('F8:0', Float32MultiArray, [1.5]), ('N7:1', Int16MultiArray, [8])):
-        bench.write_map(f'speed,Read,{address},1,PLC5,1')
+        bench.write_map(f'speed,ReadWrite,{address},1,PLC5,1')
         assert bench.reload()[0]
         echo = bench.observer.listen(kind, '/abdf1/read/speed')
         assert echo.values(values)
