@@ -173,7 +173,7 @@ def _summary(name: str, found: Findings, report: Report | None) -> str:
     if report is None:
         return '\n'.join(errors)
     text = (f'{printable(name)}: {len(found.mappings)} rows, port '
-            f'{printable(report.network.port)}, scan {report.poll_cycle * 1000:.0f} ms, '
+            f'{printable(report.network.port)}, poll cycle {report.poll_cycle * 1000:.0f} ms, '
             f'load {report.load:.0%}')
     if warnings := len(report.remarks()):
         text += colour(f', {warnings} warning{"s" if warnings > 1 else ""}', YELLOW, sys.stdout)

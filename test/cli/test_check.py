@@ -281,7 +281,7 @@ def test_folder_has_a_line_of_text_for_each_pair(
     assert main([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press']
-    assert lines[0].startswith('glue: 1 rows, port /dev/ttyS0, scan ')
+    assert lines[0].startswith('glue: 1 rows, port /dev/ttyS0, poll cycle ')
 
 
 def test_error_of_one_pair_is_named_and_the_others_are_told(

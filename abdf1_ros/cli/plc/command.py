@@ -331,8 +331,9 @@ def _detect(options: argparse.Namespace) -> int:
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
     settings = found.settings
     whom = f'--station {there.station}' if settings.mode == MODES['half'] else '--peer'
+    parity = '' if network.parity == 'None' else f' --parity {network.parity}'
     print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
-          f'--check {settings.check}')
+          f'--check {settings.check}{parity}')
     print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
     return 0
 
@@ -381,7 +382,7 @@ def _init(options: argparse.Namespace) -> int:
     target.write(network, found, there)
     print(f'written: {target.net}, {target.map}\n'
           'how to go on: write the addresses that you need into map.csv, then\n'
-          f'  {called("plc")} watch S:0 --station {there[0].station} --net {target.net}\n'
+          f'  {called("plc")} watch S:0 --station {found.presence.station} --net {target.net}\n'
           f'  {called("check")} {target.net} {target.map}\n'
           f'  {called("node")} --ros-args -p net_file:={target.net} '
           f'-p map_file:={target.map}')

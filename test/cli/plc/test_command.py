@@ -424,6 +424,8 @@ def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:
         url = process.wait_for('socket://').partition(' on ')[2].partition(',')[0]
         assert call(main, capsys, 'read', 'N7:0', '--port', url).lines == ['N7:0 1200']
+        said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', *FAST)
+    assert said.lines[1].endswith(f'--port {url} --baud 9600 --check CRC --parity Even')
 
 
 def test_lost_port(tmp_path: Path) -> None:

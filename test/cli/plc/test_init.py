@@ -82,6 +82,13 @@ def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) 
     assert load_network(str(tmp_path / 'net.csv')).station != 5
 
 
+def test_plc_that_falls_silent_after_it_was_found(
+        port: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', lambda *_: [])
+    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200']) == 0
+    assert 'watch S:0 --station 1 --net' in capsys.readouterr().out
+
+
 def test_init_leaves_files_alone_that_are_there(
         port: str, tmp_path: Path, capsys: Output) -> None:
     (tmp_path / 'map.csv').write_text('mine', encoding='utf-8')
