@@ -23,7 +23,7 @@ a line needs 1.3 ms. What goes wrong with one line stays with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import difflib
@@ -38,6 +38,7 @@ from typing import Any
 from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.ros.interlocks import END_LIMIT
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
+from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
     LAST_WRITES,
@@ -135,8 +136,9 @@ class Line:
     is called by one thread.
     """
 
-    def __init__(self, name: LineName) -> None:
+    def __init__(self, name: LineName, port_owners: PortOwners) -> None:
         self.name = name
+        self._port_owners = port_owners
         self.node: BridgeNode | None = None
         self.faults: tuple[str, ...] = ()
         self.restarts = 0
@@ -145,34 +147,24 @@ class Line:
         self._again: float | None = None
         self._logger = get_logger(str(self.name).strip('/').replace('/', '.'))
 
-    @property
-    def port(self) -> str:
-        """Return the port of a line that runs, the same text for all names of a device."""
-        if self.node is None:
-            return ''
-        name = self.node.port
-        return name.lower() if '://' in name else os.path.realpath(name)
-
-    def start(self, others: Iterable[Line]) -> None:
+    def start(self) -> None:
         """Make the node and run it."""
-        self.make(others)
+        self.make()
         self.run()
 
-    def make(self, others: Iterable[Line]) -> None:
-        """Make the node: none with faulty files, or with the port of one of the ``others``."""
+    def make(self) -> None:
+        """Make the node: none with faulty files, or with the port of another line."""
         self.faults = ()
         try:
             self.node = BridgeNode(
                 self.name.name, namespace=self.name.namespace, has_timer=False,
-                parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
+                port_owners=self._port_owners, parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
         except ConfigurationError as error:
             self.faults = tuple(map(str, error.problems))
         except (NameValidationException, RuntimeError, ValueError) as error:
             self.faults = (' '.join(str(error).split()),)
         except Exception as error:  # a bug must not end the other lines
             self._begin_again(error)
-        if self.node is not None:
-            self._take_port(others)
         for fault in self.faults:
             self._logger.fatal(printable(fault))
 
@@ -183,23 +175,14 @@ class Line:
             self._callbacks.start()
             self.node.start()
 
-    def _take_port(self, others: Iterable[Line]) -> None:
-        """Leave a port to the line that has it: two masters on one line disturb each other."""
-        owner = next((line for line in others if line is not self and line.port == self.port),
-                     None)
-        if owner is not None and self.node is not None:
-            self.faults = (f'port: {self.node.port} is the port of {owner.name}',)
-            self.node.destroy_node()
-            self.node = None
-
-    def check(self, others: Iterable[Line]) -> None:
+    def check(self) -> None:
         """Publish what is due; begin again after an internal error."""
         node = self.node
         if node is None:
             is_closing = self._closing is not None and self._closing.is_alive()
             if self._again is not None and time.monotonic() >= self._again and not is_closing:
                 self._again = None
-                self.start(others)
+                self.start()
         elif node.link.has_failed:
             self._begin_again(node.link.state.text)
         elif self._callbacks is not None and self._callbacks.error is not None:
@@ -317,7 +300,8 @@ class Lines:
     """All lines, from their start to their end."""
 
     def __init__(self, names: Sequence[LineName], node: LinesNode) -> None:
-        self.lines = [Line(name) for name in names]
+        port_owners = PortOwners()
+        self.lines = [Line(name, port_owners) for name in names]
         self._node = node
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
@@ -333,7 +317,7 @@ class Lines:
         for line in self.lines:
             if is_ended():
                 return
-            line.make(self.lines)
+            line.make()
         for line in self.lines:
             line.run()
 
@@ -346,12 +330,12 @@ class Lines:
         now = time.monotonic()
         self._executor.spin_once(timeout_sec=0)
         for line in self.lines:
-            line.check(self.lines)
+            line.check()
         if self._node.is_asked_again:
             self._node.is_asked_again = False
             for line in self.lines:
                 if line.faults:
-                    line.start(self.lines)
+                    line.start()
         if now >= self._next_status:
             self._next_status = now + _STATUS_PERIOD
             self._node.publish(self.lines)

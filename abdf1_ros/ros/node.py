@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import threading
 import time
@@ -48,6 +49,7 @@ from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
 from abdf1_ros.ros.name_watch import DuplicateNameWatch
 from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
+from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_FAULT,
     LAST_WRITES,
@@ -125,16 +127,25 @@ class BridgeNode(Node):
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
     ``check`` is to be called every 0.1 s, in any one thread; with ``has_timer`` the executor
-    does it.
+    does it. ``port_owners`` are those of all lines of the process.
     """
 
-    def __init__(self, name: str = NODE_NAME, *, has_timer: bool = True, **kwargs: Any) -> None:
+    def __init__(self, name: str = NODE_NAME, *, has_timer: bool = True,
+                 port_owners: PortOwners | None = None, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
+        self._hold_ports = partial(
+            (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
-            self._set_up(configure(self), has_timer)
+            configuration = configure(self)
+            self._hold_ports(configuration.port)
+            self._set_up(configuration, has_timer)
         except Exception:  # other lines of this process go on
             self.destroy_node()
             raise
+
+    def destroy_node(self) -> None:
+        self._hold_ports()
+        super().destroy_node()
 
     def _set_up(self, configuration: Configuration, has_timer: bool) -> None:
         self._tell(configuration)
@@ -472,6 +483,7 @@ class BridgeNode(Node):
         """Use the files as they are now, or go on as before where these have faults."""
         try:
             configuration = read_again(self, self._configuration.parameters)
+            self._hold_ports(self.port, configuration.port)
         except ConfigurationError as error:
             for problem in error.problems:
                 self.get_logger().error(f'{problem} (goes on as before)')
@@ -479,6 +491,7 @@ class BridgeNode(Node):
             response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_REMARKS])
             return response
         response.success = self._go_on_with(configuration)
+        self._hold_ports(self.port)
         response.message = printable(str(configuration))
         if not response.success:
             response.message = 'goes on as before: the link does not take the new files'

@@ -130,7 +130,12 @@ class Plant:
         self._end: Callable[..., None] = lambda *arguments: None
         for name in self.plcs:
             self.write_map(name, 'speed,Read,N7:0,1,PLC5,2')
-            write_csv(folder / f'{name}_net.csv', 'Baud,Timeout', ['115200,100'])
+            self.write_net(name, self.plcs[name].port)
+
+    def write_net(self, name: str, port: str) -> None:
+        """Write the net file of a line."""
+        write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout',
+                  [f'{port},115200,100'])
 
     def write_map(self, name: str, row: str) -> None:
         """Write the map of a line."""
@@ -140,9 +145,9 @@ class Plant:
     def start(self, *arguments: str) -> None:
         """Run the process."""
         text = ''.join(
-            f'/hall/{name}:\n  ros__parameters:\n    port: {plcs.port}\n'
+            f'/hall/{name}:\n  ros__parameters:\n'
             f'    net_file: {self.folder}/{name}_net.csv\n'
-            f'    map_file: {self.folder}/{name}_map.csv\n' for name, plcs in self.plcs.items())
+            f'    map_file: {self.folder}/{name}_map.csv\n' for name in self.plcs)
         given = ['lines', '--ros-args', '--params-file', yaml_file(self.folder, text), *arguments]
         self._thread = threading.Thread(target=lambda: setattr(self, 'status', main(given)))
         self._thread.start()
@@ -200,7 +205,7 @@ def test_each_line_is_a_node_of_its_own(
         plant: Plant, handlers: dict[int, Callable[..., None]]) -> None:
     plant.start()
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
-    assert get_parameters(plant.observer, 'port', node='/hall/b') == [plant.plcs['b'].port]
+    assert get_parameters(plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
     assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
     assert line_status(plant, OK)['running'] == '3'
@@ -227,7 +232,7 @@ def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None
     values = line_status(plant, ERROR)
     assert values['running'] == '2'
     assert values['/hall/b'].startswith(f'{plant.folder}/b_net.csv:2:1 (Baud): Baud = "9601"')
-    (plant.folder / 'b_net.csv').write_text('Baud,Timeout\n115200,100\n')
+    plant.write_net('b', plant.plcs['b'].port)
     plant.write_map('b', 'speed,Read,N7:0,1,PLC5,2')
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
     assert plant.speeds('b') == [7, 8]
@@ -251,10 +256,30 @@ def test_lines_that_are_named_run_alone(plant: Plant) -> None:
 def test_two_lines_on_one_port_are_not_two_masters(plant: Plant) -> None:
     other_name = plant.folder / 'other_name'
     other_name.symlink_to(plant.plcs['a'].port)
-    plant.plcs['b'].port = str(other_name)
+    plant.write_net('b', str(other_name))
     plant.start()
     assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
     assert line_status(plant, ERROR)['/hall/b'] == f'port: {other_name} is the port of /hall/a'
+
+
+def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
+        plant: Plant) -> None:
+    plant.start('-p', 'lines:=[a, b]')
+    assert [plant.speeds(name) for name in 'ab'] == [[7, 8]] * 2
+    taken, free = plant.plcs['a'].port, plant.plcs['c'].port
+
+    plant.write_net('b', taken)
+    response = plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request())
+    assert (response.success, response.message) == (
+        False, f'goes on as before: port: {taken} is the port of /hall/a')
+    assert plant.speeds('b') == [7, 8]
+
+    plant.write_net('b', free)
+    assert plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request()).success
+    plant.write_net('a', plant.plcs['b'].port)
+    assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
+    assert [plant.nodes[name].port for name in 'ab'] == [plant.plcs['b'].port, free]
+    assert [plant.speeds(name) for name in 'ab'] == [[7, 8]] * 2
 
 
 def test_internal_error_at_the_start_of_a_line(
@@ -321,7 +346,7 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
         raise OSError('no answer')
 
     monkeypatch.setattr('socket.getaddrinfo', resolve)
-    plant.plcs['b'].port = 'socket://device.server:4001'
+    plant.write_net('b', 'socket://device.server:4001')
     plant.start()
     assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
     began = time.monotonic()

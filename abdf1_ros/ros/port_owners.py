@@ -1,0 +1,54 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which line of this process has which port."""
+
+from __future__ import annotations
+
+import os
+
+from abdf1_ros.errors import ConfigurationError, Problem
+
+
+class PortOwners:
+    """
+    The ports of all lines: two masters on one line would disturb each other.
+
+    The system refuses a device that is open, but neither the port of a device server nor a device
+    that its line has left for a while.
+    """
+
+    def __init__(self) -> None:
+        self._ports: dict[str, tuple[str, ...]] = {}
+
+    def hold(self, owner: str, *ports: str) -> None:
+        """
+        Let a line have these ports, and no others any more; from any thread.
+
+        Raises ConfigurationError, and leaves all as it was, where another line has one of them.
+        """
+        before = self._ports.get(owner, ())
+        # Ours are entered first, so that of two lines that want a port at once none or one has it.
+        self._ports[owner] = ports
+        for other, held in [*self._ports.items()]:
+            taken = {*map(_device, held)} if other != owner else set()
+            for port in ports:
+                if _device(port) in taken:
+                    self._ports[owner] = before
+                    raise ConfigurationError([Problem('port', f'{port} is the port of {other}')])
+
+
+def _device(port: str) -> str:
+    """Return the same text for all names of a device."""
+    return port.lower() if '://' in port else os.path.realpath(port)
