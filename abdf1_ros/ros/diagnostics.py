@@ -27,6 +27,7 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
+from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
 from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
@@ -87,7 +88,7 @@ class Diagnostics:
         self._driver = driver
         self._port = port
         self._link: LinkThread | None = None
-        self._port_errors: Callable[[], dict[str, int]] = dict
+        self._opener: PortOpener | None = None
         self._last_error: Moment | None = None
         self._last_events: dict[int | None, Moment] = {}
         self.writes = writes or WriteLog()
@@ -131,10 +132,10 @@ class Diagnostics:
             values[row.mapping.tag] = state
         return values
 
-    def attach(self, link: LinkThread, port_errors: Callable[[], dict[str, int]]) -> None:
-        """Set the thread whose port is reported, and the function for the errors of its UART."""
+    def attach(self, link: LinkThread, opener: PortOpener) -> None:
+        """Set the thread whose port is reported, and what opens it."""
         self._link = link
-        self._port_errors = port_errors
+        self._opener = opener
 
     def happened(self, event: Event, now: float) -> None:
         """Remember the last numbered error, and the last thing unusual at each station."""
@@ -205,11 +206,11 @@ class Diagnostics:
 
     def _link_values(self, now: float) -> dict[str, str]:
         state = self._link.state if self._link else None
-        network = self._driver.network
+        opener, network = self._opener, self._driver.network
         values = {
             'port': f'{"open" if state and state.is_open else "closed"}',
             'settings': f'{network.baud} baud, {network.error_code}',
-            'speed seen': speed_seen(self._driver, self._port),
+            'speed seen': speed_seen(self._driver, opener is None or opener.has_speed),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
             'poll cycle': milliseconds(self._driver.poll_cycle),
@@ -217,7 +218,7 @@ class Diagnostics:
             'expected poll cycle': milliseconds(self._driver.expected_poll_cycle),
             **paces(self._driver.points.values()),
             **poll_scans(self._driver),
-            **{name: str(count) for name, count in self._port_errors().items()},
+            **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
             'files': changed_text(self.changed_files) or 'as read',
             'last error': with_age(self._last_error, now),
         }

@@ -23,7 +23,6 @@ from statistics import fmean
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.serial_device import is_pseudo_terminal
 from abdf1_ros.ros.status import milliseconds
 
 
@@ -68,9 +67,9 @@ def _rounded(rate: float) -> int:
     return int(float(f'{rate:.1e}'))
 
 
-def speed_seen(driver: Driver, port: str) -> str:
-    """Return the measured speed of the line on a port."""
-    if is_pseudo_terminal(port):
+def speed_seen(driver: Driver, has_speed: bool) -> str:
+    """Return the measured speed of the line."""
+    if not has_speed:
         return 'a pseudo-terminal has none'
     seen = driver.machine.rate.seen
     if seen is None:

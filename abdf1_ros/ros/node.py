@@ -26,6 +26,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+import random
 import threading
 import time
 from typing import Any
@@ -39,15 +40,14 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
-from abdf1_ros.ports.serial_device import is_pseudo_terminal
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import changed_text, deaf_text, Diagnostics
+from abdf1_ros.ros.graph import DuplicateNameWatch, Graph, TypeWatch
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.line_figures import speed_seen
 from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT, latched_qos
-from abdf1_ros.ros.name_watch import DuplicateNameWatch
 from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
@@ -59,7 +59,6 @@ from abdf1_ros.ros.process import (
 )
 from abdf1_ros.ros.reads import ReadTopics
 from abdf1_ros.ros.station_health import LinkCounterService
-from abdf1_ros.ros.type_watch import TypeWatch
 from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
@@ -127,18 +126,19 @@ class BridgeNode(Node):
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
     ``check`` is to be called every 0.1 s, in any one thread; with ``has_timer`` the executor
-    does it. ``port_owners`` are those of all lines of the process.
+    does it. ``graph`` and ``port_owners`` are those of all lines of the process.
     """
 
     def __init__(self, name: str = NODE_NAME, *, has_timer: bool = True,
-                 port_owners: PortOwners | None = None, **kwargs: Any) -> None:
+                 graph: Graph | None = None, port_owners: PortOwners | None = None,
+                 **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
             configuration = configure(self)
             self._hold_ports(configuration.port)
-            self._set_up(configuration, has_timer)
+            self._set_up(configuration, graph or Graph(self), has_timer)
         except Exception:  # other lines of this process go on
             self.destroy_node()
             raise
@@ -147,7 +147,7 @@ class BridgeNode(Node):
         self._hold_ports()
         super().destroy_node()
 
-    def _set_up(self, configuration: Configuration, has_timer: bool) -> None:
+    def _set_up(self, configuration: Configuration, graph: Graph, has_timer: bool) -> None:
         self._tell(configuration)
         self._log = EventLog(self.get_logger(), line_time)
         self._notes = LimitedLog(self.get_logger(), line_time)
@@ -163,10 +163,11 @@ class BridgeNode(Node):
         self._deaf_stations: list[int] = []
         self._has_told_tools = False
         self._may_have_left_over: set[int | None] = set()
-        # Every node has this service under this name.
-        service = f'{self.get_fully_qualified_name()}/get_parameters'
-        self._duplicate_names = DuplicateNameWatch(lambda: self.count_services(service))
+        self._duplicate_names = DuplicateNameWatch(
+            lambda now: graph.nodes(self.get_name(), self.get_namespace(), now))
         self._next_diagnostics = self._next_look = 0.0
+        # The nodes of a process are not to publish all at the same moment.
+        self._phase = random.uniform(0.0, parameters.diagnostics_period)
         self._levels: list[bytes] = []
         self._port_text = ''
         self._told_speed: float | None = None
@@ -187,7 +188,7 @@ class BridgeNode(Node):
         self._writes.use(self.driver)
         self._interlocks = InterlockWatch(self)
         self._interlocks.use(self.driver)
-        self._type_watch = TypeWatch(self)
+        self._type_watch = TypeWatch(graph, self.resolve_topic_name)
         self._type_watch.use(self.driver.mappings)
         self._link_counters = LinkCounterService(self.driver, self.link, self._wake_executor)
         self._create_services()
@@ -227,7 +228,7 @@ class BridgeNode(Node):
             self.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
             configuration.map_problems, Path(configuration.parameters.map_file).name,
             before.writes if before else None)
-        diagnostics.attach(self.link, self._opener.errors)
+        diagnostics.attach(self.link, self._opener)
         return diagnostics
 
     def _create_services(self) -> None:
@@ -450,11 +451,11 @@ class BridgeNode(Node):
     def _tell_speed(self, seen: float | None) -> None:
         """Log once that the line is faster, or slower, than it is set."""
         if seen is None or self._told_speed is not None and (seen > 1) is (self._told_speed > 1) \
-                or is_pseudo_terminal(self.port):
+                or not self._opener.has_speed:
             return
         self._told_speed = seen
         text = f'{self.port}: Baud is {self.driver.network.baud}, ' \
-               f'but the line shows {speed_seen(self.driver, self.port)}'
+               f'but the line shows {speed_seen(self.driver, has_speed=True)}'
         if seen > 1:
             self._notes.info('the speed', text)
         else:
@@ -471,7 +472,8 @@ class BridgeNode(Node):
             self._notes.info('the name', f'no other node is called {name} any more')
 
     def _publish_diagnostics(self, now: float) -> None:
-        self._next_diagnostics = now + self._configuration.parameters.diagnostics_period
+        period = self._configuration.parameters.diagnostics_period
+        self._next_diagnostics = now + period - (now - self._phase) % period
         message = DiagnosticArray(status=self._diagnostics.statuses(now))
         # Simulated time may still be 0, which would sort before all other messages.
         now_ros = self.get_clock().now()

@@ -30,7 +30,7 @@ class PortOwners:
     """
 
     def __init__(self) -> None:
-        self._ports: dict[str, tuple[str, ...]] = {}
+        self._devices: dict[str, dict[str, str]] = {}
 
     def hold(self, owner: str, *ports: str) -> None:
         """
@@ -38,15 +38,14 @@ class PortOwners:
 
         Raises ConfigurationError, and leaves all as it was, where another line has one of them.
         """
-        before = self._ports.get(owner, ())
+        before, wanted = self._devices.get(owner, {}), {_device(port): port for port in ports}
         # Ours are entered first, so that of two lines that want a port at once none or one has it.
-        self._ports[owner] = ports
-        for other, held in [*self._ports.items()]:
-            taken = {*map(_device, held)} if other != owner else set()
-            for port in ports:
-                if _device(port) in taken:
-                    self._ports[owner] = before
-                    raise ConfigurationError([Problem('port', f'{port} is the port of {other}')])
+        self._devices[owner] = wanted
+        for other, held in [*self._devices.items()]:
+            if other != owner and (taken := wanted.keys() & held.keys()):
+                self._devices[owner] = before
+                raise ConfigurationError([
+                    Problem('port', f'{wanted[taken.pop()]} is the port of {other}')])
 
 
 def _device(port: str) -> str:

@@ -30,6 +30,8 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics import Diagnostics
 from abdf1_ros.ros.write_log import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
@@ -77,8 +79,8 @@ class Bench:
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Listener())
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.diagnostics = Diagnostics('line_a', self.driver, PORT, left_out)
-        self.port_errors: dict[str, int] = {}
-        self.diagnostics.attach(self.link, lambda: self.port_errors)
+        self.opener = PortOpener(PortSettings.of(Network(), PORT))
+        self.diagnostics.attach(self.link, self.opener)
         self.set_port(True, 'open')
 
     def set_port(self, is_open: bool, text: str) -> None:
@@ -195,9 +197,10 @@ def test_last_numbered_error_has_its_age(bench: Bench) -> None:
     assert last_error(NOW + 100) == f'{expected} (100.0 s ago)'  # a notice is no error
 
 
-def test_link_tells_what_the_uart_has_counted(bench: Bench) -> None:
+def test_link_tells_what_the_uart_has_counted(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     assert 'framing errors' not in details(bench.status('link'))
-    bench.port_errors = {'framing errors': 3}
+    monkeypatch.setattr(bench.opener, 'errors', lambda: {'framing errors': 3})
     assert details(bench.status('link'))['framing errors'] == '3'
 
 

@@ -518,7 +518,7 @@ def test_third_internal_error_ends_the_node_with_status_1(
 def test_duplicate_name_is_told_and_forgotten(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.name_watch._LOOKS_FOR_DUPLICATES', 1)
+    monkeypatch.setattr('abdf1_ros.ros.graph._LOOKS_FOR_DUPLICATES', 1)
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
     other = Node('abdf1', context=observer.context, use_global_arguments=False)
@@ -537,8 +537,7 @@ def test_line_that_is_faster_than_baud_says_so_once_unless_it_has_no_speed(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch, has_speed: bool) -> None:
     if has_speed:
-        for module in ('node', 'line_figures'):
-            monkeypatch.setattr(f'abdf1_ros.ros.{module}.is_pseudo_terminal', lambda name: False)
+        monkeypatch.setattr('abdf1_ros.ports.trace.is_pseudo_terminal', lambda name: False)
     bench = make_bench(SPEED)
     observer.until(lambda: bench.node.driver.machine.rate.seen is not None, 'the speed')
     bench.diagnostics.clear()

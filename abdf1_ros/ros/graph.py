@@ -1,0 +1,136 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What other nodes do that concerns ours: they have its name, or its topics with other types.
+
+DDS has no event for either, so the graph is looked at. That costs some microseconds a topic of the
+whole domain, and a process may have a hundred nodes: they share one ``Graph``, which looks for all
+of them, and seldom where a look is long.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from collections.abc import Mapping as MappingType
+from time import thread_time
+from typing import Protocol
+
+from abdf1_ros.settings.mapping import Mapping
+
+_NAMES_PERIOD = 1.0  # s
+
+# Between two looks at topics (s): at least, and as a multiple of the processor time of one.
+_LEAST = 2.0
+_MULTIPLE = 2000
+
+# A node that was killed stays visible for up to 20 s, the lease of its DDS participant. A node of
+# our name that is seen in so many looks in a row, a second apart, is not an earlier run of ours.
+_LOOKS_FOR_DUPLICATES = 30
+
+
+class Seer(Protocol):
+    """What is used of the node that looks."""
+
+    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+        """Return every node of the domain."""
+
+    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Return every topic of the domain with all its types."""
+
+
+class Graph:
+    """The nodes and topics of the domain, as ``seer`` sees them; used by one thread."""
+
+    def __init__(self, seer: Seer) -> None:
+        self._seer = seer
+        self._nodes: Counter[tuple[str, str]] = Counter()
+        self._clashes: dict[str, list[str]] = {}
+        self._next_names = self._next_topics = 0.0
+
+    def nodes(self, name: str, namespace: str, now: float) -> int:
+        """Return how many nodes are called so, at the clock value ``now`` (s)."""
+        if now >= self._next_names:
+            self._next_names = now + _NAMES_PERIOD
+            self._nodes = Counter(self._seer.get_node_names_and_namespaces())
+        return self._nodes[name, namespace]
+
+    def clashes(self, now: float) -> MappingType[str, list[str]]:
+        """Return the topics that have more than one type, the same object until the next look."""
+        if now >= self._next_topics:
+            begun = thread_time()
+            self._clashes = {topic: types for topic, types
+                             in self._seer.get_topic_names_and_types() if len(types) > 1}
+            self._next_topics = now + max(_LEAST, _MULTIPLE * (thread_time() - begun))
+        return self._clashes
+
+
+class DuplicateNameWatch:
+    """
+    Find out when another node has our name, so that topics and services of both are one.
+
+    ``count`` tells how many nodes of the name there are; ours is one of them.
+    """
+
+    def __init__(self, count: Callable[[float], int]) -> None:
+        self.has_found = False
+        self._count = count
+        self._looks = 0
+        self._next_look = 0.0
+
+    def look(self, now: float) -> bool:
+        """Look once a second; return whether ``has_found`` has changed."""
+        if now < self._next_look:
+            return False
+        self._next_look = now + _NAMES_PERIOD
+        self._looks = self._looks + 1 if self._count(now) > 1 else 0
+        before, self.has_found = self.has_found, self._looks >= _LOOKS_FOR_DUPLICATES
+        return self.has_found != before
+
+
+class TypeWatch:
+    """
+    Watches the topics of a map for ends that DDS connects to nothing; ``use`` names its rows.
+
+    ``resolve`` makes the full name of a topic.
+    """
+
+    def __init__(self, graph: Graph, resolve: Callable[[str], str]) -> None:
+        self._graph = graph
+        self._resolve = resolve
+        self._own: dict[str, str] = {}
+        self._seen: MappingType[str, list[str]] = {}
+        self._told: set[tuple[str, str]] = set()
+
+    def use(self, mappings: Iterable[Mapping]) -> None:
+        """Watch the topics of these rows from now on."""
+        self._own = {
+            self._resolve(f'~/{what}/{mapping.topic}'):
+            f'std_msgs/msg/{mapping.message_type.message}'
+            for mapping in mappings for what, is_there in (
+                ('read', mapping.reads), ('write', mapping.writes)) if is_there}
+        self._seen, self._told = {}, set()
+
+    def look(self, now: float) -> list[str]:
+        """Return what is new at the clock value ``now`` (s), each once."""
+        clashes = self._graph.clashes(now)
+        if clashes is self._seen:
+            return []
+        self._seen = clashes
+        found = {(topic, kind) for topic in clashes.keys() & self._own.keys()
+                 for kind in clashes[topic] if kind != self._own[topic]}
+        news, self._told = found - self._told, found
+        return [f'{topic} is {self._own[topic]}; somebody uses it as {kind}, and DDS connects '
+                'different types to nothing' for topic, kind in sorted(news)]
