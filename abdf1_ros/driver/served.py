@@ -181,9 +181,9 @@ def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: f
     found = line_problems(mappings, network, path)
     problems = [problem for _, problem in found]
     left = [mapping for mapping in mappings if mapping not in dict(found)]
-    blocks = Planner(line_model(network), default_period).plan(left)
+    planner = Planner(line_model(network), default_period)
     faults = [(mapping, 'Heartbeat_Timeout', text)
-              for mapping, text in guard_faults(left, blocks)] or _broken(left)
+              for mapping, text in guard_faults(left, planner)] or _broken(left)
     while faults:
         for mapping, column, text in faults:
             where = Place(path, mapping.file_line, column=column)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.line_model import LineModel
-from abdf1_ros.plan.planner import Block
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.values import ValueType
@@ -191,19 +191,18 @@ def _poll_scan(network: Network, mappings: Iterable[Mapping], response_time: flo
     return len(stations) * poll
 
 
-def guard_faults(mappings: Sequence[Mapping], blocks: Iterable[Block],
+def guard_faults(mappings: Sequence[Mapping], planner: Planner,
                  response_time: float = forecast.USUAL_RESPONSE_TIME
                  ) -> Iterator[tuple[Mapping, str]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
-    blocks = list(blocks)
+    counters = {mapping: (condition.text, condition.timeout) for mapping in mappings
+                if (condition := mapping.publish_while) and condition.timeout is not None}
+    blocks = planner.plan(mappings) if counters else []
     expected = forecast.intervals(blocks, response_time)
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
-    for mapping in mappings:
-        condition = mapping.publish_while
-        if condition is None or condition.tag is None or condition.timeout is None:
-            continue
-        needed = _READS_IN_TIME * found.get(condition.tag, 0.0)
-        if condition.timeout / 1000 < needed:
+    for mapping, (tag, timeout) in counters.items():
+        needed = _READS_IN_TIME * found.get(tag, 0.0)
+        if timeout / 1000 < needed:
             yield mapping, (
-                f'Heartbeat_Timeout {condition.timeout} ms is shorter than {_READS_IN_TIME} reads '
-                f'of {condition.tag} on this line; {needed * 1000:.0f} ms would do')
+                f'Heartbeat_Timeout {timeout} ms is shorter than {_READS_IN_TIME} reads of {tag} '
+                f'on this line; {needed * 1000:.0f} ms would do')

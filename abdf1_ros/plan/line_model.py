@@ -22,6 +22,7 @@ byte in 256 has to be doubled (M 2-7), nor the response time of a station.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -61,14 +62,16 @@ class LineModel:
 
         ``command`` and ``reply`` are the bytes of each after TNS.
         """
-        # Of a frame only the size counts, so the check need not be that of its data.
-        sent, reply_size = HEADER_SIZE + command + len(frames.ACK), HEADER_SIZE + reply
-        if self.duplex is Duplex.HALF:
-            sent += len(frames.master_frame(station, b'', self.checksum))
-            sent += len(frames.poll_frame(station))
-            transmissions = 3
-        else:
-            sent += len(frames.message_frame(b'', self.checksum))
-            transmissions = 2
-        received = reply_size + len(frames.message_frame(b'', self.checksum)) + len(frames.ACK)
-        return (sent + received) * self.timing.char_time + transmissions * self.timing.tx_delay
+        characters = _overhead(self.duplex, self.checksum, station) + command + reply
+        transmissions = 3 if self.duplex is Duplex.HALF else 2
+        return characters * self.timing.char_time + transmissions * self.timing.tx_delay
+
+
+@cache
+def _overhead(duplex: Duplex, checksum: Checksum, station: int) -> int:
+    """Return the characters of a transaction, without what commands and replies have after TNS."""
+    # Of a frame only the size counts, so the check need not be that of its data.
+    message = frames.message_frame(b'', checksum)
+    sent = message if duplex is Duplex.FULL else \
+        frames.master_frame(station, b'', checksum) + frames.poll_frame(station)
+    return len(sent) + len(message) + 2 * (HEADER_SIZE + len(frames.ACK))

@@ -220,7 +220,7 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
     if problems:
         raise ConfigurationError(problems)
     return Configuration(parameters, network, port, mappings, map_problems, polling,
-                         _ignored_overrides(node, _map_cells(mappings)), files)
+                         _ignored_overrides(node, mappings), files)
 
 
 def _forget(node: Node, prefix: str) -> None:
@@ -274,11 +274,12 @@ def _unknown_overrides(node: Node) -> list[Problem]:
     return problems
 
 
-def _ignored_overrides(node: Node, cells: list[Cell]) -> list[str]:
+def _ignored_overrides(node: Node, mappings: list[Mapping]) -> list[str]:
     """Return the names of overrides ``map.*`` that say something else than the map."""
     given = {name: _text(parameter.value) for name, parameter in _overrides(node).items()
              if name.startswith('map.')}
-    repeated = {name for name, value, _ in cells if given.get(name) == value}
+    repeated = {name for name, value, _ in _map_cells(mappings) if given.get(name) == value} \
+        if given else set()
     return sorted(given.keys() - repeated)
 
 
