@@ -153,7 +153,7 @@ def _without_data(entry: Entry) -> Entry:
         return replace(entry, text='')
     # The first byte of a command is its FNC. The words before the colon are stations and TNS.
     data = packet.data[:1] if entry.kind is Kind.COMMAND else b''
-    return replace(entry, packet=replace(packet, data=data), text=entry.text.partition(':')[0])
+    return replace(entry, packet=packet._replace(data=data), text=entry.text.partition(':')[0])
 
 
 def _without_names(text: str) -> str:

@@ -28,7 +28,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 from typing import NoReturn, TypeGuard
 
@@ -350,7 +350,7 @@ class MasterLine:
     def answers(self, packet: Packet, command: Packet) -> bool:
         """Tell whether a message is the reply to ``command``; a gateway may fill in its DST."""
         if self.stations.via(command.dst) != command.dst:
-            packet = replace(packet, dst=command.src)
+            packet = packet._replace(dst=command.src)
         return packet.answers(command)
 
     def complete(self, task: Task, reply: Packet) -> None:

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import struct
+from typing import NamedTuple
 
 from abdf1_ros.errors import FormatError
 
@@ -39,8 +39,7 @@ def begins_good_reply(link_data: bytes | bytearray) -> bool:
     return len(link_data) >= HEADER_SIZE and link_data[2] & REPLY_BIT != 0 and link_data[3] == 0
 
 
-@dataclass(frozen=True, slots=True)
-class Packet:
+class Packet(NamedTuple):
     """
     DST SRC CMD STS TNS and what follows them (M 6-3).
 
@@ -61,8 +60,7 @@ class Packet:
         """Read link data; raise FormatError when it is shorter than a header (M 3-7, 4-4)."""
         if len(link_data) < HEADER_SIZE:
             raise FormatError(f'{len(link_data)} bytes of link data, a header has {HEADER_SIZE}')
-        dst, src, cmd, sts, tns = _HEADER.unpack_from(link_data)
-        return cls(dst, src, cmd, sts, tns, link_data[HEADER_SIZE:])
+        return cls._make((*_HEADER.unpack_from(link_data), link_data[HEADER_SIZE:]))
 
     def encode(self) -> bytes:
         """Return the unstuffed link data."""

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 import math
 
 from abdf1_ros.counters import Counters
@@ -327,8 +326,8 @@ def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
 
 @pytest.mark.parametrize(('packet', 'reply_size'), [
     (REPLY, 0),  # a size that nobody knows
-    (replace(REPLY, sts=0x10), 94),  # an error comes without data
-    (replace(REPLY, cmd=0x0F), 94)])  # a command of the station's own
+    (REPLY._replace(sts=0x10), 94),  # an error comes without data
+    (REPLY._replace(cmd=0x0F), 94)])  # a command of the station's own
 def test_any_other_message_is_heard_as_it_comes(packet: Packet, reply_size: int) -> None:
     bench = Bench(Step(FRAME, 1.0, reply_size=reply_size), timing=LineTiming(char_time=0.01))
     bench.machine.start(0.0)

@@ -32,7 +32,7 @@ from support.script import Answer, Expect, MasterScript, Murmur, Silence
 SLAVE, MASTER = 17, 5
 COMMAND = Packet(SLAVE, MASTER, 0x0F, 0, 0x0102, bytes.fromhex('A2 02 07 89 00 00'))
 REPLY = COMMAND.reply(b'\x34\x12')
-STALE = replace(REPLY, tns=0x0101)
+STALE = REPLY._replace(tns=0x0101)
 SETTINGS = MasterSettings(
     station=MASTER, nak_retries=2, enq_retries=2, timeout=0.5, cmd_timeout=2.0, poll_pause=0.005)
 
@@ -184,7 +184,7 @@ def test_master_ack_lost_the_duplicate_is_acknowledged_and_passed_over() -> None
     script = MasterScript(SETTINGS)
     script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
     script.forget()
-    command = replace(COMMAND, tns=0x0103)
+    command = COMMAND._replace(tns=0x0103)
     reply = command.reply(b'\x35\x12')
     assert script.run(
         command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK,
@@ -200,7 +200,7 @@ def test_master_ack_lost_the_duplicate_is_acknowledged_and_passed_over() -> None
 def test_reply_counts_as_duplicate_only_when_it_is_the_same_transaction() -> None:
     script = MasterScript(SETTINGS)
     for tns in range(0x0102, 0x0105):
-        command = replace(COMMAND, tns=tns)
+        command = COMMAND._replace(tns=tns)
         sent = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
         reply = command.reply(b'\x34\x12')
         assert script.run(command, sent, SAYS_ACK, POLLED, says(reply), ACKED) == reply
@@ -275,7 +275,7 @@ def test_duplicate_makes_an_inactive_station_active() -> None:
     script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
     script.stations.lost(SLAVE, script.now)
     script.forget()
-    command = replace(COMMAND, tns=0x0103)
+    command = COMMAND._replace(tns=0x0103)
     sent = Expect(ACK + master_frame(SLAVE, command.encode(), Checksum.CRC))
     assert isinstance(script.run(command, POLLED, SAYS_REPLY, sent, *_never_acknowledged(command)),
                       StationInactive)
@@ -400,7 +400,7 @@ def test_command_timeout_is_not_early() -> None:
 
 def test_command_timeout_by_stale_messages() -> None:
     script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
-    stale = [replace(REPLY, tns=0x0090 + n) for n in range(MOST_QUEUED + 1)]
+    stale = [REPLY._replace(tns=0x0090 + n) for n in range(MOST_QUEUED + 1)]
     steps = [step for packet in stale for step in (POLLED_AGAIN, says(packet), ACKED)][1:-1]
     error = script.run(COMMAND, SENT, Answer(ACK), POLLED, *steps, Expect(ACK + NAK))
     assert isinstance(error, CommandTimeout)
@@ -433,7 +433,7 @@ def test_late_reply_after_a_command_timeout_is_stale() -> None:
     script = MasterScript(replace(SETTINGS, cmd_timeout=0.5))
     script.run(COMMAND, SENT, SAYS_ACK, POLLED, Answer(EOT, 0.45), NAKED)
     script.forget()
-    command = replace(COMMAND, tns=0x0103)
+    command = COMMAND._replace(tns=0x0103)
     assert script.run(
         command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
         SAYS_REPLY, ACKED, POLLED_AGAIN, says(command.reply()), ACKED) == command.reply()
@@ -485,7 +485,7 @@ def test_message_instead_of_an_ack_is_no_ack() -> None:
 
 def test_wrong_command_code() -> None:
     script = MasterScript(SETTINGS)
-    error = script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(replace(REPLY, cmd=0x41)), ACKED)
+    error = script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(REPLY._replace(cmd=0x41)), ACKED)
     assert isinstance(error, WrongCommandCode)
     assert error.args == (SLAVE, 0x41, 0x4F)
     assert script.numbers() == [(2505, SLAVE, 0x41, 0x4F)]
@@ -520,9 +520,9 @@ def test_command_from_a_slave_is_acknowledged_and_passed_over() -> None:
 
 def test_reply_to_another_station_is_invalid() -> None:
     script = MasterScript(replace(SETTINGS, accept_slave_messages=False))
-    wrong = replace(REPLY, dst=6)
+    wrong = REPLY._replace(dst=6)
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), ACKED, POLLED_AGAIN,
-                      Answer(frame(replace(REPLY, tns=0x0101))), ACKED, POLLED_AGAIN,
+                      Answer(frame(REPLY._replace(tns=0x0101))), ACKED, POLLED_AGAIN,
                       says(REPLY), ACKED) == REPLY
     assert script.numbers() == [
         (2510, wrong.src, wrong.dst, wrong.tns), (2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
@@ -534,7 +534,7 @@ def test_reply_to_another_station_is_invalid() -> None:
 def test_message_that_cannot_be_the_stations_gets_no_ack_and_comes_again(
         change: dict[str, Any]) -> None:
     script = MasterScript(SETTINGS)
-    wrong = replace(REPLY, **change)
+    wrong = REPLY._replace(**change)
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), POLLED_AGAIN, SAYS_REPLY,
                       ACKED) == REPLY
     assert script.numbers() == [(2510, wrong.src, wrong.dst, wrong.tns), (2523, SLAVE)]
@@ -545,7 +545,7 @@ def test_message_that_cannot_be_the_stations_gets_no_ack_and_comes_again(
 
 def test_message_that_cannot_be_the_stations_is_acknowledged_when_it_insists() -> None:
     script = MasterScript(SETTINGS)
-    wrong = replace(REPLY, src=18)
+    wrong = REPLY._replace(src=18)
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(wrong), POLLED_AGAIN, says(wrong),
                       ACKED, POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
     assert script.counts()['invalid_messages'] == 1
@@ -554,7 +554,7 @@ def test_message_that_cannot_be_the_stations_is_acknowledged_when_it_insists() -
 @pytest.mark.parametrize('checksum', Checksum)
 def test_reply_that_lost_its_leading_00_is_not_taken_for_a_command(checksum: Checksum) -> None:
     """The CRC of M 3-6 begins with 0: neither check sees it; what is left begins with SLAVE 4F."""
-    command = replace(COMMAND, src=0)
+    command = COMMAND._replace(src=0)
     script = MasterScript(replace(SETTINGS, station=0, checksum=checksum))
     whole = command.reply(b'\x34\x12')
     shorter = message_frame(whole.encode()[1:], checksum)
@@ -682,7 +682,7 @@ def test_echo_of_our_ack_does_not_acknowledge_the_next_command() -> None:
     script = MasterScript(SETTINGS)
     script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data),
                SAYS_REPLY, ACKED)
-    command = replace(COMMAND, tns=0x0103)
+    command = COMMAND._replace(tns=0x0103)
     sent = master_frame(SLAVE, command.encode(), Checksum.CRC)
     reply = command.reply()
     assert script.run(command, Expect(sent), Answer(ACK), Answer(sent), SAYS_ACK, POLLED,
@@ -711,7 +711,7 @@ def test_echo_that_is_damaged_is_still_passed_over(at: int) -> None:
     script = MasterScript(SETTINGS)
     damaged = bytearray(SENT.data)
     damaged[at] ^= 0x08
-    command = replace(COMMAND, tns=0x0103)
+    command = COMMAND._replace(tns=0x0103)
     sent = master_frame(SLAVE, command.encode(), Checksum.CRC)
     script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data),
                Answer(SAYS_REPLY.data), ACKED)
@@ -766,7 +766,7 @@ def test_timeout_zero_is_as_short_as_the_equipment_can_do() -> None:
 def test_station_behind_a_gateway() -> None:
     """STN is the gateway, DST the station (M 3-7)."""
     script = MasterScript(SETTINGS, routes={99: SLAVE, 98: SLAVE})
-    command = replace(COMMAND, dst=99)
+    command = COMMAND._replace(dst=99)
     reply = command.reply(b'\x34\x12')
     assert script.run(
         command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
@@ -778,8 +778,8 @@ def test_station_behind_a_gateway() -> None:
 
 def test_reply_of_another_station_behind_the_same_gateway_is_stale() -> None:
     script = MasterScript(SETTINGS, routes={99: SLAVE, 98: SLAVE})
-    command = replace(COMMAND, dst=99)
-    other = replace(COMMAND, dst=98).reply(b'\x77')
+    command = COMMAND._replace(dst=99)
+    other = COMMAND._replace(dst=98).reply(b'\x77')
     assert script.run(
         command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
         says(other), ACKED, POLLED_AGAIN, says(command.reply()), ACKED
@@ -790,7 +790,7 @@ def test_reply_of_another_station_behind_the_same_gateway_is_stale() -> None:
 def test_stations_behind_a_gateway_share_its_state() -> None:
     script = MasterScript(SETTINGS, routes={99: SLAVE, 98: SLAVE})
     script.stations.add((98, 99))
-    command, other = replace(COMMAND, dst=99), replace(COMMAND, dst=98)
+    command, other = COMMAND._replace(dst=99), COMMAND._replace(dst=98)
     frame = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
     assert isinstance(script.run(command, *(frame, TIMEOUT) * 3), StationInactive)
     assert sorted(script.changes) == [(SLAVE, False), (98, False), (99, False)]
@@ -805,7 +805,7 @@ def test_stations_behind_a_gateway_share_its_state() -> None:
 
 def test_station_that_its_gateway_does_not_reach_is_not_heard() -> None:
     script = MasterScript(SETTINGS, routes={99: SLAVE})
-    command = replace(COMMAND, dst=99)
+    command = COMMAND._replace(dst=99)
     reply = command.reply(sts=0x02)
     assert script.run(
         command, Expect(master_frame(SLAVE, command.encode(), Checksum.CRC)), SAYS_ACK, POLLED,
@@ -817,7 +817,7 @@ def test_station_that_its_gateway_does_not_reach_is_not_heard() -> None:
 def test_stations_are_kept_apart() -> None:
     script = MasterScript(SETTINGS)
     assert isinstance(script.run(COMMAND, *(SENT, TIMEOUT) * 3), StationInactive)
-    other = replace(COMMAND, dst=9)
+    other = COMMAND._replace(dst=9)
     assert script.run(
         other, Expect(master_frame(9, other.encode(), Checksum.CRC)), SAYS_ACK,
         Expect(poll_frame(9)), says(other.reply()), ACKED) == other.reply()
@@ -867,7 +867,7 @@ def test_slaves_command_instead_of_the_reply_is_acknowledged_and_polling_goes_on
 
 def test_repetition_is_known_by_its_dst_too() -> None:
     script = MasterScript(SETTINGS)
-    others = replace(REPLY, dst=9)
+    others = REPLY._replace(dst=9)
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(others), ACKED, POLLED_AGAIN,
                       SAYS_REPLY, ACKED) == REPLY
     assert 'duplicate_messages' not in script.counts()

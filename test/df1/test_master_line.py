@@ -175,7 +175,7 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
 def test_reply_with_another_command_code_is_passed_on_as_it_is(standard: bool) -> None:
     rig = bench(standard, 7, 8)
     command = rig.message(7, 8)
-    wrong = replace(command.reply(), cmd=0x46)
+    wrong = command.reply()._replace(cmd=0x46)
     rig[8].slave._serve = lambda packet: wrong if packet == command else packet.reply()
     rig.start()
     poll(rig, 7, 8, times=2)

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1.checksum import Checksum
@@ -54,7 +53,7 @@ def bench(checksum: Checksum = Checksum.CRC, *, nak_retries: int = 3, enq_retrie
 
 def later(packet: Packet, number: int) -> Packet:
     """Return the same packet of a later transaction."""
-    return replace(packet, tns=packet.tns + number & 0xFFFF)
+    return packet._replace(tns=packet.tns + number & 0xFFFF)
 
 
 # Transmitter
@@ -291,11 +290,11 @@ def test_next_message_does_not_wait_long_after_a_nak() -> None:
 def test_late_responses_after_a_failure_do_not_acknowledge_the_next_message() -> None:
     peer = bench(enq_retries=0)
     peer.begin(COMMAND)
-    other = peer.begin(replace(COMMAND, dst=2))
+    other = peer.begin(COMMAND._replace(dst=2))
     peer.said()
     assert peer.wait(1.05) == []
     assert peer.hear(ACK) == b''
-    assert peer.wait(0.1) == [(0.05, peer.frame(replace(COMMAND, dst=2)))]
+    assert peer.wait(0.1) == [(0.05, peer.frame(COMMAND._replace(dst=2)))]
     assert peer.wait(1.1) == []
     assert isinstance(other.result, StationInactive)
 
@@ -759,13 +758,13 @@ def test_message_shorter_than_a_header(checksum: Checksum, size: int) -> None:
 
 def test_header_alone_is_a_message() -> None:
     peer = bench()
-    command = replace(THEIRS, data=b'')
+    command = THEIRS._replace(data=b'')
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
 
 
 def test_longest_message() -> None:
     peer = bench()
-    command = replace(THEIRS, data=b'\x10' * (MAX_LINK_DATA - 6))
+    command = THEIRS._replace(data=b'\x10' * (MAX_LINK_DATA - 6))
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
 
 
@@ -773,7 +772,7 @@ def test_longest_message() -> None:
 @pytest.mark.parametrize('more', [1, 2, 3, 50, 700])
 def test_message_too_long(byte: int, more: int) -> None:
     peer = bench()
-    command = replace(THEIRS, data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more))
+    command = THEIRS._replace(data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more))
     frame = peer.frame(command)
     assert peer.hear(*single_bytes(frame[:-1])) == b''  # not in its middle (M 4-8)
     assert peer.hear(frame[-1:]) == NAK
@@ -787,7 +786,7 @@ def test_message_too_long(byte: int, more: int) -> None:
 def test_duplicate_is_acknowledged_and_not_executed() -> None:
     peer = bench()
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
-    assert peer.hear_packet(replace(THEIRS, dst=9, data=b'other')) == ACK
+    assert peer.hear_packet(THEIRS._replace(dst=9, data=b'other')) == ACK
     assert peer.hear(ACK) == b''
     assert peer.wait(60) == []
     assert peer.served == [THEIRS]
@@ -812,7 +811,7 @@ def test_duplicate_after_its_reply_is_known_when_the_sender_has_asked_again(
 @pytest.mark.parametrize('pause', [1.0, 3.0, 10.0])
 def test_program_that_always_sends_tns_0_is_answered_each_time(pause: float) -> None:
     peer = bench()
-    command = replace(THEIRS, tns=0)
+    command = THEIRS._replace(tns=0)
     for _ in range(10):
         assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
         assert peer.hear(ACK) == b''
@@ -823,7 +822,7 @@ def test_program_that_always_sends_tns_0_is_answered_each_time(pause: float) -> 
 def test_processor_that_counts_from_0_after_its_power_up_is_answered() -> None:
     """It went off before it could acknowledge our reply to its first and only command."""
     peer = bench()
-    command = replace(THEIRS, tns=0)
+    command = THEIRS._replace(tns=0)
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
     assert [said for _, said in peer.wait(4.0)] == [ENQ] * 3
     assert peer.wait(1.0) == []
@@ -862,8 +861,8 @@ def test_duplicates_are_executed_when_nobody_looks_for_them() -> None:
 
 
 @pytest.mark.parametrize('other', [
-    replace(THEIRS, src=2), replace(THEIRS, cmd=0x0F), replace(THEIRS, tns=0x7711),
-    replace(THEIRS, tns=0x7610)])
+    THEIRS._replace(src=2), THEIRS._replace(cmd=0x0F), THEIRS._replace(tns=0x7711),
+    THEIRS._replace(tns=0x7610)])
 def test_another_src_cmd_or_tns_is_no_duplicate(other: Packet) -> None:
     peer = bench()
     peer.hear_packet(THEIRS)
@@ -986,7 +985,7 @@ def test_unknown_control_is_reported() -> None:
 @pytest.mark.parametrize('checksum', Checksum)
 def test_any_address_is_served_and_swapped(dst: int, src: int, checksum: Checksum) -> None:
     peer = bench(checksum)
-    command = replace(THEIRS, dst=dst, src=src)
+    command = THEIRS._replace(dst=dst, src=src)
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
     assert (command.reply().dst, command.reply().src) == (src, dst)
 
@@ -1008,7 +1007,7 @@ def test_command_that_lost_its_leading_00_is_not_executed_and_comes_again(
 
 def test_command_with_a_status_gets_nak() -> None:
     peer = bench()
-    assert peer.hear_packet(replace(THEIRS, sts=0x10)) == NAK
+    assert peer.hear_packet(THEIRS._replace(sts=0x10)) == NAK
     assert peer.hear(ENQ) == NAK
     assert peer.served == []
 
@@ -1160,8 +1159,8 @@ def test_reply_of_the_last_moment() -> None:
 
 
 @pytest.mark.parametrize('other', [
-    replace(REPLY, tns=REPLY.tns ^ 0x0100), replace(REPLY, src=2),
-    replace(REPLY, tns=REPLY.tns ^ 1, cmd=0x46)])
+    REPLY._replace(tns=REPLY.tns ^ 0x0100), REPLY._replace(src=2),
+    REPLY._replace(tns=REPLY.tns ^ 1, cmd=0x46)])
 def test_reply_of_another_transaction_or_station_is_stale(other: Packet) -> None:
     peer = bench()
     task = peer.begin(COMMAND)
@@ -1179,8 +1178,8 @@ def test_reply_to_any_dst_counts() -> None:
     task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
-    assert peer.hear_packet(replace(REPLY, dst=0)) == ACK
-    assert task.result == replace(REPLY, dst=0)
+    assert peer.hear_packet(REPLY._replace(dst=0)) == ACK
+    assert task.result == REPLY._replace(dst=0)
 
 
 def test_reply_with_another_command_code() -> None:
@@ -1188,7 +1187,7 @@ def test_reply_with_another_command_code() -> None:
     task = peer.begin(COMMAND)
     peer.said()
     peer.hear(ACK)
-    assert peer.hear_packet(replace(REPLY, cmd=0x46)) == ACK
+    assert peer.hear_packet(REPLY._replace(cmd=0x46)) == ACK
     assert isinstance(task.result, WrongCommandCode)
     assert task.result.args == (1, 0x46, 0x4F)
     assert peer.numbers() == [(2505, 1, 0x46, 0x4F)]
@@ -1232,7 +1231,7 @@ def test_commands_outstanding(allowed: int) -> None:
 @pytest.mark.parametrize('order', list(itertools.permutations(range(3))))
 def test_replies_in_any_order_find_their_command(order: tuple[int, ...]) -> None:
     peer = bench(max_outstanding=3)
-    commands = [replace(later(COMMAND, number), dst=1 + number) for number in range(3)]
+    commands = [later(COMMAND, number)._replace(dst=1 + number) for number in range(3)]
     tasks = [peer.begin(command) for command in commands]
     assert peer.said() + peer.hear(ACK) + peer.hear(ACK) + peer.hear(ACK) == b''.join(
         map(peer.frame, commands))
@@ -1245,13 +1244,13 @@ def test_replies_in_any_order_find_their_command(order: tuple[int, ...]) -> None
 
 def test_same_tns_at_two_stations() -> None:
     peer = bench(max_outstanding=2)
-    tasks = [peer.begin(replace(COMMAND, dst=number)) for number in (1, 2)]
+    tasks = [peer.begin(COMMAND._replace(dst=number)) for number in (1, 2)]
     peer.said()
     peer.hear(ACK, ACK)
-    peer.hear_packet(replace(REPLY, src=2, data=b'two'))
-    peer.hear_packet(replace(REPLY, src=1, data=b'one'))
+    peer.hear_packet(REPLY._replace(src=2, data=b'two'))
+    peer.hear_packet(REPLY._replace(src=1, data=b'one'))
     assert [task.result for task in tasks] == [
-        replace(REPLY, src=1, data=b'one'), replace(REPLY, src=2, data=b'two')]
+        REPLY._replace(src=1, data=b'one'), REPLY._replace(src=2, data=b'two')]
 
 
 def test_each_outstanding_command_has_its_own_time() -> None:
@@ -1270,9 +1269,9 @@ def test_each_outstanding_command_has_its_own_time() -> None:
 
 def test_outstanding_replies_while_another_transfer_fails() -> None:
     peer = bench(max_outstanding=2)
-    first, second = peer.begin(COMMAND), peer.begin(replace(COMMAND, dst=2))
+    first, second = peer.begin(COMMAND), peer.begin(COMMAND._replace(dst=2))
     peer.said()
-    assert peer.hear(ACK) == peer.frame(replace(COMMAND, dst=2))
+    assert peer.hear(ACK) == peer.frame(COMMAND._replace(dst=2))
     peer.wait(1.5)
     assert peer.hear_packet(REPLY) == ACK
     assert first.result == REPLY

@@ -407,7 +407,7 @@ def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
 
 def test_station_that_never_stops_sending_does_not_hold_off_the_command_timeout() -> None:
     rig = bench(PollingSettings((1,)), settings=replace(SETTINGS, cmd_timeout=0.001))
-    setattr(rig[1], '_execute', lambda command: replace(command.reply(), tns=0))
+    setattr(rig[1], '_execute', lambda command: command.reply()._replace(tns=0))
     task = rig.ask(1)
     for _ in range(3 * MOST_QUEUED):
         rig.message(1, 5)
@@ -443,7 +443,7 @@ def test_nak_is_never_sent_whatever_the_setting() -> None:
 
 def test_reply_with_a_wrong_command_code() -> None:
     rig = bench(PollingSettings((1,)))
-    rig[1].slave._serve = lambda command: replace(command.reply(), cmd=0x46)
+    rig[1].slave._serve = lambda command: command.reply()._replace(cmd=0x46)
     task = rig.ask(1)
     rig.start()
     rig.run(0.2)

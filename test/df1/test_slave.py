@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
@@ -79,7 +79,7 @@ def reply_frame(command: Packet, sts: int = 0, checksum: Checksum = Checksum.CRC
 
 def later(number: int) -> Packet:
     """Return a command of a later transaction."""
-    return replace(COMMAND, tns=COMMAND.tns + number)
+    return COMMAND._replace(tns=COMMAND.tns + number)
 
 
 def test_normal() -> None:
@@ -114,8 +114,8 @@ def test_frame_of_another_is_passed_over(station: int | None) -> None:
 
 def test_frame_for_a_node_behind_the_station_is_accepted_by_its_stn() -> None:
     bench = Bench()
-    assert bench.hear(sent(replace(COMMAND, dst=99))) == [ACK]
-    assert bench.served == [replace(COMMAND, dst=99)]
+    assert bench.hear(sent(COMMAND._replace(dst=99))) == [ACK]
+    assert bench.served == [COMMAND._replace(dst=99)]
 
 
 @pytest.mark.parametrize(('fault', 'checksum', 'counter'), [
@@ -136,7 +136,7 @@ def test_bad_frame_is_met_with_silence(fault: FrameFault, checksum: Checksum,
 def test_command_that_lost_its_leading_00_is_met_with_silence(checksum: Checksum,
                                                               tns: int) -> None:
     bench = Bench(settings=SlaveSettings(0, checksum))
-    command = replace(COMMAND, dst=0, tns=tns)
+    command = COMMAND._replace(dst=0, tns=tns)
     moved = Frame(command.encode()[1:], 0)
     assert bench.hear(moved, sent(command, 0)) == [b'', ACK]
     assert bench.served == [command]
@@ -145,7 +145,7 @@ def test_command_that_lost_its_leading_00_is_met_with_silence(checksum: Checksum
 
 def test_command_with_a_status_is_met_with_silence() -> None:
     bench = Bench()
-    assert bench.hear(sent(replace(COMMAND, sts=0x10)), sent(COMMAND)) == [b'', ACK]
+    assert bench.hear(sent(COMMAND._replace(sts=0x10)), sent(COMMAND)) == [b'', ACK]
     assert bench.served == [COMMAND]
 
 
@@ -171,7 +171,7 @@ def test_duplicate_is_known_after_its_reply_too() -> None:
 
 
 @pytest.mark.parametrize('other', [
-    replace(COMMAND, tns=0x0202), replace(COMMAND, src=6), replace(COMMAND, cmd=0x06)])
+    COMMAND._replace(tns=0x0202), COMMAND._replace(src=6), COMMAND._replace(cmd=0x06)])
 def test_command_with_another_src_cmd_or_tns_is_no_duplicate(other: Packet) -> None:
     bench = Bench()
     assert bench.hear(sent(COMMAND), sent(other)) == [ACK, ACK]
@@ -267,7 +267,7 @@ def test_command_is_still_known_as_duplicate_after_a_nak() -> None:
 
 def test_broadcast_is_executed_but_neither_acknowledged_nor_answered() -> None:
     bench = Bench()
-    command = replace(COMMAND, dst=BROADCAST)
+    command = COMMAND._replace(dst=BROADCAST)
     assert bench.hear(sent(command, BROADCAST), sent(command, BROADCAST), POLL) == [
         b'', b'', EOT]
     assert bench.served == [command]
@@ -333,10 +333,10 @@ def test_multidrop_ack_goes_to_the_station_that_spoke() -> None:
     slaves = [HalfDuplexSlave(SlaveSettings(number), echo(b'')) for number in (7, 8)]
     line = Line(*slaves)
     for number in (7, 8):
-        command = replace(COMMAND, dst=number)
+        command = COMMAND._replace(dst=number)
         assert line.say(master_frame(number, command.encode(), Checksum.CRC)) == ACK
     assert line.say(poll_frame(7)) == reply_frame(COMMAND)
-    assert line.say(poll_frame(8)) == reply_frame(replace(COMMAND, dst=8))
+    assert line.say(poll_frame(8)) == reply_frame(COMMAND._replace(dst=8))
     assert line.say(ACK) == b''
     assert [slave.counters.acks_received for slave in slaves] == [0, 1]
     assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (reply_frame(COMMAND), EOT)
@@ -345,7 +345,7 @@ def test_multidrop_ack_goes_to_the_station_that_spoke() -> None:
 def test_multidrop_broadcast_reaches_every_station() -> None:
     benches = [Bench(settings=SlaveSettings(number)) for number in (7, 8)]
     line = Line(*(bench.slave for bench in benches))
-    command = replace(COMMAND, dst=BROADCAST)
+    command = COMMAND._replace(dst=BROADCAST)
     assert line.say(master_frame(BROADCAST, command.encode(), Checksum.CRC)) == b''
     assert [bench.served for bench in benches] == [[command], [command]]
 
@@ -395,7 +395,7 @@ def test_full_sink_does_not_forget_the_last_command() -> None:
 
 def test_broadcast_and_reply_need_no_room() -> None:
     bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
-    broadcast = replace(later(1), dst=BROADCAST)
+    broadcast = later(1)._replace(dst=BROADCAST)
     assert bench.hear(sent(COMMAND), sent(broadcast, BROADCAST), sent(later(2).reply())) == [
         ACK, b'', ACK]
     assert bench.served == [COMMAND, broadcast]

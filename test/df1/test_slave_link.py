@@ -71,7 +71,7 @@ def test_one_command_is_outstanding() -> None:
 def test_commands_and_replies_take_turns() -> None:
     bench = SlaveBench(SETTINGS)
     tasks = [bench.add(own(number)) for number in (1, 2)]
-    served = [replace(FROM_MASTER, tns=tns) for tns in (0x11, 0x12, 0x13)]
+    served = [FROM_MASTER._replace(tns=tns) for tns in (0x11, 0x12, 0x13)]
     for command in served:
         assert bench.hear(bench.frame(command)) == ACK
     said = []
@@ -175,7 +175,7 @@ def test_reply_with_a_wrong_command_code() -> None:
     task = bench.add(own())
     bench.poll()
     bench.hear(ACK)
-    assert bench.hear(bench.frame(replace(own().reply(), cmd=0x46))) == ACK
+    assert bench.hear(bench.frame(own().reply()._replace(cmd=0x46))) == ACK
     assert isinstance(task.result, WrongCommandCode)
     assert task.result.args == (OTHER, 0x46, 0x4F)
     assert bench.numbers() == [(2505, OTHER, 0x46, 0x4F)]
@@ -183,7 +183,7 @@ def test_reply_with_a_wrong_command_code() -> None:
 
 
 @pytest.mark.parametrize('reply', [
-    own(2).reply(), replace(own().reply(), src=9), replace(own().reply(), dst=9)])
+    own(2).reply(), own().reply()._replace(src=9), own().reply()._replace(dst=9)])
 def test_reply_that_fits_nothing_is_stale(reply: Packet) -> None:
     bench = SlaveBench(SETTINGS)
     task = bench.add(own())
@@ -216,7 +216,7 @@ def test_reply_is_taken_by_a_sink_that_is_full_of_others() -> None:
     bench.poll()
     bench.hear(ACK)
     assert bench.hear(bench.frame(FROM_MASTER)) == ACK
-    assert bench.hear(bench.frame(replace(FROM_MASTER, tns=9))) == b''
+    assert bench.hear(bench.frame(FROM_MASTER._replace(tns=9))) == b''
     assert bench.hear(bench.frame(own().reply())) == ACK
     assert task.result == own().reply()
 
@@ -467,7 +467,7 @@ def test_polls_that_lie_in_the_buffer_are_answered_once() -> None:
 
 def test_broadcast_is_executed_whatever_follows_it() -> None:
     bench = SlaveBench(SETTINGS, timing=SLOW)
-    command = replace(FROM_MASTER, dst=BROADCAST)
+    command = FROM_MASTER._replace(dst=BROADCAST)
     bench.hear(bench.frame(command, BROADCAST) + poll_frame(US))
     assert bench.served == [command]
     assert said_within(bench, 1.0) == [(0.2, EOT)]

@@ -197,7 +197,7 @@ def test_reply_that_is_no_status_is_said_to_be_none() -> None:
 def test_station_that_never_answers_this_is_asked_rarely() -> None:
     bench, (plc,), (ears,) = make_bench(word(), network=Network(baud=115200, timeout=100,
                                                                 cmd_timeout=500), period=2.0)
-    ears.answer_diagnostics(lambda command: replace(command, tns=0).reply())
+    ears.answer_diagnostics(lambda command: command._replace(tns=0).reply())
     bench.open()
     bench.run(50.0)
     assert len(ears.times(STATUS)) == 1
@@ -366,7 +366,7 @@ class OldSlc(Ears):
     def _answer(self, command: Packet) -> Packet:
         reply = self._plc.serve(command)
         if command.cmd == 0x06:  # type and name of M 10-4
-            return replace(reply, data=reply.data[:3] + b'\x18' + reply.data[4:5]
+            return reply._replace(data=reply.data[:3] + b'\x18' + reply.data[4:5]
                            + b'5/01'.ljust(11) + reply.data[16:])
         self.writes += [command.data[1]] if command.data[0] == 0xAA else []
         if command.data[1] <= 82:

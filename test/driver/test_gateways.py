@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 from abdf1_ros.df1.checksum import Checksum
@@ -228,8 +227,8 @@ def test_rule_11_plc_out_of_reach_does_not_take_the_line_from_the_other(
     if is_told:
         bench.plcs[1].faults.silent = True
     else:
-        bench.plcs[1].serve = lambda command: replace(  # type: ignore[method-assign]
-            command.reply(), tns=command.tns ^ 0x8000)
+        bench.plcs[1].serve = lambda command: (  # type: ignore[method-assign]
+            command.reply()._replace(tns=command.tns ^ 0x8000))
     begun = bench.clock()
     bench.run(20.0)
     changes = [when for when, _ in bench.seen[0] if when >= begun]

@@ -21,7 +21,6 @@ when. Three things have to hold in every mode, whatever happens (docs/heartbeats
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from random import Random
@@ -127,7 +126,7 @@ class World:
                     self.stood[number] = self.published.get(after[number], math.inf)
         if changed and self.swallows_replies and SAFE not in changed:
             self.swallowed = self.line.now
-            reply = dataclasses.replace(reply, tns=reply.tns ^ 0x8000)  # which nobody waits for
+            reply = reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
 
     def words(self) -> list[int]:

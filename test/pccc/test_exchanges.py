@@ -20,7 +20,7 @@ They begin at DST; frames around such bytes are those of vectors/frames.json.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from abdf1_ros.counters import Counters
@@ -178,7 +178,7 @@ def test_no_request_that_a_dialect_makes_is_left_out() -> None:
 def test_other_bits_of_cmd_make_another_command(bit: int) -> None:
     entry = next(entry for entry in EXCHANGES if entry.name == 'slc_read')
     _, server = plc(entry.family, entry.before)
-    command = replace(entry.command, cmd=entry.command.cmd | bit)
+    command = entry.command._replace(cmd=entry.command.cmd | bit)
     assert server.serve(command) == command.reply(sts=0x10)
 
 
