@@ -16,17 +16,18 @@
 Measure what many lines in one process cost, and what they do to each other.
 
 Method. Each of --lines lines has 10 mappings of one PLC, side by side in one block, all to be
-read as often as the line allows. A process for all PLCs answers on a pseudo-terminal a line; a
-reply is handed over when its last character would have come at --baud, so a line has as many
-transactions as a real one. "ACK" is the time from then to the ACK of the bridge, for 50, 99 and
-99.9 % of them. "start" is from the start of the process to the line of the log that all lines
-run, "end" from SIGINT to the end of the process. Processor time is that of all threads of the
-bridge in --seconds, as part of one core, diagnostics included; nobody listens. "fresh" is the
-number of lines that said at the end that all their mappings were fresh.
+read as often as the line allows, or every --period ms. A process for all PLCs answers on a
+pseudo-terminal a line; a reply is handed over when its last character would have come at --baud,
+so a line has as many transactions as a real one. "ACK" is the time from then to the ACK of the
+bridge, for 50, 99 and 99.9 % of them. "start" is from the start of the process to the line of the
+log that all lines run, "end" from SIGINT to the end of the process. Processor time is that of all
+threads of the bridge in --seconds, as part of one core, diagnostics included; nobody listens to
+values. "fresh / late / stale" is how often lines said in that time that all their mappings were
+fresh, that one was late, and that one was stale; they say so once a second, and at each change.
 
 --ways: "one" is one process for all lines, "four" four with a quarter of them each, "each" a
 process (the command "node") a line. "bare" is one process that does the same without this
-package (bare_lines.py); "fresh" means nothing there.
+package (bare_lines.py) as often as the line allows, and says nothing.
 
 Run it as "python test/benchmarks/many_lines.py"; it needs ROS, or the wheels of it.
 """
@@ -34,6 +35,7 @@ Run it as "python test/benchmarks/many_lines.py"; it needs ROS, or the wheels of
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
@@ -54,7 +56,7 @@ from abdf1_ros.settings.map_file import load_mappings
 from diagnostic_msgs.msg import DiagnosticArray
 from node_rig import plc_of, Running
 from paced_line import BITS
-from support.ros import EVERYTHING, find_status, Observer, OK, Process, write_csv
+from support.ros import ERROR, EVERYTHING, find_status, Observer, OK, Process, WARN, write_csv
 
 MAPPINGS = 10
 
@@ -140,7 +142,7 @@ class Rig:
 
 
 @contextmanager
-def rigged(count: int, baud: int) -> Iterator[Rig]:
+def rigged(count: int, baud: int, period: int = 0) -> Iterator[Rig]:
     """Run so many PLCs in a process."""
     with tempfile.TemporaryDirectory(prefix='abdf1_bench_') as name, ExitStack() as stack:
         ours, theirs = multiprocessing.Pipe()
@@ -155,7 +157,7 @@ def rigged(count: int, baud: int) -> Iterator[Rig]:
             net, table = rig.files(number)
             write_csv(net, 'Baud,Timeout', [f'{baud},1000'])
             write_csv(table, 'Tag,Command,Address,Station,PLC_Type,Period',
-                      [f'w{row},Read,N7:{row},1,SLC,0' for row in range(MAPPINGS)])
+                      [f'w{row},Read,N7:{row},1,SLC,{period}' for row in range(MAPPINGS)])
             machines.append(plc_of(load_mappings(str(table))[0]))
         process = multiprocessing.Process(
             target=run_plcs, args=([far for far, _ in pairs], machines, BITS / baud, theirs),
@@ -172,21 +174,22 @@ def rigged(count: int, baud: int) -> Iterator[Rig]:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What a run has shown: s, MiB, cores, transactions a second, s, lines, s."""
+    """What a run has shown: s, MiB, cores, transactions a second, s, looks, s."""
 
     start: float
     memory: float
     processor: float
     transactions: float
     acks: tuple[float, ...]
-    fresh: int
+    looks: tuple[int, ...]
     end: float
 
     def __str__(self) -> str:
         """Return a line of the table."""
         acks = ' / '.join(f'{value * 1000:.2f}' for value in self.acks)
+        looks = ' / '.join(map(str, self.looks))
         return (f'{self.start:6.1f} s {self.memory:7.0f} MiB {self.processor * 100:7.1f} % '
-                f'{self.transactions:8.0f}  {acks:>20} ms {self.fresh:6d} {self.end:6.1f} s')
+                f'{self.transactions:8.0f}  {acks:>20} ms  {looks:>20} {self.end:6.1f} s')
 
 
 def measure(rig: Rig, commands: Sequence[tuple[str | Path, Sequence[str], str]],
@@ -203,13 +206,12 @@ def measure(rig: Rig, commands: Sequence[tuple[str | Path, Sequence[str], str]],
         time.sleep(options.settle)
         rig.pipe.send('reset')
         used, begun = sum(one.used() for one in running), time.monotonic()
-        time.sleep(options.seconds)
+        looks = look_on(observer, options.seconds)
         rig.pipe.send('tell')
         told = rig.pipe.recv()
         passed = time.monotonic() - begun
         used = sum(one.used() for one in running) - used
         memory = sum(one.memory() for one in running)
-        fresh = fresh_lines(observer)
         begun = time.monotonic()
         for one in running:
             one.process.send(signal.SIGINT)
@@ -219,24 +221,24 @@ def measure(rig: Rig, commands: Sequence[tuple[str | Path, Sequence[str], str]],
     acks = sorted(latency for latencies, _ in told for latency in latencies)
     shares = tuple(acks[int(share * (len(acks) - 1))] for share in (0.5, 0.99, 0.999) if acks)
     return Figures(start, memory, used / passed, sum(count for _, count in told) / passed,
-                   shares, fresh, end)
+                   shares, looks, end)
 
 
-def fresh_lines(observer: Observer) -> int:
-    """Return how many lines say within three seconds that all their mappings are fresh."""
-    levels: dict[str, bytes] = {}
+def look_on(observer: Observer, seconds: float) -> tuple[int, ...]:
+    """Return how often lines say in this time that all is fresh, late, and stale."""
+    levels: Counter[bytes] = Counter()
 
     def take(array: DiagnosticArray) -> None:
         if any(status.name.endswith(': mappings') for status in array.status):
-            levels[array.status[0].name] = find_status(array, 'mappings').level
+            levels[find_status(array, 'mappings').level] += 1
 
     subscription = observer.node.create_subscription(
         DiagnosticArray, '/diagnostics', take, EVERYTHING)
-    end = time.monotonic() + 3.0
+    end = time.monotonic() + seconds
     while time.monotonic() < end:
         observer.executor.spin_once(timeout_sec=0.1)
     observer.node.destroy_subscription(subscription)
-    return sum(level == OK for level in levels.values())
+    return levels[OK], levels[WARN], levels[ERROR]
 
 
 def commands_of(way: str, rig: Rig, count: int) -> list[tuple[str | Path, list[str], str]]:
@@ -267,16 +269,17 @@ def main() -> None:
     parser.add_argument('--ways', nargs='+', default=['one'],
                         choices=['one', 'four', 'each', 'bare'])
     parser.add_argument('--baud', type=int, default=19200)
+    parser.add_argument('--period', type=int, default=0, metavar='MS')
     parser.add_argument('--settle', type=float, default=5.0)
     parser.add_argument('--seconds', type=float, default=20.0)
     options = parser.parse_args()
-    print(f'{MAPPINGS} mappings a line at {options.baud} baud, {options.seconds:g} s each; '
-          f'load of the machine before {os.getloadavg()[0]:.1f}')
+    print(f'{MAPPINGS} mappings a line at {options.baud} baud, Period {options.period}, '
+          f'{options.seconds:g} s each; load of the machine before {os.getloadavg()[0]:.1f}')
     print('way  lines    start      memory   processor  trans/s   ACK 50 / 99 / 99.9 %'
-          '      fresh    end')
+          '   fresh / late / stale    end')
     for way in options.ways:
         for count in options.lines:
-            with rigged(count, options.baud) as rig:
+            with rigged(count, options.baud, options.period) as rig:
                 print(f'{way:5}{count:5d}  {measure(rig, commands_of(way, rig, count), options)}',
                       flush=True)
 
