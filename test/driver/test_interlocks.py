@@ -194,7 +194,8 @@ def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
 
 def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     speed = speed_row()
-    cell = Cell(beat_row(), speed)
+    elsewhere = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)  # it never answers
+    cell = Cell(beat_row(), speed, elsewhere)
     cell.run(1.0)
     cell.publish(speed, 3)
     cell.run(0.2)
@@ -208,6 +209,7 @@ def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     cell.run(2.0)
     assert cell.word('N7:0') == 7
     assert cell.word('N10:0') > 1
+    assert cell.bench.driver.interlocks.unconfirmed()[1:] == [elsewhere.tag]
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)
