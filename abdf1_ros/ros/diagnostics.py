@@ -357,11 +357,5 @@ def _describe(point: ReadPoint, now: float) -> str:
     text += ', never read' if age is None else f', last read {age:.1f} s ago'
     if point.withheld:
         text += f'; {point.withheld}, since {now - point.withheld_since:.1f} s, ' \
-                f'for the {_ordinal(point.withholdings)} time'
+                f'no. {point.withholdings} so far'
     return f'{text}; {point.error}' if point.error else text
-
-
-def _ordinal(number: int) -> str:
-    endings = {1: 'st', 2: 'nd', 3: 'rd'}
-    is_teen = number // 10 % 10 == 1
-    return f'{number}{"th" if is_teen else endings.get(number % 10, "th")}'

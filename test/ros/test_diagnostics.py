@@ -383,6 +383,17 @@ def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
     assert 'speed' not in values
 
 
+def test_withheld_mapping_tells_why_since_when_and_how_often(bench: Bench) -> None:
+    speed = bench.point('speed')
+    speed.update(b'\x01\x00', NOW)
+    speed.withhold('not in RUN', NOW)
+    speed.update(b'\x01\x00', NOW + 1)
+    speed.withhold('not in RUN', NOW + 2)
+    assert bench.says('mappings', NOW + 2)[0] == ERROR
+    assert details(bench.status('mappings', NOW + 5))['speed'] == (
+        'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, since 3.0 s, no. 2 so far')
+
+
 def test_tag_does_not_stand_in_for_a_count(make_bench: Callable[..., Bench]) -> None:
     values = details(make_bench('total,Read,N7:0,1,PLC5,1000').status('mappings'))
     assert values['total'] == '1'
