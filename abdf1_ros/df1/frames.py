@@ -214,10 +214,11 @@ class FrameDecoder:
 
     def reset(self) -> None:
         """Forget everything heard so far."""
-        self.noise += len(self._buffer) + self.in_message
-        self._buffer.clear()
+        if self._buffer or self.in_message:
+            self.noise += len(self._buffer) + self.in_message
+            self._buffer.clear()
+            self.in_message = False
         self._step = self._idle
-        self.in_message = False
         self.last_byte = 0
 
     def feed(self, data: bytes) -> None:

@@ -60,7 +60,8 @@ class Packet(NamedTuple):
         """Read link data; raise FormatError when it is shorter than a header (M 3-7, 4-4)."""
         if len(link_data) < HEADER_SIZE:
             raise FormatError(f'{len(link_data)} bytes of link data, a header has {HEADER_SIZE}')
-        return cls._make((*_HEADER.unpack_from(link_data), link_data[HEADER_SIZE:]))
+        dst, src, cmd, sts, tns = _HEADER.unpack_from(link_data)
+        return cls(dst, src, cmd, sts, tns, link_data[HEADER_SIZE:])
 
     def encode(self) -> bytes:
         """Return the unstuffed link data."""

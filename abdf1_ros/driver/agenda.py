@@ -129,12 +129,9 @@ class Agenda:
 
     def _read(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return a probe or read that is due."""
-        job = self.reads.next_probe(now, busy)
+        job = self.reads.next(now, busy)
         if job is not None:
-            self._last_probe_was_echo = False
-        else:
-            job = self.reads.next(now, busy)
-        if job is not None:
+            self._last_probe_was_echo &= not job.is_probe
             self._writes_in_a_row = self._own_in_a_row = 0
         return job
 

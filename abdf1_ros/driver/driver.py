@@ -300,8 +300,8 @@ class Driver:
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
-        return min(self._writes.next_expiry, self._tasks.next_expiry(),
-                   self.interlocks.next_expiry(), self._read_backs.next_expiry())
+        return min(self._writes.next_expiry, self._tasks.next_expiry,
+                   self.interlocks.next_expiry(), self._read_backs.next_expiry)
 
     def _clock(self) -> float:
         return self.machine.now

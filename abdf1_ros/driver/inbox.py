@@ -63,6 +63,9 @@ class Inbox(Generic[_Item]):
 
     def take(self) -> Iterator[_Item]:
         """Yield and remove what waits, also what is added meanwhile."""
+        return self._each() if self._items else iter(())
+
+    def _each(self) -> Iterator[_Item]:
         while True:
             try:
                 yield self._items.popleft()

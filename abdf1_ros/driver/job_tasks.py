@@ -44,7 +44,8 @@ class JobTasks:
     All jobs under way, and the transaction numbers of their commands.
 
     ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts
-    the replies. ``char_time`` is seconds a character.
+    the replies. ``char_time`` is seconds a character. ``next_expiry`` is when a waiting command
+    will have waited too long (clock value in s), infinite for never.
     """
 
     def __init__(self, station: int, first_tns: int, char_time: float = 0.0) -> None:
@@ -55,6 +56,7 @@ class JobTasks:
         self._last_tns: dict[int, int] = {}
         self._tasks: set[JobTask] = set()
         self._waiting: deque[JobTask] = deque()
+        self.next_expiry = math.inf
 
     def start(self, station: int, steps: Steps[None], now: float, *, reply_size: int = 0,
               expires: float = math.inf, patience: float = 0.0) -> JobTask:
@@ -79,25 +81,26 @@ class JobTasks:
 
     def take(self, task: JobTask, now: float) -> JobTask:
         """Return a waiting task that is now to be sent."""
-        self._waiting.remove(task)
+        self._stop_waiting(task)
         task.taken = now
         return task
 
     def expire(self, now: float) -> None:
         """End the jobs whose next command has waited too long."""
         for task in [task for task in self._waiting if now >= task.expires]:
-            self._waiting.remove(task)
+            self._stop_waiting(task)
             task.fail(CommandExpired())
 
-    def next_expiry(self) -> float:
-        """Return when a waiting command will have waited too long (clock value in s)."""
-        return min(task.expires for task in self._waiting) if self._waiting else math.inf
+    def _stop_waiting(self, task: JobTask) -> None:
+        self._waiting.remove(task)
+        self.next_expiry = min((task.expires for task in self._waiting), default=math.inf)
 
     def fail(self, error: LinkError) -> None:
         """End every job with ``error``."""
         for task in list(self._tasks):
             task.fail(error)
         self._waiting.clear()
+        self.next_expiry = math.inf
 
     def new_command(self, station: int, request: Request) -> Packet:
         """Return the command for a request, with a transaction number of its own."""
@@ -110,6 +113,7 @@ class JobTasks:
             self._tasks.discard(task)
         else:
             self._waiting.append(task)
+            self.next_expiry = min(self.next_expiry, task.expires)
 
     def _next_tns(self, station: int) -> int:
         """Return the next transaction number, never the one this station had last."""

@@ -43,13 +43,15 @@ class ReadBacks:
     """
     The writes that wait to be read back, for ``patience`` seconds at most.
 
-    ``report`` gets their results. All of it belongs to the link thread.
+    ``report`` gets their results. ``next_expiry`` is when the first will have waited too long
+    (clock value in s), infinite for never. All of it belongs to the link thread.
     """
 
     def __init__(self, patience: float, report: Callable[[WriteResult], None]) -> None:
         self._patience = patience
         self._report = report
         self._waiting: list[_UnconfirmedWrite] = []
+        self.next_expiry = math.inf
 
     def add(self, write: Write, result: WriteResult, blocks: Iterable[Block],
             now: float) -> None:
@@ -57,6 +59,7 @@ class ReadBacks:
         entry = _UnconfirmedWrite(write, result, now)
         if any(_shows(block, write.mapping) for block in blocks):
             self._waiting.append(entry)
+            self._plan()
         else:
             self._tell(entry, 'not read back: no row reads all of these words', now)
 
@@ -81,10 +84,6 @@ class ReadBacks:
             if now >= entry.since + self._patience:
                 self._end(entry, f'not read back within {self._patience:g} s', now)
 
-    def next_expiry(self) -> float:
-        """Return when the first will have waited too long (clock value in s), infinite: never."""
-        return self._waiting[0].since + self._patience if self._waiting else math.inf
-
     def end(self, now: float) -> None:
         """End all: the port is lost."""
         for entry in self._waiting[:]:
@@ -92,7 +91,11 @@ class ReadBacks:
 
     def _end(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
         self._waiting.remove(entry)
+        self._plan()
         self._tell(entry, finding, now)
+
+    def _plan(self) -> None:
+        self.next_expiry = self._waiting[0].since + self._patience if self._waiting else math.inf
 
     def _tell(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
         write, result = entry.write, entry.result

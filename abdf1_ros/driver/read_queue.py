@@ -206,11 +206,11 @@ class ReadQueue:
 
     def next_due(self) -> float | None:
         """Return when the next job is due (clock value in s), None for never."""
-        return min((heap[0][0] for heap in self._clean_heaps()), default=None)
+        return min((heap[0][0] for heap in self._heaps_due(math.inf)), default=None)
 
     def _next_heap(self, now: float) -> list[_QueueEntry] | None:
         """Return the heap that begins with the job that goes next."""
-        due = [heap for heap in self._clean_heaps() if heap[0][0] <= now]
+        due = self._heaps_due(now)
         if len(due) < 2:
             return due[0] if due else None
         latest = max(due, key=lambda heap: self._periods_late(heap[0], now))
@@ -225,13 +225,13 @@ class ReadQueue:
         due, _, job = entry
         return (now - due) / self._period(job)
 
-    def _clean_heaps(self) -> list[list[_QueueEntry]]:
-        """Return the heaps that are not empty, each beginning with a valid entry."""
+    def _heaps_due(self, now: float) -> list[list[_QueueEntry]]:
+        """Return the heaps that begin with a job that is due, each with a valid entry."""
         heaps = []
         for heap in self._heaps.values():
             while heap and not self._counts(heap[0]):
                 heapq.heappop(heap)
-            if heap:
+            if heap and heap[0][0] <= now:
                 heaps.append(heap)
         return heaps
 

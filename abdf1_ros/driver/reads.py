@@ -68,10 +68,12 @@ class Reads:
         for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
             self._due.put(job, now)
 
-    def next_probe(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
+    def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
+        """Return a probe if one may be sent, or else the next read that is due."""
+        return (self._aside and self._probe(now, busy)) or self._first(now, busy)
+
+    def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
-        if not self._aside:
-            return None
         for number in list(self._aside):
             if self._stations[number].replies_in_time:  # to a write, or to somebody else
                 self.release(number, now)
@@ -88,7 +90,7 @@ class Reads:
             self._aside[station] = jobs  # to the end: the next probe goes to another station
         return job
 
-    def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
+    def _first(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read that is due, of a station that answers and is not ``busy``."""
         passed_over = []
         while (job := self._due.take(now)) is not None:

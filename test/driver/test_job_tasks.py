@@ -127,7 +127,7 @@ def test_job_that_nobody_has_asked_for_does_not_expire() -> None:
     tasks = JobTasks(OURS, 0)
     task = tasks.start(1, Job().steps(), NOW)
     task.reply(task.command.reply())
-    assert (task.expires, tasks.next_expiry()) == (math.inf, math.inf)
+    assert (task.expires, tasks.next_expiry) == (math.inf, math.inf)
 
 
 def test_command_expires_by_the_request_or_by_the_command_before() -> None:
@@ -136,7 +136,7 @@ def test_command_expires_by_the_request_or_by_the_command_before() -> None:
     size = len(task.command.encode())
     task.reply(task.command.reply())
     assert task.expires == pytest.approx(NOW + 2.0 + 0.01 * size)
-    assert tasks.next_expiry() == task.expires
+    assert tasks.next_expiry == task.expires
 
 
 @pytest.mark.parametrize('after, errors', [(-0.001, 0), (0.0, 1), (4.0, 1)])

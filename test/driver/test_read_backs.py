@@ -103,7 +103,7 @@ def test_nothing_reads_all_of_the_words(text: str, length: int, station: int) ->
     mapping = make_mapping(text, 'Write', length=length, station=station)
     unconfirmed = Unconfirmed(make_mapping('N7:0', length=2), mapping, [1] * length)
     assert unconfirmed.details == ['lost; not read back: no row reads all of these words']
-    assert unconfirmed.backs.next_expiry() == math.inf
+    assert unconfirmed.backs.next_expiry == math.inf
 
 
 def test_read_that_began_before_the_write_ended_says_nothing() -> None:
@@ -116,12 +116,12 @@ def test_read_that_began_before_the_write_ended_says_nothing() -> None:
 def test_patience_ends() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     unconfirmed = Unconfirmed(mapping, mapping, [5])
-    assert unconfirmed.backs.next_expiry() == EARLY + PATIENCE
+    assert unconfirmed.backs.next_expiry == EARLY + PATIENCE
     unconfirmed.backs.expire(EARLY + PATIENCE - 0.001)
     assert unconfirmed.details == []
     unconfirmed.backs.expire(EARLY + PATIENCE)
     assert unconfirmed.details == ['lost; not read back within 2 s']
-    assert unconfirmed.backs.next_expiry() == math.inf
+    assert unconfirmed.backs.next_expiry == math.inf
 
 
 @pytest.mark.parametrize(('text', 'is_overtaken'), [('N7:0', True), ('N7:1', False)])
