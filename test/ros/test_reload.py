@@ -29,7 +29,7 @@ from abdf1_ros.ros.node import BridgeNode
 import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
-from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.ros import (
     details,
@@ -251,9 +251,11 @@ def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) 
     bench.observer.until(client.service_is_ready, 'the service')
     future = client.call_async(Trigger.Request())
     bench.observer.until(lambda: bench.node._link_counters._done, 'the question')
+    active = bench.observer.listen(UInt16MultiArray, '/abdf1/active_stations')
     bench.write_map('speed,Read,N7:0,2,PLC5,2')
     assert bench.reload()[0]
     bench.observer.until(future.done, 'an answer')
+    assert active.values([1 << 2] + [0] * 15)
     assert future.result() == Trigger.Response(success=False, message='station 1: no answer')
 
 
