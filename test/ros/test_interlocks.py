@@ -143,12 +143,17 @@ def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
     assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
 
 
-def test_rule_5_port_that_is_left_to_others_is_left_with_zero(cell: Cell) -> None:
+def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
+        cell: Cell, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     cell.until_counting()
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
     assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
     assert cell.call(SetBool, 'polling', SetBool.Request(data=True)).success
     cell.until_counting()
+    cell.plcs.say('silent 1')
+    monkeypatch.setattr('abdf1_ros.ros.node.END_LIMIT', 0.1)
+    assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
+    assert 'the port is left before the PLC has confirmed: beat' in capfd.readouterr().err
 
 
 def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
