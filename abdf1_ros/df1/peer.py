@@ -150,7 +150,6 @@ class FullDuplexPeer:
         yield from self._listen()  # it answers an earlier process
         while True:
             self._expire()
-            source.expire(self._machine.now)
             # In turns, or an other end that asks all the time would keep our commands waiting.
             if self._replies:
                 yield from self._send_reply(self._replies.popleft())
