@@ -630,12 +630,12 @@ class Stuck:
         self.closed.set()
 
 
-def test_stop_does_not_wait_for_a_name_server() -> None:
+def test_neither_another_machine_nor_the_end_waits_for_a_name_server() -> None:
     stuck = Stuck()
     thread = LinkThread(Script().machine, stuck.open)
     thread.start()
     assert stuck.is_asked.wait(PATIENCE)
-    thread.wake()
+    assert thread.exchange(Script().machine, lambda: None, reopen=False)
     began = time.monotonic()
     thread.stop()
     assert time.monotonic() - began < PATIENCE / 2
