@@ -130,6 +130,11 @@ class Unknown:
         return self.byte in _CODES
 
 
+# Bytes outside of any symbol since the last message. Told before a DLE ENQ, which then asks for
+# the response to what we have not understood (M 4-8).
+NOISE = Unknown(Code.DLE)
+
+
 @dataclass(frozen=True, slots=True)
 class Poll:
     """DLE ENQ STN BCC; ``valid`` tells whether the BCC is right."""
@@ -144,7 +149,8 @@ class Frame(NamedTuple):
 
     ``data`` is the unstuffed link data, ``station`` the STN of a master's frame (None for
     any other). ``fault`` is None for a good frame. ``received`` and ``expected`` are the check
-    as read and as computed; they mean something only for a good frame or a BAD_CHECK.
+    as read and as computed, for a good frame or a BAD_CHECK; ``received`` of a NO_ETX is the code
+    after DLE that broke in. ``has_response`` tells that a response was embedded (M 4-3).
     """
 
     data: bytes
@@ -152,6 +158,7 @@ class Frame(NamedTuple):
     fault: FrameFault | None = None
     received: int = 0
     expected: int = 0
+    has_response: bool = False
 
 
 Symbol = Control | Unknown | Poll | Frame
@@ -189,9 +196,9 @@ class FrameDecoder:
     Turn bytes into symbols.
 
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
-    everything heard. Bytes outside of any symbol are noise: they are skipped and counted in
-    ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
-    ``in_message`` tells whether a message has begun and not ended, ``begun`` counts beginnings.
+    everything heard. Bytes outside of any symbol are counted in ``noise``, and the last byte heard
+    stays in ``last_byte`` for whoever reports it. ``in_message`` tells whether a message has begun
+    and not ended, ``begun`` counts beginnings.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
@@ -203,9 +210,11 @@ class FrameDecoder:
         self._station: int | None = None
         self.last_byte = 0
         self.noise = 0
+        self._noise_told = 0
         self.in_message = False
         self.begun = 0
         self._is_damaged = False  # a character of the message that is coming in
+        self._has_response = False
 
     @property
     def link_data(self) -> bytearray:
@@ -264,6 +273,9 @@ class FrameDecoder:
         if len(self._buffer) < 2:
             return MORE
         pair = bytes(self._buffer[:2])
+        if self.noise != self._noise_told and pair == ENQ and not self._is_half_duplex:
+            self._noise_told = self.noise
+            return NOISE
         del self._buffer[:2]
         return self._begin(pair)
 
@@ -282,7 +294,7 @@ class FrameDecoder:
 
     def _begin_data(self, station: int | None) -> None:
         self._step = self._link_data
-        self.in_message, self._is_damaged = True, False
+        self.in_message, self._is_damaged, self._has_response = True, False, False
         self.begun += 1
         self._station = station
         self._data.clear()
@@ -350,8 +362,9 @@ class FrameDecoder:
             return None
         if pair in (ACK, NAK) and not self._is_half_duplex:
             del self._buffer[:2]
+            self._has_response = True
             return _CONTROLS[pair]  # an embedded response (M 4-3)
-        return self._frame(FrameFault.NO_ETX)  # the pair that broke in is read again as a symbol
+        return self._frame(FrameFault.NO_ETX, pair[1])  # the pair is read again as a symbol
 
     def _take_data(self, count: int) -> None:
         """Take bytes of a message; those that are too many are dropped, up to its end (M 4-8)."""
@@ -375,5 +388,6 @@ class FrameDecoder:
     def _frame(self, fault: FrameFault | None, received: int = 0, expected: int = 0) -> Frame:
         """End the message."""
         self._step = self._idle
-        self.in_message = False
-        return Frame(bytes(self._data), self._station, fault, received, expected)
+        self.in_message, self._noise_told = False, self.noise
+        return Frame(
+            bytes(self._data), self._station, fault, received, expected, self._has_response)

@@ -28,6 +28,7 @@ from abdf1_ros.df1.frames import (
     Frame,
     FrameDecoder,
     MORE,
+    NOISE,
     Poll,
     SOH,
     STX,
@@ -95,6 +96,8 @@ class ListeningDecoder(FrameDecoder):
 
     def next_symbol(self) -> Symbol | None:
         symbol = super().next_symbol()
+        while symbol is NOISE:  # the count is enough
+            symbol = super().next_symbol()
         if symbol is not None:
             self._keep(symbol)
         elif not self.in_message and self._step == self._idle:

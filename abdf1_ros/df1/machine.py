@@ -61,13 +61,13 @@ class Step(NamedTuple):
 
     ``frame`` goes on the line (empty: only listen; None: rest until the time is up or
     ``Machine.wake``, deaf to a half-duplex line). ``timeout`` is in seconds from the moment the
-    last byte has left (0: do not wait, None: no limit, KEEP: what is left of the time of the
-    last step). ``delay`` seconds pass before the frame goes out, and TX_Delay at least, unless it
-    is AT_ONCE. After ``expires`` (clock value in s) it does not go out any more: CommandExpired is
-    raised at the ``yield``. ``reply_size`` is the bytes after the header of the reply that is
-    expected, if that tells no error; 0 where it is not known. ``is_echoed`` says that the line
-    gives back what is sent from now on, as two-wire adapters do; that ends by itself when a
-    time-out shows an echo missing.
+    last byte has left (0: do not wait; where there is nothing to send either, hear what is here
+    already; None: no limit; KEEP: what is left of the time of the last step). ``delay`` seconds
+    pass before the frame goes out, and TX_Delay at least, unless it is AT_ONCE. After ``expires``
+    (clock value in s) it does not go out any more: CommandExpired is raised at the ``yield``.
+    ``reply_size`` is the bytes after the header of the reply that is expected, if that tells no
+    error; 0 where it is not known. ``is_echoed`` says that the line gives back what is sent from
+    now on, as two-wire adapters do; that ends by itself when a time-out shows an echo missing.
     """
 
     frame: bytes | None
@@ -170,10 +170,11 @@ class Machine:
     All others come from ``data_to_send``.
 
     ``unsent`` asks the port how many bytes have still to leave, as far as it can tell;
-    ``position`` counts the bytes given out so far. With ``embeds`` a long message is given out in
-    portions, and a response goes between two of them (M 4-3). ``rate`` is what the line has shown
-    of its speed. ``late`` is the sum of the seconds by which it was called after a deadline of its
-    procedure: so long this process, or its host, has not run.
+    ``position`` counts the bytes given out so far. Once the other end ``embeds`` responses, a long
+    message is given out in portions, and a response goes between two of them (M 4-3), as products
+    do with Embedded Responses = Auto-detect. ``rate`` is what the line has shown of its speed.
+    ``late`` is the sum of the seconds by which it was called after a deadline of its procedure: so
+    long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -278,6 +279,7 @@ class Machine:
         procedure, self._procedure = self._procedure, None
         self._out = b''
         self._outgoing.clear()
+        self.embeds = False
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
         self._is_listening = False
@@ -380,9 +382,11 @@ class Machine:
         while self._is_listening and (symbol := self.decoder.next_symbol()) is not None:
             if self._is_half_duplex or symbol in _RESPONSES:
                 self._take_as_answer()
-            if isinstance(symbol, Frame) and self._message.number == self.decoder.begun:
-                self.rate.message(self.counters.chars_received - self._message.heard,
-                                  self.now - self._message.begun)
+            if isinstance(symbol, Frame):
+                self.embeds |= symbol.has_response and symbol.fault is None
+                if self._message.number == self.decoder.begun:
+                    self.rate.message(self.counters.chars_received - self._message.heard,
+                                      self.now - self._message.begun)
             self._resume(symbol)
 
     def _take_as_answer(self) -> None:
@@ -408,6 +412,8 @@ class Machine:
                 error = CommandExpired()
             elif not self._take_step(step):
                 return
+            elif not step.frame:
+                heard = self.decoder.next_symbol() or _NOTHING
 
     def _take_step(self, step: Step) -> bool:
         """Carry out a step; return whether the procedure goes on at once."""

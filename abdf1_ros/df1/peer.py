@@ -168,11 +168,7 @@ class FullDuplexPeer:
         self._outstanding: dict[tuple[int, int], Outstanding] = {}
         self._last_response = frames.NAK
         self._accepted: _Accepted | None = None
-        self._noise = 0
         self._unused: Packet | None = None
-        self._is_aborted = False
-        self._embedded_in = 0  # the last message that had a response inside, by its number
-        self._machine.embeds = False
 
     def _next_task(self, source: TaskSource) -> Task | None:
         if len(self._outstanding) >= self._settings.max_outstanding:
@@ -337,36 +333,28 @@ class FullDuplexPeer:
 
     def _hear(self, symbol: Symbol) -> bytes:
         """Return what the receiver answers to a symbol (M 4-7..4-9)."""
-        is_aborted, self._is_aborted = self._is_aborted, False
         if isinstance(symbol, Frame):
             return self._message(symbol)
         if symbol is Control.ENQ:
             self._expect_repetition()
             self._counters.enqs_received += 1
-            # What was heard since the last response was not a message, or it would have had one.
-            is_clean = self._machine.decoder.noise == self._noise
-            return self._respond(self._last_response if is_clean else frames.NAK)
+            return self._respond(self._last_response)
         if symbol is Control.ACK or symbol is Control.NAK:
             self._count_response(symbol.code)
             return b''
         self._last_response = frames.NAK
         if isinstance(symbol, Unknown) and not symbol.is_misplaced:
             self._note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=None)
-        return self._respond(frames.NAK) if is_aborted else b''
+        return b''
 
     def _message(self, frame: Frame) -> bytes:
         """Judge a message and return the response to it."""
         if frame.fault is not None:
             self._report(count_fault(frame, self._settings.checksum, self._counters))
-            if frame.fault is not FrameFault.NO_ETX:
-                return self._respond(frames.NAK)
-            # Its sender asks with ENQ, begins again with DLE STX, or has sent a pair that is not a
-            # symbol; only the last of these needs a NAK now (M 4-8).
-            self._last_response, self._is_aborted = frames.NAK, True
-            return b''
-        # An end that embeds responses understands embedded ones. So we embed ours from now on,
-        # like the products with Embedded Responses = Auto-detect (M 4-3).
-        self._machine.embeds |= self._embedded_in == self._machine.decoder.begun
+            if frame.fault is FrameFault.NO_ETX and frame.received in (Code.STX, Code.ENQ):
+                self._last_response = frames.NAK
+                return b''  # its sender begins again, or asks
+            return self._respond(frames.NAK)
         packet = Packet.decode(frame.data)
         self._counters.messages_received += 1
         if not packet.is_sound:
@@ -422,13 +410,10 @@ class FullDuplexPeer:
         if response == frames.NAK:
             self._expect_repetition()
         self._last_response = response
-        self._noise = self._machine.decoder.noise
         self._counters.acks_sent += response == frames.ACK
         self._counters.naks_sent += response == frames.NAK
         return response
 
     def _count_response(self, code: Code) -> None:
-        if self._machine.decoder.in_message:
-            self._embedded_in = self._machine.decoder.begun
         self._counters.acks_received += code is Code.ACK
         self._counters.naks_received += code is Code.NAK

@@ -284,12 +284,11 @@ def _next_within(machine: Machine, seconds: float,
                  look: Callable[[], None]) -> Generator[Step, Heard, Symbol | None]:
     """Return the next symbol, if it is here already or comes within ``seconds``."""
     end = machine.now + seconds
-    symbol = machine.decoder.next_symbol()
-    while symbol is None and (left := end - machine.now) > 0:
+    heard = yield Step(b'', 0)
+    while isinstance(heard, Silence) and (left := end - machine.now) > 0:
         heard = yield Step(None, min(left, TICK))
-        symbol = None if isinstance(heard, Silence) else heard
         look()
-    return symbol
+    return None if isinstance(heard, Silence) else heard
 
 
 def multidrop(stations: Sequence[Responder]) -> Callable[[Machine], Procedure]:

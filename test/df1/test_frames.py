@@ -32,6 +32,7 @@ from abdf1_ros.df1.frames import (
     MAX_WAITING,
     message_frame,
     NAK,
+    NOISE,
     Poll,
     poll_frame,
     stuff,
@@ -90,7 +91,8 @@ def expected_symbols(entry: Vector) -> list[Symbol]:
         fault, expected = FrameFault.BAD_CHECK, entry.expected
     elif len(entry.link_data) < 6:
         fault = FrameFault.TOO_SHORT
-    frame = Frame(entry.link_data, entry.station, fault, received, expected)
+    frame = Frame(entry.link_data, entry.station, fault, received, expected,
+                  entry.has_embedded_response)
     inside = {'embedded_ack': [Control(Code.ACK)], 'embedded_nak': [Control(Code.NAK)]}
     return [*inside.get(entry.name, []), frame]
 
@@ -187,6 +189,16 @@ def test_doubled_dle_outside_of_a_message_is_no_symbol() -> None:
     assert decode(b'\x10\x10\x10\x06') == [Control(Code.ACK)]
 
 
+@pytest.mark.parametrize('noise', [b'\x55\xAA', b'\x10\x10', b'\x55\x10\x10'])
+@pytest.mark.parametrize('chunk', [None, 1])
+def test_noise_since_the_last_message_is_told_before_an_enq(noise: bytes,
+                                                            chunk: int | None) -> None:
+    ack, enq, frame = Control(Code.ACK), Control(Code.ENQ), message_frame(DATA, CRC)
+    assert decode(ENQ + noise + ACK + ENQ + ENQ + noise + frame + ENQ, CRC, FULL, chunk) == [
+        enq, ack, NOISE, enq, enq, *decode(frame), enq]
+    assert decode(noise + poll_frame(7), CRC, HALF, chunk) == [Poll(7, True)]
+
+
 def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
     decoder = FrameDecoder(CRC, HALF)
     decoder.feed(b'\x55\xAA' + ACK + b'\x01\x77')
@@ -275,23 +287,26 @@ def test_largest_reply_of_any_command_fits() -> None:
 def test_message_without_end_is_told_with_what_breaks_it_off(chunk: int | None) -> None:
     assert decode(b'\x10\x02' + bytes(1000), chunk=chunk) == []
     assert decode(b'\x10\x02' + bytes(1000) + EOT, chunk=chunk) == [
-        Frame(bytes(262), None, FrameFault.NO_ETX), Control(Code.EOT)]
+        Frame(bytes(262), None, FrameFault.NO_ETX, Code.EOT), Control(Code.EOT)]
 
 
 @pytest.mark.parametrize('duplex', Duplex)
 def test_message_that_breaks_off_is_reported_and_the_next_one_read(duplex: Duplex) -> None:
     good = message_frame(DATA, CRC)
     assert decode(good[:9] + good, duplex=duplex, chunk=1) == [
-        Frame(DATA[:7], None, FrameFault.NO_ETX), *decode(good)]
+        Frame(DATA[:7], None, FrameFault.NO_ETX, Code.STX), *decode(good)]
 
 
 @pytest.mark.parametrize('response', [ACK, NAK])
 def test_embedded_response_is_one_in_full_duplex_only(response: bytes) -> None:
     good = message_frame(DATA, CRC)
     mixed = good[:5] + response + good[5:]
-    assert decode(mixed, duplex=FULL) == [Control(Code(response[1])), *decode(good)]
+    (frame,) = decode(good)
+    assert isinstance(frame, Frame)
+    assert decode(mixed + good, duplex=FULL) == [
+        Control(Code(response[1])), frame._replace(has_response=True), frame]
     assert decode(mixed, duplex=HALF)[:2] == [
-        Frame(DATA[:3], None, FrameFault.NO_ETX), Control(Code(response[1]))]
+        Frame(DATA[:3], None, FrameFault.NO_ETX, response[1]), Control(Code(response[1]))]
 
 
 def test_reset_forgets_a_message_that_has_begun() -> None:
@@ -362,7 +377,7 @@ def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
         decoder.feed(ENQ * 1000)
     assert len(decoder._buffer) == MAX_WAITING
     assert decoder.noise == 80_000 - MAX_WAITING
-    assert drain(decoder) == [Control(Code.ENQ)] * (MAX_WAITING // 2)
+    assert drain(decoder) == [NOISE] + [Control(Code.ENQ)] * (MAX_WAITING // 2)
     decoder.feed(EOT)
     assert drain(decoder) == [Control(Code.EOT)]
 

@@ -68,4 +68,4 @@ def _check_frame(frame: Frame, checksum: Checksum, duplex: Duplex) -> None:
         line = master_frame(frame.station, frame.data, checksum)
     decoder = FrameDecoder(checksum, duplex)
     decoder.feed(line)
-    assert _drain(decoder) == [frame]
+    assert _drain(decoder) == [frame._replace(has_response=False)]
