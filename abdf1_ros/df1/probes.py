@@ -42,9 +42,14 @@ class Probes:
         free = self._free + self.pause if self._is_kept_for_message else self._free
         return max(free, self._put_off)
 
+    @property
+    def next_message(self) -> float:
+        """Return from when on (clock value, s) a message may go to a silent station."""
+        return self._free + self.pause if self._was_message else self._free
+
     def admits_message(self, now: float) -> bool:
         """Tell whether a message may go to a silent station now."""
-        is_admitted = now >= (self._free + self.pause if self._was_message else self._free)
+        is_admitted = now >= self.next_message
         self._is_kept_for_message |= not is_admitted and not self._was_message
         return is_admitted
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+import math
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.probes import Probes
@@ -165,6 +166,10 @@ class ActiveStationList:
         """Tell whether a message may go to a station: to a silent one in its probes' time only."""
         return self[number].replies_in_time or (
             not self.is_polled(number) and self.probes.admits_message(now))
+
+    def next_message(self, number: int) -> float:
+        """Return from when on (clock value, s) a message may go to an active station."""
+        return -math.inf if self[number].replies_in_time else self.probes.next_message
 
     def tried(self, number: int, now: float, *, probe_begun: float | None,
               is_message: bool = False) -> None:

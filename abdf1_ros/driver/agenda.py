@@ -68,7 +68,7 @@ class Agenda:
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
-        self._last_probe_was_echo = False
+        self._last_probe_was_check = False
 
     def next(self, now: float, busy: Container[int] = (),  # noqa: A003
              ) -> OwnWrite | JobTask | Write | Check | ReadJob | None:
@@ -108,30 +108,30 @@ class Agenda:
         """Return a check that is due; the turn of the reads comes after it."""
         if not self.checks.is_due(now) or self.reads.is_due(self._last_check):
             return None
-        check = self.checks.next(now, busy, self._echo_from(now))
+        check = self.checks.next(now, busy, self._probe_from(now))
         if check is None:
             return None
         self._last_check = now
-        self._last_probe_was_echo |= check.is_probe
+        self._last_probe_was_check |= check.is_probe
         if self.writes:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
 
-    def _echo_from(self, now: float) -> float:
+    def _probe_from(self, now: float) -> float:
         """
-        Return the clock value (s) from which an echo may be a probe.
+        Return the clock value (s) from which a check may be a probe.
 
-        Where reads of silent stations wait as well, echoes and reads take turns.
+        Where reads of silent stations wait as well, checks and reads take turns.
         """
         probes = self._stations.probes
-        is_reads_turn = self._last_probe_was_echo and self.reads.has_silent
+        is_reads_turn = self._last_probe_was_check and self.reads.has_silent
         return now + probes.pause if is_reads_turn and now >= probes.next else probes.next
 
     def _read(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return a probe or read that is due."""
         job = self.reads.next(now, busy)
         if job is not None:
-            self._last_probe_was_echo &= not job.is_probe
+            self._last_probe_was_check &= not job.is_probe
             self._writes_in_a_row = self._own_in_a_row = 0
         return job
 

@@ -164,18 +164,18 @@ class Checks:
             self._add_request(station, now)
         return now >= self._next_due
 
-    def next(self, now: float, busy: Container[int], echo_from: float  # noqa: A003
+    def next(self, now: float, busy: Container[int], probe_from: float  # noqa: A003
              ) -> Check | None:
         """
         Return the next check that is due, None for none or while its station is busy.
 
-        An echo may be a probe from the clock value ``echo_from`` (s) on.
+        It may be a probe from the clock value ``probe_from`` (s) on.
         """
         for check in sorted(self._checks, key=lambda check: check.due):
             if check.due <= now and check.station in busy:
                 return None  # no other check instead: after each of them the reads have their turn
             if check.due <= now:
-                check.due = self._wanted_from(check, echo_from)
+                check.due = self._wanted_from(check, probe_from)
                 if check.due <= now:
                     check.due = math.inf
                     check.is_probe = not self._stations[check.station].replies_in_time
@@ -238,11 +238,11 @@ class Checks:
             check.due = self._clock() + check.period
         self._plan()
 
-    def _wanted_from(self, check: Check, echo_from: float) -> float:
+    def _wanted_from(self, check: Check, probe_from: float) -> float:
         """Return the clock value (s) from which a check that is due wants the line."""
         station = self._stations[check.station]
-        if not station.active:
-            return echo_from if check.kind is CheckKind.ECHO else math.inf
+        if not station.replies_in_time:
+            return probe_from if station.active or check.kind is CheckKind.ECHO else math.inf
         if check.kind is CheckKind.ECHO and station.last_heard is not None:
             return station.last_heard + check.period
         return check.due

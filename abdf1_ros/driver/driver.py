@@ -515,14 +515,14 @@ class Driver:
 
     def _own_steps(self, own: OwnWrite) -> Steps[None]:
         """Write a heartbeat or a fallback."""
-        write, outcome = own.write, Outcome.NOT_SENT
+        write, outcome, begun = own.write, Outcome.NOT_SENT, self.machine.now
         if own.urgency is Urgency.FALLBACK:
-            self._read_backs.overtaken(write, self.machine.now)
+            self._read_backs.overtaken(write, begun)
         try:
             result = yield from self._carry_out(write)
             outcome = result.outcome
         finally:
-            self._writes.ended(write)
+            self._agenda.write_ended(write, begun, self.machine.now)
             self.interlocks.ended(own, outcome, self.machine.now)
         self._write_failed(own.station, result.error)
         refusal = '' if outcome is Outcome.WRITTEN else str(result.error)

@@ -103,6 +103,8 @@ class Interlocks:
         self.fallbacks = [FallbackRow(mapping, cmd_timeout)
                           for mapping in mappings if mapping.fallback]
         self._served = [row for row in self.fallbacks if row.mapping.serves]
+        self._numbers = {mapping.station for mapping in mappings
+                         if (mapping.heartbeat or mapping.fallback) and not mapping.serves}
         self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
         self._stations = stations
         self._writes = writes
@@ -206,21 +208,39 @@ class Interlocks:
         if not self:
             return None
         self.expire(now)
-        return self._zero(now, busy) or self._fallback(now, busy) or self._beat(now, busy)
+        free = [number for number in self._numbers
+                if number not in busy and now >= self._free_from(number)]
+        late = [number for number in free if not self._stations[number].replies_in_time]
+        own = self._first_of({*free}.difference(late), now)
+        # Those that reply late take turns: the one goes first that was tried the longest ago.
+        for number in sorted(late, key=self._pause_end):
+            own = own or self._first_of({number}, now)
+        return own
 
-    def _can_go(self, station: int, now: float, busy: Container[int]) -> bool:
-        """Tell whether a station may be written to: inactive ones are not probed (rule 4)."""
-        return station not in busy and self._stations[station].active \
-            and now >= self._pause_end(station)
+    def _first_of(self, free: Container[int], now: float) -> OwnWrite | None:
+        """Return what has to be written next to one of some stations, None for nothing."""
+        return self._zero(now, free) or self._fallback(now, free) or self._beat(now, free)
+
+    def _free_from(self, station: int) -> float:
+        """
+        Return from when on a station may be written to (clock value in s), infinite for never.
+
+        Inactive ones are not probed (rule 4), those that reply late only in the time for probes.
+        At the end there is no time to wait for that (rule 5).
+        """
+        if not self._stations[station].active:
+            return math.inf
+        in_turn = -math.inf if self._is_ending else self._stations.next_message(station)
+        return max(in_turn, self._pause_end(station))
 
     def _pause_end(self, station: int) -> float:
         """Return until when a PLC that does not answer is left alone (clock value in s)."""
         reach = self._reach.get(station)
         return reach.pause_end if reach else -math.inf
 
-    def _zero(self, now: float, busy: Container[int]) -> OwnWrite | None:
+    def _zero(self, now: float, free: Container[int]) -> OwnWrite | None:
         for row in self.heartbeats:
-            if self._can_go(row.mapping.station, now, busy):
+            if row.mapping.station in free:
                 self._judge(row, now)
                 if row.wants_zero(row.is_held, now):
                     return OwnWrite(Urgency.ZERO, row, row.take(now, is_zero=True))
@@ -242,11 +262,11 @@ class Interlocks:
         topic = row.missing(self._messages, now)
         return f'no message of {topic} in time' if topic else ''
 
-    def _fallback(self, now: float, busy: Container[int]) -> OwnWrite | None:
+    def _fallback(self, now: float, free: Container[int]) -> OwnWrite | None:
         youngest = self._writes.youngest()
         for row in self.fallbacks:
             mapping = row.mapping
-            if mapping.serves or not self._can_go(mapping.station, now, busy) \
+            if mapping.serves or mapping.station not in free \
                     or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
                 continue
             write = row.take(now)
@@ -257,10 +277,9 @@ class Interlocks:
             return OwnWrite(Urgency.FALLBACK, row, write)
         return None
 
-    def _beat(self, now: float, busy: Container[int]) -> OwnWrite | None:
+    def _beat(self, now: float, free: Container[int]) -> OwnWrite | None:
         for row in self.heartbeats:
-            if not self._can_go(row.mapping.station, now, busy) \
-                    or not row.wants_beat(now) or row.is_held:
+            if row.mapping.station not in free or not row.wants_beat(now) or row.is_held:
                 continue
             if row.reason:
                 row.put_off(now + _GLANCE)
@@ -341,13 +360,11 @@ class Interlocks:
     def _moments(self) -> Iterator[float]:
         youngest = self._writes.youngest()
         for fallback in self.fallbacks:
-            if not fallback.mapping.serves and self._stations[fallback.mapping.station].active:
+            if not fallback.mapping.serves:
                 yield max(fallback.next_due(youngest.get(id(fallback.mapping), -math.inf)),
-                          self._pause_end(fallback.mapping.station))
+                          self._free_from(fallback.mapping.station))
         for row in self.heartbeats:
-            if self._stations[row.mapping.station].active:
-                yield max(row.next_due(self._messages),
-                          self._pause_end(row.mapping.station))
+            yield max(row.next_due(self._messages), self._free_from(row.mapping.station))
 
     def _heartbeats_of(self, station: int) -> Iterable[HeartbeatRow]:
         return (row for row in self.heartbeats if row.mapping.station == station)

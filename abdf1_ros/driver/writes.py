@@ -103,10 +103,13 @@ class WriteQueue:
         write = self._first_free(busy)
         if write is not None:
             self._waiting.remove(write)
-            self._under_way.append(write)
-            station = write.mapping.station
-            write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
+            self._begin(write)
         return write
+
+    def _begin(self, write: Write) -> None:
+        self._under_way.append(write)
+        station = write.mapping.station
+        write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
 
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that does not have to wait."""
@@ -140,7 +143,7 @@ class WriteQueue:
     def begin_own(self, write: Write) -> None:
         """Take note that a write of our own is under way, until it has ``ended``."""
         write.is_own = True
-        self._under_way.append(write)
+        self._begin(write)
 
     def ended(self, write: Write) -> None:
         """Take note that a write is not under way any more; the next of its words may be sent."""

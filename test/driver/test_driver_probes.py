@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 from abdf1_ros.df1.checksum import Checksum
@@ -23,7 +24,10 @@ from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.plan.forecast import longest_probe
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.gateway import SimulatedGateway
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import pytest
@@ -33,6 +37,7 @@ from support.multidrop import Slave
 
 LIVING, STRANGERS = 254, (252, 253)
 PROBES = 10
+SLOTS = 16
 
 
 class Bench(DriverBench):
@@ -125,3 +130,71 @@ def test_stations_that_are_gone_get_an_eighth_of_the_line_at_most(
     total, longest = bench.spent()
     assert 0 < total <= window / 8 + longest + bench.unit
     assert len(bench.listener.times(bench.living)) > PROBES / 2
+
+
+GATEWAY = 100
+
+
+class LateBench(DriverBench):
+    """
+    A living PLC, and others that take commands and never reply in time.
+
+    Each of these has a heartbeat and a fallback, every other one a read. ``asked`` notes who has
+    got a command; for its Cmd_Timeout all others wait.
+    """
+
+    def __init__(self, late: int, cmd_timeout: int, via: int | None) -> None:
+        self.living = make_mapping('N7:0', station=LIVING, period=cmd_timeout // 4)
+        self.late = {*range(1, late + 1)}
+        rows = [row for number in self.late for row in self._rows(number, via)]
+        super().__init__([self.living, *rows], start=False, network=Network(
+            baud=115200, timeout=50, cmd_timeout=cmd_timeout))
+        self.plc(LIVING, 'PLC5', ('N7:0', 4))
+        self.asked: list[int] = []
+        if via is None:
+            for number in self.late:
+                self.connect(Slave(number, self.clock, self._lose_reply))
+        else:
+            plcs = [simulated_plc(number, 'PLC5', self.clock) for number in self.late]
+            for plc in plcs:
+                plc.serve = self._lose_reply  # type: ignore[method-assign]
+            self.connect(SimulatedGateway(via, plcs, Checksum.CRC))
+        self._tick()
+        self.open()
+
+    def _rows(self, number: int, via: int | None) -> list[Mapping]:
+        """Return the rows of a station that replies late."""
+        rows = [make_mapping('N7:0', 'Heartbeat', station=number, via=via, tag=f'beat{number}',
+                             period=1000, heartbeat=Heartbeat()),
+                make_mapping('N7:1', 'Write', station=number, via=via, tag=f'speed{number}',
+                             fallback=Fallback((7,), 1000))]
+        read = make_mapping('N7:2', station=number, via=via, tag=f'read{number}')
+        return [*rows, read] if number % 2 else rows
+
+    def _lose_reply(self, command: Packet) -> Packet:
+        self.asked.append(command.dst)
+        reply = command.reply()
+        return replace(reply, tns=reply.tns ^ 0x8000)  # which nobody waits for
+
+    def _tick(self) -> None:
+        """Let the executor run."""
+        self.driver.interlocks.executor_ran(self.clock())
+        self.at(self.clock() + 0.1, self._tick)
+
+
+@pytest.mark.parametrize('via', [None, GATEWAY])
+@settings(max_examples=3)
+@given(late=st.integers(1, 6), cmd_timeout=st.integers(300, 3000))
+@example(late=1, cmd_timeout=3000)
+@example(late=4, cmd_timeout=500)
+def test_heartbeats_fallbacks_and_checks_of_late_stations_are_in_that_eighth(
+        via: int | None, late: int, cmd_timeout: int) -> None:
+    bench = LateBench(late, cmd_timeout, via)
+    unit = cmd_timeout / 1000
+    bench.run((3 * late + 8) * unit)  # until that is known of each
+    bench.asked.clear()
+    before = len(bench.listener.times(bench.living))
+    bench.run(8 * SLOTS * unit)
+    assert SLOTS / 2 < len(bench.asked) <= SLOTS + 1
+    assert {*bench.asked} == bench.late
+    assert len(bench.listener.times(bench.living)) - before > 0.8 * 4 * 8 * SLOTS
