@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 from abdf1_ros.df1.checksum import Checksum
@@ -174,7 +173,7 @@ class LateBench(DriverBench):
     def _lose_reply(self, command: Packet) -> Packet:
         self.asked.append(command.dst)
         reply = command.reply()
-        return replace(reply, tns=reply.tns ^ 0x8000)  # which nobody waits for
+        return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
 
     def _tick(self) -> None:
         """Let the executor run."""
