@@ -79,9 +79,10 @@ class ReadPoint:
         self._is_told = False
         timeout = mapping.publish_while.timeout if mapping.publish_while else None
         self._patience = stale_time if timeout is None else timeout / 1000
-        self._codec = mapping.codec
+        self._decode = mapping.codec.decoder()
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
+        self._is_on_change = mapping.publish is Publish.CHANGE
         self._published: bytes | str | None = None
 
     def update(self, words: bytes, now: float) -> Values | None:
@@ -90,18 +91,23 @@ class ReadPoint:
 
         Raises FormatError when the words are no value of the mapping's type.
         """
-        values = self._codec.decode(words)
-        # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
-        # itself.
-        content = values if isinstance(values, str) else values.tobytes()
-        changed = content != self._published or self.error is not None
+        values = self._decode(words)
+        is_same = self._is_on_change and not self._is_change(values) and self.error is None
         if self.last_good is not None:
             self.interval = now - self.last_good if self.error is None else None
         self.last_good, self.error, self.withheld = now, None, ''
-        self._published = content
-        if self.mapping.publish is Publish.CHANGE and not changed:
+        if is_same:
             return None
         return values if self._scaling is None else self._scaling.publish(values)
+
+    def _is_change(self, values: Values) -> bool:
+        """Remember values; return whether they differ from the last ones."""
+        # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
+        # itself.
+        content = values if isinstance(values, str) else values.tobytes()
+        is_change: bool = content != self._published
+        self._published = content
+        return is_change
 
     def fail(self, error: str) -> bool:
         """Take note that a read gave no value; return whether the reason is a new one."""

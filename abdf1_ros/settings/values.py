@@ -17,9 +17,10 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 import math
 import struct
 import sys
@@ -126,6 +127,12 @@ class Codec:
         if self.type is ValueType.BOOL:
             return (self.bit + self.length + 15) // 16
         return self.element_words * self.length
+
+    def decoder(self) -> Callable[[bytes], Values]:
+        """Return ``decode``, or for plain numbers what does the same in a third of the time."""
+        is_plain = self.word_order is WordOrder.LOW and sys.byteorder == 'little' and \
+            self.type not in (ValueType.STRING, ValueType.BOOL, ValueType.BCD16)
+        return partial(array, self.type.array_code) if is_plain else self.decode
 
     def decode(self, data: bytes) -> Values:
         """Return the values in ``data``; FormatError where the words are not such a value."""

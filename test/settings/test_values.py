@@ -112,7 +112,8 @@ def test_any_words_give_values_or_a_format_error(kind: ValueType) -> None:
 ])
 def test_order_of_bytes_and_words(kind: ValueType, words: str, values: list[float]) -> None:
     codec = Codec(kind, len(values))
-    assert list(codec.decode(bytes.fromhex(words))) == values
+    for decode in codec.decode, codec.decoder():
+        assert decode(bytes.fromhex(words)) == array(kind.array_code, values)
     assert codec.encode(values) == bytes.fromhex(words)
 
 
@@ -122,7 +123,8 @@ def test_order_of_bytes_and_words(kind: ValueType, words: str, values: list[floa
     (ValueType.FLOAT32, 'c0 3f 00 00 7a 44 00 00', [1.5, 1000.0])])
 def test_high_word_first(kind: ValueType, words: str, values: list[float]) -> None:
     codec = Codec(kind, len(values), word_order=WordOrder.HIGH)
-    assert list(codec.decode(bytes.fromhex(words))) == values
+    for decode in codec.decode, codec.decoder():
+        assert decode(bytes.fromhex(words)) == array(kind.array_code, values)
     assert codec.encode(values) == bytes.fromhex(words)
 
 
@@ -210,6 +212,7 @@ def test_words_of_one_value(codec: Codec, words: int) -> None:
 def test_bits_across_words() -> None:
     codec = Codec(ValueType.BOOL, 4, 14)
     assert list(codec.decode(bytes.fromhex('00 40 02 00'))) == [1, 0, 0, 1]
+    assert codec.decoder()(bytes.fromhex('00 40 02 00')) == array('B', [1, 0, 0, 1])
     start = parse_address('B3:0/14', PlcType.SLC)
     assert [(str(address), mask, bits)
             for address, mask, bits in codec.bit_changes(start, [1, 0, 0, 1])] == [
