@@ -94,6 +94,9 @@ class HalfDuplexSlave:
     ``serve`` executes a command and returns its reply. It is called after the command has been
     accepted, once for each command, never for a repetition. ``initiator`` has commands of its
     own to send, if there are any; ``report`` gets the faults of messages for us.
+
+    A message that is stored may be acknowledged (KF2 4-31). So whoever has a line sends what
+    ``respond`` returns, and calls ``make_use`` then; ``handle`` does both.
     """
 
     def __init__(self, settings: SlaveSettings, serve: Callable[[Packet], Packet],
@@ -109,9 +112,16 @@ class HalfDuplexSlave:
         self._just_sent = False
         self._sent_reply = True
         self._last_key: tuple[int, int, int] | None = None
+        self._unused: tuple[Packet, bool] | None = None  # and whether it wants a reply
 
     def handle(self, symbol: Symbol) -> bytes:
         """Return the bytes that this station sends after ``symbol``, mostly none."""
+        response = self.respond(symbol)
+        self.make_use()
+        return response
+
+    def respond(self, symbol: Symbol) -> bytes:
+        """Return the same, and leave the message that it brings to ``make_use``."""
         just_sent, self._just_sent = self._just_sent, False
         if isinstance(symbol, Poll):
             return self._polled(symbol)
@@ -134,7 +144,7 @@ class HalfDuplexSlave:
     def reset(self) -> None:
         """Forget all messages to send and the last one heard."""
         self._held, self._last_key = None, None
-        self._just_sent, self._sent_reply = False, True
+        self._just_sent, self._sent_reply, self._unused = False, True, None
         self._queue.clear()
 
     def withdraw(self) -> None:
@@ -180,10 +190,14 @@ class HalfDuplexSlave:
             self.counters.refused_for_memory += 1
             return b''  # sink full: neither acknowledged nor remembered
         self._last_key = packet.duplicate_key
-        self._execute(packet, wants_reply)
+        self._unused = packet, wants_reply
         return self._ack(frame)
 
-    def _execute(self, packet: Packet, wants_reply: bool) -> None:
+    def make_use(self) -> None:
+        """Take the reply, or carry out the command, that has been accepted."""
+        if self._unused is None:
+            return
+        (packet, wants_reply), self._unused = self._unused, None
         if packet.is_reply:
             self.counters.replies_received += 1
             self.counters.error_messages_received += packet.sts != 0

@@ -73,7 +73,8 @@ class SlaveLink:
             symbol = yield Step(None, max(0.0, next_look - self._machine.now))
             if not isinstance(symbol, Silence):
                 yield from answer(
-                    self._machine, symbol, self._slave.handle, lambda: self._look_after(source))
+                    self._machine, symbol, self._slave.respond, lambda: self._look_after(source))
+                self._slave.make_use()
             if self._machine.now >= next_look:
                 self._look_after(source)
                 next_look = self._machine.now + TICK

@@ -57,6 +57,21 @@ def test_command_leaves_at_a_poll_and_its_reply_ends_it() -> None:
     assert bench.events[0].station == OTHER
 
 
+@pytest.mark.parametrize('tx_delay', [0.0, 0.2])
+def test_ack_leaves_before_the_message_is_made_use_of(tx_delay: float) -> None:
+    order: list[bytes] = []
+
+    def serve(command: Packet) -> Packet:
+        order.append(b'served')
+        return command.reply()
+
+    bench = SlaveBench(SETTINGS, serve=serve, timing=LineTiming(tx_delay=tx_delay))
+    bench.machine.send_at_once = order.append
+    bench.hear(bench.frame(FROM_MASTER))
+    bench.wait(tx_delay)
+    assert order == [ACK, b'served']
+
+
 def test_one_command_is_outstanding() -> None:
     bench = SlaveBench(SETTINGS)
     first, second = bench.add(own(1)), bench.add(own(2))
