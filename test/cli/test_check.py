@@ -78,9 +78,12 @@ def test_files_of_the_package_are_good(prefix: str, capsys: pytest.CaptureFixtur
     assert {block['station'] for block in content['blocks']} <= {1, 2}
 
 
-def test_interlocks_of_the_example_are_guarded(capsys: pytest.CaptureFixture[str]) -> None:
-    main([str(config_file('net.csv')), str(config_file('map.csv')), '--json'])
-    assert not [note for note in parsed(capsys)['notes'] if 'without Publish_While' in note]
+@pytest.mark.parametrize('name', ['', 'heartbeat_', 'peer_'])
+def test_examples_follow_our_own_advice(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main([str(config_file(f'{name}net.csv')), str(config_file(f'{name}map.csv')), '--json'])
+    content = parsed(capsys)
+    assert content['errors'] == content['warnings'] == []
+    assert not [note for note in content['notes'] if 'without Publish_While' in note]
 
 
 def test_every_error_of_both_files_at_once(files: tuple[Path, Path],
