@@ -139,9 +139,10 @@ def _passes(copy: Path, tests: list[str], is_told: bool = False) -> bool:
     """Run tests in a copy until the first one fails; tell whether none does."""
     # No new bytecode: that of a mistake could be taken for the next one's of the same second.
     environment = os.environ | {'PYTHONPATH': str(copy), 'PYTHONDONTWRITEBYTECODE': '1'}
+    # A test that hangs ends the process: hypothesis would repeat it, without a limit.
     process = subprocess.Popen(
         [sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider',
-         f'--timeout={_LIMIT}', *tests],
+         f'--timeout={_LIMIT}', '--timeout-method=thread', *tests],
         cwd=copy, env=environment, stdout=None if is_told else subprocess.DEVNULL,
         stderr=subprocess.STDOUT, start_new_session=True)
     try:
