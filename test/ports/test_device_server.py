@@ -129,6 +129,20 @@ def test_server_that_does_not_answer(
         port.negotiate(EVEN)
 
 
+def test_connection_to_a_server_that_does_not_answer_is_closed(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device_server, '_NEGOTIATION_TIMEOUT', 0.05)
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        with pytest.raises(OSError) as error:  # it keeps the port from being thrown away
+            open_port(PortSettings(f'rfc2217://127.0.0.1:{server.getsockname()[1]}'))
+        connection, _ = server.accept()
+        with connection:
+            connection.settimeout(PATIENCE)
+            while connection.recv(4096):
+                pass
+    assert 'the other end does not speak RFC 2217' in str(error.value)
+
+
 def read(port: Rfc2217Port, wake: int, size: int) -> bytes:
     """Return so many bytes of the line."""
     data = b''
