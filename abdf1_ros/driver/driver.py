@@ -82,6 +82,9 @@ class Listener(Protocol):
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Take note that a station answers without a usable value; once for each reason."""
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Take note that rows are no longer withheld, of which ``mapping`` was the last one."""
+
     def written(self, result: WriteResult) -> None:
         """Take the one result of a write."""
 
@@ -438,7 +441,10 @@ class Driver:
                 continue
             reason = point.guard.why_not(job.started, now) if point.guard else ''
             if not reason:
+                was_withheld = point.is_withheld
                 self._update(point, data[place])
+                if was_withheld and not any(same.is_withheld for same in self._same_as(point)):
+                    self._listener.published_again(point.mapping, now - point.withheld_since)
             elif point.withhold(reason, now):
                 self._tell_withheld(point, reason)
         job.done(now)
@@ -447,12 +453,16 @@ class Driver:
 
     def _tell_withheld(self, point: ReadPoint, reason: str) -> None:
         """Tell that a row is withheld, once for all that depend on the same (rule 15)."""
-        condition = _condition(point.mapping)
-        same = [other for mapping, other in self.points.items()
-                if _condition(mapping) == condition]
+        same = self._same_as(point)
         if not any(other.is_withheld for other in same if other is not point):
             more = f'; so are all {len(same)} rows that depend on it' if len(same) > 1 else ''
             self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
+
+    def _same_as(self, point: ReadPoint) -> list[ReadPoint]:
+        """Return the points whose values depend on the same condition."""
+        condition = _condition(point.mapping)
+        return [other for mapping, other in self.points.items()
+                if _condition(mapping) == condition]
 
     def _update(self, point: ReadPoint, words: bytes) -> None:
         try:

@@ -116,6 +116,7 @@ class _NodeListener:
 
     read: Callable[[Mapping, Values], None]
     unreadable: Callable[[Mapping, str], None]
+    published_again: Callable[[Mapping, float], None]
     written: Callable[[WriteResult], None]
     happened: Callable[[Event], None]
     station_changed: Callable[[Station], None]
@@ -215,7 +216,8 @@ class BridgeNode(Node):
         """Return a driver for the files, and the topics that it publishes to."""
         reads = ReadTopics(self)
         listener = _NodeListener(
-            reads.read, self.unreadable, self.written, self.happened, self.station_changed)
+            reads.read, self.unreadable, self.published_again, self.written, self.happened,
+            self.station_changed)
         configuration = self._configuration
         driver = Driver(configuration.network, configuration.mappings,
                         configuration.driver_settings(), listener)
@@ -315,6 +317,11 @@ class BridgeNode(Node):
         """Log why a read of a station that answers has no value."""
         self._notes.error(mapping.tag, f'{mapping.tag} ({mapping.address} at station '
                                        f'{mapping.station}): {reason}')
+
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Log that a row is not withheld any more, nor are those that depend on the same."""
+        self._notes.info(mapping.tag, f'{mapping.tag} ({mapping.address} at station '
+                                      f'{mapping.station}): published again after {seconds:.1f} s')
 
     def written(self, result: WriteResult) -> None:
         """Publish the result of a write."""

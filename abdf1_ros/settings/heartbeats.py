@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+import difflib
 from typing import Protocol
 
 from abdf1_ros.numbers import decimal_number, whole_number
@@ -187,12 +188,16 @@ def read_publish_while(row: Row, command: str, publishes_always: bool,
         fault('Publish_While', 'Publish_While needs Publish Always: with Change a silent topic '
                                'would look normal')
     if condition.upper() != RUN:
-        if not timeout:
+        if timeout:
+            return PublishWhile(condition, number_in(row, 'Heartbeat_Timeout', _TIMEOUTS, fault))
+        if difflib.get_close_matches(condition.upper(), [RUN]):
+            fault('Publish_While', f'"{condition}" is not {RUN}: did you mean {RUN}? The tag of a '
+                                   'counter needs a Heartbeat_Timeout')
+        else:
             fault('Heartbeat_Timeout', 'Heartbeat_Timeout is missing: ms that the counter '
                   f'"{condition}" may stand still; for the mode of the processor Publish_While '
                   f'is {RUN}')
-            return PublishWhile(condition, None)
-        return PublishWhile(condition, number_in(row, 'Heartbeat_Timeout', _TIMEOUTS, fault))
+        return PublishWhile(condition, None)
     if timeout:
         fault('Heartbeat_Timeout', 'RUN has no Heartbeat_Timeout: the age of the mode is bounded '
                                    'by the stale time', is_superfluous=True)

@@ -95,6 +95,9 @@ class Listener:
         """Count a read without a value."""
         self.troubles += 1
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Do nothing: no row has Publish_While."""
+
     def written(self, result: WriteResult) -> None:
         """Take the result of a write."""
 

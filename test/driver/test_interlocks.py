@@ -572,6 +572,8 @@ def test_rule_15_withholding_is_counted_and_told_once_a_cause() -> None:
         count(cell, 5)
         cell.run(3.0)
     assert cell.bench.driver.points[read].withholdings == len(withheld(cell)) == 3
+    assert [tag for tag, _ in cell.bench.listener.ends] == 2 * [read.tag]
+    assert all(2.0 < seconds < 3.0 for _, seconds in cell.bench.listener.ends)
 
 
 def test_rule_15_rows_of_one_cause_are_told_together() -> None:
@@ -587,6 +589,7 @@ def test_rule_15_rows_of_one_cause_are_told_together() -> None:
     points = [cell.bench.driver.points[read] for read in reads]
     assert [point.freshness(cell.now) for point in points] == 3 * [Freshness.WITHHELD]
     assert [point.withholdings for point in points] == [2, 2, 2]
+    assert len(cell.bench.listener.ends) == 1
 
 
 def test_rule_15_start_is_told_when_the_program_has_had_its_time_to_count() -> None:

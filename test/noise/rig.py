@@ -152,6 +152,9 @@ class DriverEnd:
         """Count reads without a value."""
         self._rig.judge.counts['unreadable'] += 1
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Do nothing: no row has Publish_While."""
+
     def written(self, result: WriteResult) -> None:
         """Hand on a result."""
         content = self._texts.pop(result.value)

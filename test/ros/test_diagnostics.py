@@ -60,6 +60,9 @@ class Listener:
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Take a reason."""
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Take the end of a withholding."""
+
     def written(self, result: WriteResult) -> None:
         """Take a result."""
 

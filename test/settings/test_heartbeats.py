@@ -170,6 +170,12 @@ def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
     assert text in faults(row(**DOORS), row(**COUNTER | cells))[0]
 
 
+@pytest.mark.parametrize('text', ['RUM', 'runn', 'RNU'])
+def test_rule_13_misspelt_run_is_not_taken_for_a_tag(text: str) -> None:
+    told, = faults(row(**DOORS | {'Heartbeat_Timeout': '', 'Publish_While': text}))
+    assert f'(Publish_While): Item: 1, "{text}" is not RUN: did you mean RUN?' in told
+
+
 def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
     text, = faults(row(**DOORS | {'Heartbeat_Timeout': '', 'Publish_While': 'PROG'}))
     assert 'Heartbeat_Timeout is missing: ms that the counter "PROG" may stand still; for the ' \

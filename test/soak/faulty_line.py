@@ -91,6 +91,9 @@ class Ear:
         """Log why there is no value."""
         self._lines.error(mapping.tag, reason)
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Do nothing: no row has Publish_While."""
+
     def written(self, result: WriteResult) -> None:
         """Count the result of a write."""
         self.results += 1

@@ -48,6 +48,7 @@ class Recorder:
         self.reads: list[tuple[float, Mapping, Values]] = []
         self.results: list[WriteResult] = []
         self.reasons: list[tuple[str, str]] = []
+        self.ends: list[tuple[str, float]] = []
         self.events: list[Event] = []
         self.changes: list[tuple[int, bool]] = []
 
@@ -59,6 +60,10 @@ class Recorder:
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Keep why a mapping has no value."""
         self.reasons.append((str(mapping.address), reason))
+
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Keep when a withholding ended."""
+        self.ends.append((mapping.tag, seconds))
 
     def written(self, result: WriteResult) -> None:
         """Keep the result of a write."""

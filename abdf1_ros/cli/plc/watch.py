@@ -114,6 +114,9 @@ class Watch:
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Do nothing: the point has the reason."""
 
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Do nothing: no row has Publish_While."""
+
     def written(self, result: WriteResult) -> None:
         """Do nothing: nothing is written."""
 
