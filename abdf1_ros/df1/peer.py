@@ -217,7 +217,6 @@ class FullDuplexPeer:
                   ) -> Generator[Step, Heard, float | None]:
         """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
-        station = packet.dst
         naks = enqs = 0
         sending = message
         while True:
@@ -233,37 +232,42 @@ class FullDuplexPeer:
                 break
             if response is Code.NAK:
                 naks += 1
-                self._note(Message.NTC_RCVD_NAK_SYMBOL, station=station)
-                if is_probe:
+                self._note(Message.NTC_RCVD_NAK_SYMBOL, station=packet.dst)
+                if is_probe or not self._may_repeat(naks, packet.dst):
                     break
-                if naks > self._settings.nak_retries:
-                    self._counters.nak_limit_exceeded += 1
-                    self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries,
-                               station=station)
-                    break
-                self._counters.nak_retries += 1
-                self._note(Message.NTC_NAK_RETRY, naks, Message.ERR_RCVD_NAK_SYMBOL.number,
-                           station=station)
                 if naks > 1:
                     yield from self._listen((naks - 1) * _NAK_PAUSE)
                 sending = message
             else:
                 enqs += 1
-                if is_probe:
+                if is_probe or not self._may_ask(enqs, packet.dst):
                     break
-                if enqs > self._settings.enq_retries:
-                    self._counters.enq_limit_exceeded += 1
-                    self._note(Message.NTC_ENQ_LIMIT_EXCEEDED, self._settings.enq_retries,
-                               station=station)
-                    break
-                self._counters.enq_retries += 1
-                self._note(Message.NTC_ENQ_RETRY, enqs, Message.NTC_ACK_EXPECTED.number,
-                           station=station)
                 sending = frames.ENQ
         delivered = self._machine.now if response in (Code.ACK, Code.STX) else None
         if enqs or naks or response is Code.STX:
             yield from self._listen()
         return delivered
+
+    def _may_repeat(self, naks: int, station: int) -> bool:
+        """Count and report that a message is sent again, or is not any more."""
+        if naks > self._settings.nak_retries:
+            self._counters.nak_limit_exceeded += 1
+            self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries, station=station)
+            return False
+        self._counters.nak_retries += 1
+        self._note(Message.NTC_NAK_RETRY, naks, Message.ERR_RCVD_NAK_SYMBOL.number,
+                   station=station)
+        return True
+
+    def _may_ask(self, enqs: int, station: int) -> bool:
+        """Count and report that an ENQ asks for the response, or does not any more."""
+        if enqs > self._settings.enq_retries:
+            self._counters.enq_limit_exceeded += 1
+            self._note(Message.NTC_ENQ_LIMIT_EXCEEDED, self._settings.enq_retries, station=station)
+            return False
+        self._counters.enq_retries += 1
+        self._note(Message.NTC_ENQ_RETRY, enqs, Message.NTC_ACK_EXPECTED.number, station=station)
+        return True
 
     def _response(self, sending: bytes, is_answered: Callable[[], bool],
                   expires: float) -> Generator[Step, Heard, Code | None]:
