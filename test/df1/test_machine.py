@@ -202,6 +202,13 @@ def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:
     assert bench.got == [None, None]
 
 
+def test_step_that_neither_sends_nor_waits_hears_what_is_here_already() -> None:
+    bench = Bench(Step(None, None), Step(b'', 0), Step(ACK, 0), Step(b'', 0), Step(b'', 0))
+    bench.machine.start(0.0)
+    bench.machine.receive_data(ACK + EOT + EOT, 1.0)
+    assert bench.got == [SAID_ACK, SAID_EOT, None, SAID_EOT, None]
+
+
 def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
     bench = Bench(Step(ACK, 0))
     bench.machine.start(0.0)
