@@ -69,7 +69,7 @@ class Cell:
             baud=115200 if polling == 'Message' else 19200, timeout=200, cmd_timeout=500,
             nak_retries=1, enq_retries=1, polling=polling),
             settings=DriverSettings(**settings), start=False)  # type: ignore
-        self.plc = self.bench.plc(1, 'PLC5', ('N7:0', 20), ('N10:0', 20), ('N11:0', 20),
+        self.plc = self.bench.plc(1, 'PLC5', ('N7:0', 200), ('N10:0', 20), ('N11:0', 20),
                                   ('B3:0', 4))
         self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
         self.is_alive = True
@@ -412,6 +412,16 @@ def test_rule_10_fallback_is_tried_until_it_is_confirmed() -> None:
     cell.run(2.0)
     assert cell.written('N7:0') == [7]
     assert cell.results() == [START]
+
+
+def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
+    cell = Cell(speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200))
+    cell.run(1.0)
+    cell.bench.lose_port()
+    cell.run(1.0)
+    cell.bench.open()
+    cell.run(1.0)
+    assert cell.results() == [START, RETURN]
 
 
 def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
