@@ -434,10 +434,11 @@ class Driver:
         now = self.machine.now
         self._read_backs.read(job.block, data, job.started, now)
         self._guards.values_read(job.points, job.slices, data, now)
-        has_recovered = False
+        has_recovered, period = False, job.block.period
         for point, place in zip(job.points, job.slices, strict=True):
             has_recovered |= point.error is not None
-            if not job.is_refresh and not point.is_due(now, job.block.period):
+            is_rare = point.period > period and not job.is_refresh  # others are for every read
+            if is_rare and not point.is_due(now, period):
                 continue
             reason = point.guard.why_not(job.started, now) if point.guard else ''
             if not reason:

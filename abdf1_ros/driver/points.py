@@ -141,9 +141,9 @@ class ReadPoint:
         """
         Tell whether a read that is made now is for this point.
 
-        Its block may be read every ``block_period`` seconds, more often than it wants.
+        Its block is read every ``block_period`` seconds, more often than it wants.
         """
-        if self.last_good is None or self.error is not None or self.period <= block_period:
+        if self.last_good is None or self.error is not None:
             return True
         return now - self.last_good >= self.period - 0.5 * block_period
 

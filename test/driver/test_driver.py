@@ -144,6 +144,21 @@ def test_values_are_published_again_each_period() -> None:
     assert len(bench.listener.values(slow)) == 4
 
 
+def test_read_soon_after_a_late_one_is_published_too() -> None:
+    mapping = make_mapping('N7:0', period=100)
+    bench, plc = make_bench(mapping)
+    recording = RecordingPlc(bench, plc)
+    bench._stations[:] = [recording]
+    bench.open()
+    bench.run(0.05)
+    plc.faults.delay = 0.08
+    bench.run(0.1)
+    plc.faults.delay = 0.0
+    bench.run(0.1)
+    assert bench.listener.values(mapping) == [[0]] * 3
+    assert [when for when, _ in recording.commands] == pytest.approx([0.0, 0.1, 0.2], abs=0.02)
+
+
 def test_value_that_publishes_changes_only() -> None:
     mapping = make_mapping('N7:0', publish='Change')
     bench, plc = make_bench(mapping)

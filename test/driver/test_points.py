@@ -403,6 +403,5 @@ def test_read_of_a_faster_block_is_for_a_point_when_its_period_has_passed() -> N
     point.update(bytes(2), 0.0)
     assert [point.is_due(now, 0.1) for now in (0.1, 0.9, 0.96, 1.0, 2.0)] == [
         False, False, True, True, True]
-    assert point.is_due(0.2, 1.0)  # a read of its own
     point.fail('lost')
     assert point.is_due(0.1, 0.1)
