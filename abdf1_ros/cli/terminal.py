@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import difflib
 import errno
 import io
 import os
@@ -28,7 +29,7 @@ import signal
 import sys
 import time
 from types import FrameType
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import package_version
@@ -146,11 +147,34 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[in
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are two lines: a list of all options hides what is wrong."""
+    """
+    A parser whose errors are two lines: a list of all options hides what is wrong.
+
+    An option that it does not know is told by the parser of its own command, with those that may
+    be meant.
+    """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Parse arguments; all have to be known."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            option = next((text for text in unknown if text.startswith('-')), '')
+            meant = _alike(option.partition('=')[0].strip('-').lower(), [
+                name for name in self._option_string_actions if name.startswith('--')])
+            hint = f'; did you mean {" or ".join(meant)}?' if meant else ''
+            self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
+        return found, unknown
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
         self.exit(2, f'{self.prog}: error: {message}\n"{self.prog} --help" tells what it takes\n')
+
+
+def _alike(name: str, options: Sequence[str]) -> list[str]:
+    """Return the options that a name may stand for: all that begin with a single letter."""
+    if len(name) == 1:
+        return [option for option in options if option[2:].startswith(name)]
+    return difflib.get_close_matches(f'--{name}', options, 2)
 
 
 def command_parser(name: str, description: str | None,

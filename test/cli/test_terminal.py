@@ -27,6 +27,7 @@ import sys
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.terminal import (
     colour,
+    command_parser,
     interruptible,
     is_terminal,
     prepare_output,
@@ -186,3 +187,21 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     error = OSError(number, os.strerror(number))
     assert text in reason_of('/dev/ttyUSB0', error)
     assert text not in reason_of('net.csv', error)
+
+
+@pytest.mark.parametrize(('given', 'meant'), [
+    (['--sation', '1'], '--sation 1; did you mean --station?'),
+    (['-s', '1'], '-s 1; did you mean --station?'),
+    (['--baudrate=9600'], '--baudrate=9600; did you mean --baud?'),
+    (['-p'], '-p; did you mean --port or --parity?'), (['--zzz'], '--zzz'), (['more'], 'more')])
+def test_option_that_may_be_meant(
+        given: list[str], meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = command_parser('tool', None)
+    read = parser.add_subparsers().add_parser('read', allow_abbrev=False)
+    for name in ('station', 'port', 'parity', 'baud'):
+        read.add_argument(f'--{name}')
+    with pytest.raises(SystemExit) as ending:
+        parser.parse_args(['read', *given])
+    assert ending.value.code == 2
+    assert capsys.readouterr().err == (f'tool read: error: unrecognized arguments: {meant}\n'
+                                       '"tool read --help" tells what it takes\n')
