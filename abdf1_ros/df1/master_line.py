@@ -243,16 +243,16 @@ class MasterLine:
                 self._last_code = symbol.code
                 if symbol in wanted:
                     return symbol
-            elif isinstance(symbol, Unknown):
-                self._last_code = symbol.byte
-                if not symbol.is_misplaced:
-                    self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
             elif isinstance(symbol, Frame) and symbol.station is None:
                 self._last_code = Code.STX
                 if symbol.fault is FrameFault.NO_ETX:
                     return (yield from self._hear_rest(symbol, number))
                 if symbol.fault is not None or not self._take_late(number, symbol):
                     return symbol
+            elif isinstance(symbol, Unknown):
+                self._last_code = symbol.byte
+                if not symbol.is_misplaced:
+                    self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
             elif self._is_echo(symbol, question.frame):
                 step = _LISTEN_ON_ECHOED
         if symbol.is_broken_off:

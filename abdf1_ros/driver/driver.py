@@ -268,6 +268,9 @@ class Driver:
         job = self._agenda.next(now, busy)
         if job is None:
             return None
+        if isinstance(job, ReadJob):
+            return self._tasks.start(
+                job.station, self._read_steps(job, now), now, reply_size=job.reply_size)
         if isinstance(job, JobTask):
             return self._tasks.take(job, now)
         if isinstance(job, OwnWrite):
@@ -276,10 +279,7 @@ class Driver:
             expires, patience = self._time_limits(job)
             return self._tasks.start(job.mapping.station, self._write_steps(job), now,
                                      expires=expires, patience=patience)
-        if isinstance(job, Check):
-            return self._tasks.start(job.station, self._check_steps(job), now)
-        return self._tasks.start(
-            job.station, self._read_steps(job, now), now, reply_size=job.reply_size)
+        return self._tasks.start(job.station, self._check_steps(job), now)
 
     def _time_limits(self, write: Write) -> tuple[float, float]:
         """Return until when a message may be sent, and the patience between its packets (s)."""
