@@ -66,11 +66,13 @@ def test_rows_that_are_only_comments_are_good_rows_too(
                  '--stations', '1,2']) == 0
     capsys.readouterr()
     path = tmp_path / 'map.csv'
-    rows = [line.removeprefix('# ') if line.count(',') == 7 else line
+    rows = [line.removeprefix('# ') if line.count(',') == 8 else line
             for line in path.read_text(encoding='utf-8').splitlines()]
     path.write_text('\n'.join(rows), encoding='utf-8')
     mappings, problems = load_mappings(str(path))
     assert (len(mappings), problems) == (8, [])
+    guarded = [mapping.tag for mapping in mappings if mapping.publish_while is not None]
+    assert guarded == ['interlocks_1', 'interlocks_2']
 
 
 def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) -> None:
