@@ -32,7 +32,7 @@ def seen(real: int | None, *, words: int = 50, chunk: int = 1) -> float | None:
     rig = MasterBench(7, settings=SETTINGS, baud=BAUD)
     setattr(rig[7], '_execute', lambda command: command.reply(bytes(2 * words)))
     rig.line.char_time = char_time(real) if real else 0.0
-    setattr(rig.line, '_chunk', chunk)
+    rig.line.chunk = chunk
     rig.start()
     for _ in range(EXCHANGES):
         task = rig.ask(7)

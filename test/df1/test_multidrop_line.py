@@ -156,6 +156,7 @@ def assert_exact(rig: Rig) -> None:
 def assert_recovers(rig: Rig) -> None:
     """Check that everybody reaches everybody when the line is quiet."""
     rig.line.noise = QUIET
+    rig.line.chunk = 14  # takes a third of the steps
     rig.line.run_for(4.0)  # what was under way comes to its end
     for number in SLAVES:  # message-based polling brings a station back by a command
         rig.ask(MASTER, number)
@@ -208,16 +209,16 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
     assert_recovers(rig)
 
 
-@pytest.mark.parametrize(('rate', 'chunk'), [(1e-4, 1), (1e-3, 14), (1e-2, 1), (1e-2, 14)])
+@pytest.mark.parametrize(('rate', 'chunk'), [(1e-3, 14), (1e-2, 1)])
 @pytest.mark.parametrize('mode', MODES)
 def test_noise(mode: str, rate: float, chunk: int) -> None:
     rig = Rig(mode, noise=noise_of(rate), chunk=chunk, seed=int(rate * 1e4) + chunk)
     rig.run(30)
     assert_exact(rig)
-    least = {1e-4: 0.95, 1e-3: 0.9, 1e-2: 0.25}[rate]
+    least = {1e-3: 0.9, 1e-2: 0.25}[rate]
     for src in (MASTER, *ASKING):
         assert len(rig.results(src)) >= least * len(rig.nodes[src].all)
-    assert rate < 1e-3 or rig.master.machine.counters.enq_retries > 0
+    assert rig.master.machine.counters.enq_retries > 0
     assert_recovers(rig)
     assert_exact(rig)
 

@@ -200,9 +200,8 @@ def test_counters_of_both_ends_agree_on_a_clean_line(checksum: Checksum, outstan
         assert {number for number, *_ in one.numbers()} == {2523}
 
 
-@pytest.mark.parametrize('chunk', [1, 14])
 @pytest.mark.parametrize('outstanding', [1, 3])
-@pytest.mark.parametrize('rate', [1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize(('rate', 'chunk'), [(1e-4, 14), (1e-3, 14), (1e-2, 1)])
 def test_noise(rate: float, outstanding: int, chunk: int) -> None:
     rig = Rig(replace(SETTINGS, max_outstanding=outstanding), noise=noise_of(rate), chunk=chunk,
               seed=int(rate * 1e4) + outstanding)
@@ -215,7 +214,7 @@ def test_noise(rate: float, outstanding: int, chunk: int) -> None:
 
 
 @pytest.mark.parametrize('outstanding', [1, 3])
-@pytest.mark.parametrize('rate', [1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize('rate', [1e-3, 1e-2])
 def test_noise_on_a_line_with_bcc(rate: float, outstanding: int) -> None:
     rig = Rig(replace(SETTINGS, checksum=Checksum.BCC, max_outstanding=outstanding),
               noise=noise_of(rate), seed=3)

@@ -93,7 +93,7 @@ class VirtualLine:
         self.char_time = char_time(baud)
         self._machines = machines
         self._propagation = propagation
-        self._chunk = chunk
+        self.chunk = chunk
         self._random = Random(seed)
         self._free = [0.0] * len(machines)  # when each sender's last byte has left
         self._away = [0.0] * len(machines)  # until when
@@ -194,8 +194,8 @@ class VirtualLine:
                 self._send(data, start, receiver)
 
     def _send(self, data: bytes, start: float, receiver: int) -> None:
-        for at in range(0, len(data), self._chunk):
-            part = data[at:at + self._chunk]
+        for at in range(0, len(data), self.chunk):
+            part = data[at:at + self.chunk]
             here = start + (at + len(part)) * self.char_time + self._propagation
             if self.noise is not QUIET:
                 part = self.noise.damage(part, self._random)

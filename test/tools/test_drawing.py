@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from tools import drawing
 from tools.rooms import Room, room_of, ROOMS
 
@@ -28,15 +30,18 @@ def test_what_a_longer_way_implies_is_left_out() -> None:
     assert drawing.reduced({A: {B, C}, B: {C}, C: set()}) == {A: {B}, B: {C}, C: set()}
 
 
-def test_arrows_are_the_imports() -> None:
-    found = drawing.arrows()
+@pytest.fixture(scope='module')
+def found() -> dict[Room, set[Room]]:
+    return drawing.arrows()
+
+
+def test_arrows_are_the_imports(found: dict[Room, set[Room]]) -> None:
     assert room_of('pccc/address.py') in found[room_of('settings/mapping.py')]
     assert room_of('ports/link_thread.py') in found[room_of('ros/node.py')]
     assert found[room_of('messages.py')] == set()
 
 
-def test_no_room_leads_back_to_itself() -> None:
-    found = drawing.arrows()
+def test_no_room_leads_back_to_itself(found: dict[Room, set[Room]]) -> None:
     for room in ROOMS:
         reached: set[Room] = set()
         waiting = [room]
