@@ -71,13 +71,13 @@ def test_pseudo_terminal_without_a_link() -> None:
 
 def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
     name = tmp_path / 'plc'
-    name.symlink_to('/dev/pts/does-not-exist')
-    line = PtyEndpoint(str(name))
-    try:
-        assert os.readlink(name).startswith('/dev/pts/')
-        assert name.exists()
-    finally:
-        line.close()
+    # One that is gone, and one whose number another program has by now.
+    with closing(Pty(tmp_path / 'other')) as other:
+        for earlier in ('/dev/pts/does-not-exist', os.readlink(other.name)):
+            name.symlink_to(earlier)
+            with closing(PtyEndpoint(str(name))):
+                assert os.readlink(name) not in (earlier, os.readlink(other.name))
+                assert name.is_char_device()
 
 
 def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
