@@ -216,7 +216,7 @@ def test_keys_lead_to_the_parts_of_the_picture(simulator: Process) -> None:
         screen.resize(6, 80)
         screen.press('c' + CONTROL_L)
         screen.wait_for('counters')
-        screen.redraw_until('q end  arrows')
+        screen.wait_for('q end  arrows')
         screen.press('l' + CONTROL_L)
         screen.wait_for(NODE)
         screen.press('q')
