@@ -21,7 +21,6 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 import pytest
-from support import forkserver
 
 # Files that wait for other processes, the longest first. Tests that only compute come after them,
 # also the longest first: several workers then share the processors better, and end together.
@@ -36,8 +35,6 @@ settings.register_profile(
     'abdf1_ros', derandomize=True, max_examples=150, deadline=None, database=None,
     suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('abdf1_ros')
-
-forkserver.enabled = True
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

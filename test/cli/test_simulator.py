@@ -23,13 +23,14 @@ from pathlib import Path
 import select
 import signal
 import socket
+import subprocess
+import sys
 import termios
 
 from abdf1_ros.cli.simulator import _input, main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
-from support import forkserver
 from support.commands import call
 from support.ptys import PATIENCE, read_exactly
 
@@ -57,7 +58,9 @@ class Simulator:
     """The simulator as a process."""
 
     def __init__(self, *options: str) -> None:
-        self._process = forkserver.start('-m', 'abdf1_ros', 'simulator', *options, text=False)
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'simulator', *options], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self._rest = b''
 
     def line(self) -> str:

@@ -34,7 +34,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.endpoints import PtyEndpoint
 import pytest
-from support import forkserver
 from support.ptys import PATIENCE, Pty, read_exactly
 
 COMMAND = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
@@ -240,8 +239,9 @@ class Command:
     """A module of the package as a process; lines of its output are read as they come."""
 
     def __init__(self, module: str, *args: str) -> None:
-        self.process = forkserver.start(
-            '-m', 'abdf1_ros', module, *args, stdin=subprocess.DEVNULL)
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', module, *args], text=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def __enter__(self) -> Command:
         return self
@@ -286,8 +286,10 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path) -> None:
     assert (status, err) == (0, '')
     assert '  seen: 1 commands, 1 replies, 1 polls, 2 ACK' in out
     assert not os.path.lexists(tap)
-    again = forkserver.start('-m', 'abdf1_ros', 'sniff', saved, '--pcapng', f'{packets}2')
-    assert again.communicate(PATIENCE)[0].splitlines()[:5] == live
+    again = subprocess.run(
+        [sys.executable, '-m', 'abdf1_ros', 'sniff', saved, '--pcapng', f'{packets}2'], text=True,
+        capture_output=True, timeout=PATIENCE, check=True)
+    assert again.stdout.splitlines()[:5] == live
     for path in (packets, f'{packets}2'):  # but for microseconds that a capture rounds
         assert all(entry in Path(path).read_bytes() for entry in (SAID[0], SAID[2], heard))
 

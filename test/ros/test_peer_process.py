@@ -23,13 +23,14 @@ import re
 import select
 import socket
 import subprocess
+import sys
 import threading
 import time
 import tty
 
 import pytest
-from support import forkserver
 
+ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 20.0
 US = 9
 
@@ -121,8 +122,9 @@ class Simulator:
     def __init__(self, folder: Path, *args: str) -> None:
         data = folder / 'data.csv'
         data.write_text(DATA, encoding='utf-8')
-        self._process = forkserver.start('-m', 'abdf1_ros', 'simulator', '--data', str(data),
-                                         *args, stderr=subprocess.STDOUT)
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'simulator', '--data', str(data), *args], cwd=ROOT,
+            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         self.lines: list[str] = []
         self._news = threading.Condition()
         self._reader = threading.Thread(target=self._read)

@@ -27,6 +27,7 @@ from pathlib import Path
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -49,7 +50,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile
-from support import forkserver
 
 
 def _claim_domain() -> tuple[int, socket.socket]:
@@ -94,8 +94,10 @@ class Process:
     def __init__(self, module: str | Path, *args: str) -> None:
         self.lines: list[str] = []
         self._said = threading.Condition()
-        program = [str(module)] if isinstance(module, Path) else ['-m', 'abdf1_ros', module]
-        self._process = forkserver.start(*program, *args)
+        program = [module] if isinstance(module, Path) else ['-m', 'abdf1_ros', module]
+        self._process = subprocess.Popen(
+            [sys.executable, *program, *args], text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self._readers = [
             threading.Thread(target=self._read, args=(stream,))
             for stream in (self._process.stdout, self._process.stderr)]

@@ -25,13 +25,13 @@ import re
 import select
 import signal
 import subprocess
+import sys
 import termios
 import time
 
 from abdf1_ros.cli.monitor.command import main
 import pytest
 from std_msgs.msg import UInt16MultiArray
-from support import forkserver
 from support.commands import call
 from support.ros import Observer, OK, PATIENCE, Process, until_status
 from support.simulator_process import Files, make_files, READS, STATUSES
@@ -104,13 +104,14 @@ def test_it_ends_after_the_time_it_is_given(
 
 def test_reader_that_has_seen_enough_ends_it_quietly(simulator: Process) -> None:
     read, write = os.pipe()
-    process = forkserver.start('-m', 'abdf1_ros', 'monitor', '--node', NODE, '--period', '0.1',
-                               stdin=subprocess.DEVNULL, stdout=write)
-    os.close(write)
-    assert os.read(read, 5)
-    os.close(read)
-    _, said = process.communicate(timeout=PATIENCE)
-    assert all('looking for' in line for line in said.splitlines()), said
+    with subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'monitor', '--node', NODE, '--period', '0.1'],
+            stdout=write, stderr=subprocess.PIPE, text=True) as process:
+        os.close(write)
+        assert os.read(read, 5)
+        os.close(read)
+        _, said = process.communicate(timeout=PATIENCE)
+        assert all('looking for' in line for line in said.splitlines()), said
     assert process.returncode == 0
 
 
@@ -126,10 +127,9 @@ class Terminal:
         self._ours, theirs = pty.openpty()
         termios.tcsetwinsize(theirs, (60, 120))
         environment = {name: os.environ[name] for name in os.environ if name not in _SIZES}
-        # Two contexts of ROS, one after the other, crash at the end of a forked process.
-        self.process = forkserver.start(
-            '-m', 'abdf1_ros', 'monitor', *args, stdin=theirs, stdout=theirs, stderr=theirs,
-            env=environment | {'TERM': term}, forks='--all' not in args)
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'monitor', *args], stdin=theirs, stdout=theirs,
+            stderr=theirs, env=environment | {'TERM': term})
         os.close(theirs)
         self.drawn = ''
         self._decoder = codecs.getincrementaldecoder('utf-8')()

@@ -26,7 +26,6 @@ import sys
 
 from abdf1_ros.cli.plc.command import main
 import pytest
-from support import forkserver
 from support.commands import call, running_simulator, Said
 from support.ptys import Pty
 from support.ros import Process, write_csv
@@ -206,8 +205,9 @@ def test_write_asks_who_sits_at_a_terminal(line: str, plc: Plc, answer: str, sta
                                            value: str) -> None:
     plc('write', 'N7:25', '60', '--yes', '--station', '2')
     ours, theirs = pty.openpty()
-    process = forkserver.start('-m', 'abdf1_ros', 'plc', 'write', 'N7:25', '61', '--station', '2',
-                               '--port', line, stdin=theirs)
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'abdf1_ros', 'plc', 'write', 'N7:25', '61', '--station', '2',
+         '--port', line], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     os.write(ours, f'{answer}\n'.encode())
     out, _ = process.communicate(timeout=20)
     os.close(ours)
@@ -337,9 +337,9 @@ def test_ping_goes_on_until_it_is_interrupted(line: str) -> None:
 
 def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
     ours, theirs = pty.openpty()
-    process = forkserver.start(
-        '-m', 'abdf1_ros', 'plc', 'watch', 'N7:0', '--count', '3', '--period', '0.05',
-        '--port', line, stdin=subprocess.DEVNULL, stdout=theirs, stderr=theirs,
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'abdf1_ros', 'plc', 'watch', 'N7:0', '--count', '3', '--period',
+         '0.05', '--port', line], stdin=subprocess.DEVNULL, stdout=theirs, stderr=theirs,
         env=os.environ | {'TERM': 'xterm', 'COLUMNS': '60', 'LINES': '10'})
     os.close(theirs)
     screen = b''
