@@ -157,7 +157,8 @@ class Line:
     def start(self) -> None:
         """Make the node and run it."""
         self.make()
-        self.run()
+        self.take_callbacks()
+        self.open_port()
 
     def make(self) -> None:
         """Make the node: none with faulty files, or with the port of another line."""
@@ -176,11 +177,15 @@ class Line:
         for fault in self.faults:
             self._logger.fatal(printable(fault))
 
-    def run(self) -> None:
-        """Open the port, and take callbacks."""
-        if self.node is not None and self._callbacks is None:
+    def take_callbacks(self) -> None:
+        """Begin to take callbacks, if there is a node."""
+        if self.node is not None:
             self._callbacks = _Callbacks(self.node)
             self._callbacks.start()
+
+    def open_port(self) -> None:
+        """Begin to read and write, if there is a node."""
+        if self.node is not None:
             self.node.start()
 
     def check(self) -> None:
@@ -320,15 +325,18 @@ class Lines:
         """
         Make all nodes, then run them, until asked to end.
 
-        Lines that run would have the interpreter lock most of the time that the others need to be
-        made: a hundred took four times as long.
+        Lines that run would have the interpreter lock most of the time that the others need: a
+        hundred nodes took four times as long, and their threads half as long again. Threads that
+        take callbacks would wake up at each node that is made.
         """
         for line in self.lines:
             if is_ended():
                 return
             line.make()
         for line in self.lines:
-            line.run()
+            line.take_callbacks()
+        for line in self.lines:
+            line.open_port()
 
     def run(self, ended: threading.Event) -> None:
         """Look after all lines until the end."""
