@@ -67,6 +67,16 @@ def test_changes_are_told_once() -> None:
     assert told == [(7, False), (7, True)]
 
 
+def test_station_that_comes_back_twice_without_a_reply_takes_no_commands() -> None:
+    stations = ActiveStationList([7])
+    found = []
+    for now in range(3):
+        found.append(stations[7].takes_no_commands)
+        stations.lost(7, now + 0.1)
+        stations.heard(7, now + 0.2)
+    assert found == [False, False, True]
+
+
 def test_silence_counts_from_the_loss_until_the_next_answer() -> None:
     stations = ActiveStationList([7])
     assert (stations[7].last_heard, stations[7].silent_since) == (None, None)
