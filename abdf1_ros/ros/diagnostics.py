@@ -356,6 +356,6 @@ def _describe(point: ReadPoint, now: float) -> str:
            f'{point.mapping.station}'
     text += ', never read' if age is None else f', last read {age:.1f} s ago'
     if point.withheld:
-        text += f'; {point.withheld}, since {now - point.withheld_since:.1f} s, ' \
-                f'no. {point.withholdings} so far'
+        text += f'; {point.withheld}, since {now - point.withheld_since:.1f} s; ' \
+                f'times withheld: {point.withholdings}'
     return f'{text}; {point.error}' if point.error else text

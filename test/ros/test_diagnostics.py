@@ -394,7 +394,8 @@ def test_withheld_mapping_tells_why_since_when_and_how_often(bench: Bench) -> No
     speed.withhold('not in RUN', NOW + 2)
     assert bench.says('mappings', NOW + 2)[0] == ERROR
     assert details(bench.status('mappings', NOW + 5))['speed'] == (
-        'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, since 3.0 s, no. 2 so far')
+        'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, since 3.0 s; '
+        'times withheld: 2')
 
 
 def test_tag_does_not_stand_in_for_a_count(make_bench: Callable[..., Bench]) -> None:
