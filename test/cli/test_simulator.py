@@ -312,10 +312,12 @@ def test_two_simulators_do_not_share_a_name(
     assert _refused(capsys, '--data', str(data), '--pty', str(name), status=1) == \
         f'simulator: {name} is in use by another simulator or sniff\n'
     assert os.readlink(name) == before
+    held = os.open(name, os.O_RDWR | os.O_NOCTTY)  # no other simulator is to get this number
     simulator.signal(signal.SIGKILL)
     simulator.end()
     assert os.path.lexists(name)
     again = start('--pty', str(name))
+    os.close(held)
     assert again.line().startswith('simulator: stations')
     assert 'is in use' in _refused(capsys, '--data', str(data), '--pty', str(name), status=1)
     again.signal(signal.SIGTERM)
