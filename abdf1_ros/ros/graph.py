@@ -41,7 +41,7 @@ _MULTIPLE = 2000
 _LOOKS_FOR_DUPLICATES = 30
 
 
-class Seer(Protocol):
+class GraphSource(Protocol):
     """What is used of the node that looks."""
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
@@ -52,10 +52,10 @@ class Seer(Protocol):
 
 
 class Graph:
-    """The nodes and topics of the domain, as ``seer`` sees them; used by one thread."""
+    """The nodes and topics of the domain, as ``source`` sees them; used by one thread."""
 
-    def __init__(self, seer: Seer) -> None:
-        self._seer = seer
+    def __init__(self, source: GraphSource) -> None:
+        self._source = source
         self._nodes: Counter[tuple[str, str]] = Counter()
         self._clashes: dict[str, list[str]] = {}
         self._next_names = self._next_topics = 0.0
@@ -64,7 +64,7 @@ class Graph:
         """Return how many nodes are called so, at the clock value ``now`` (s)."""
         if now >= self._next_names:
             self._next_names = now + _NAMES_PERIOD
-            self._nodes = Counter(self._seer.get_node_names_and_namespaces())
+            self._nodes = Counter(self._source.get_node_names_and_namespaces())
         return self._nodes[name, namespace]
 
     def clashes(self, now: float) -> MappingType[str, list[str]]:
@@ -72,7 +72,7 @@ class Graph:
         if now >= self._next_topics:
             begun = thread_time()
             self._clashes = {topic: types for topic, types
-                             in self._seer.get_topic_names_and_types() if len(types) > 1}
+                             in self._source.get_topic_names_and_types() if len(types) > 1}
             self._next_topics = now + max(_LEAST, _MULTIPLE * (thread_time() - begun))
         return self._clashes
 
