@@ -83,6 +83,11 @@ class FallbackRow:
             self.cause, self._due_since = cause, now
         self._next_try = -math.inf
 
+    @property
+    def is_first_try(self) -> bool:
+        """Tell whether the fallback is due and was not sent since."""
+        return self.cause is not None and self.sent < self._due_since
+
     def is_fresh(self, now: float) -> bool:
         """Tell whether the last confirmed message is young enough."""
         return now < self.refreshed + self.after

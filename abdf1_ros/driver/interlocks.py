@@ -211,26 +211,29 @@ class Interlocks:
         free = [number for number in self._numbers
                 if number not in busy and now >= self._free_from(number)]
         late = [number for number in free if not self._stations[number].replies_in_time]
-        own = self._first_of({*free}.difference(late), now)
+        own = self._first_of({*free}.difference(late), now, busy)
         # Those that reply late take turns: the one goes first that was tried the longest ago.
         for number in sorted(late, key=self._pause_end):
-            own = own or self._first_of({number}, now)
+            own = own or self._first_of({number}, now, busy)
         return own
 
-    def _first_of(self, free: Container[int], now: float) -> OwnWrite | None:
+    def _first_of(self, free: Container[int], now: float,
+                  busy: Container[int]) -> OwnWrite | None:
         """Return what has to be written next to one of some stations, None for nothing."""
-        return self._zero(now, free) or self._fallback(now, free) or self._beat(now, free)
+        return self._zero(now, free) or self._fallback(now, free, busy) or self._beat(now, free)
 
-    def _free_from(self, station: int) -> float:
+    def _free_from(self, station: int, is_first_try: bool = False) -> float:
         """
         Return from when on a station may be written to (clock value in s), infinite for never.
 
         Inactive ones are not probed (rule 4), those that reply late only in the time for probes.
-        At the end there is no time to wait for that (rule 5).
+        The end (rule 5) and the first try of a fallback do not wait for that: the PLC may well
+        carry out what it does not answer.
         """
         if not self._stations[station].active:
             return math.inf
-        in_turn = -math.inf if self._is_ending else self._stations.next_message(station)
+        is_at_once = self._is_ending or is_first_try
+        in_turn = -math.inf if is_at_once else self._stations.next_message(station)
         return max(in_turn, self._pause_end(station))
 
     def _pause_end(self, station: int) -> float:
@@ -262,11 +265,14 @@ class Interlocks:
         topic = row.missing(self._messages, now)
         return f'no message of {topic} in time' if topic else ''
 
-    def _fallback(self, now: float, free: Container[int]) -> OwnWrite | None:
+    def _fallback(self, now: float, free: Container[int],
+                  busy: Container[int]) -> OwnWrite | None:
         youngest = self._writes.youngest()
         for row in self.fallbacks:
-            mapping = row.mapping
-            if mapping.serves or mapping.station not in free \
+            mapping, station = row.mapping, row.mapping.station
+            is_first = row.is_first_try and station not in busy \
+                and now >= self._free_from(station, is_first_try=True)
+            if mapping.serves or not (station in free or is_first) \
                     or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
                 continue
             write = row.take(now)
@@ -362,7 +368,7 @@ class Interlocks:
         for fallback in self.fallbacks:
             if not fallback.mapping.serves:
                 yield max(fallback.next_due(youngest.get(id(fallback.mapping), -math.inf)),
-                          self._free_from(fallback.mapping.station))
+                          self._free_from(fallback.mapping.station, fallback.is_first_try))
         for row in self.heartbeats:
             yield max(row.next_due(self._messages), self._free_from(row.mapping.station))
 

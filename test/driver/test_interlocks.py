@@ -75,6 +75,7 @@ class Cell:
         self.is_alive = True
         self.refused: set[str] = set()
         self.spared: int | None = None  # this value is taken all the same
+        self.is_late = False  # commands are carried out, and no reply comes in time
         self.writes: list[tuple[float, str, int]] = []
         self._tick()
         if start:
@@ -98,6 +99,8 @@ class Cell:
                 and self.refused & self._named(command):
             return command.reply(sts=0x10)
         reply = self.plc.serve(command)
+        if self.is_late:  # nobody waits for this one
+            reply = reply._replace(tns=reply.tns ^ 0x8000)
         after = self._words()
         if command.cmd == 0x0F and command.data[0] == 0x67:
             for name in self._named(command):
@@ -475,6 +478,19 @@ def test_rule_11_every_eighth_turn_is_a_reads() -> None:
     cell = Cell(*beats, read)
     cell.run(5.0)
     assert len(cell.bench.listener.times(read)) > 10
+
+
+def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs() -> None:
+    speed = speed_row(Fallback((7,), 3000))
+    cell = Cell(beat_row(), speed)
+    cell.run(2.0)
+    cell.publish(speed, 3)
+    cell.run(0.1)
+    cell.is_late, begun = True, cell.now
+    cell.run(6.0)
+    assert not cell.bench.driver.stations[1].replies_in_time
+    tried, = (when - begun for when, _, value in cell.writes if value == 7 and when > begun)
+    assert 2.8 < tried < 2.9 + 0.5 + 1.0 + 0.1  # a heartbeat has the line, and a pause follows it
 
 
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
