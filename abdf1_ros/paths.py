@@ -16,19 +16,35 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
+import argparse
 from pathlib import Path
 import sys
+from typing import Any
 
 _PACKAGE = 'abdf1_ros'
 
 
 def package_version() -> str:
     """Return the version of this package, as it is installed."""
+    from importlib.metadata import PackageNotFoundError, version  # a tenth of a command's start
+
     try:
         return version(_PACKAGE)
     except PackageNotFoundError:
         return 'of the source tree'
+
+
+class ShowVersion(argparse.Action):
+    """The option ``--version``, for which the version is looked up only where it is given."""
+
+    def __init__(self, option_strings: list[str], dest: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, default=argparse.SUPPRESS,
+                         help="show program's version number and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        """Print the version and end."""
+        print(f'abdf1_ros {package_version()}')
+        parser.exit()
 
 
 def config_file(name: str) -> Path:

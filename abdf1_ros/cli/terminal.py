@@ -32,7 +32,7 @@ from types import FrameType
 from typing import Any, NoReturn, TextIO
 
 from abdf1_ros.numbers import decimal_number, whole_number
-from abdf1_ros.paths import package_version
+from abdf1_ros.paths import ShowVersion
 
 RED, YELLOW, GREEN = 31, 33, 32
 
@@ -183,7 +183,7 @@ def command_parser(name: str, description: str | None,
     parser = _Parser(
         prog=name, description=description, epilog=epilog, allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
+    parser.add_argument('--version', action=ShowVersion)
     return parser
 
 

@@ -31,7 +31,7 @@ import time
 from types import FrameType
 
 from abdf1_ros.errors import ConfigurationError, Problem
-from abdf1_ros.paths import package_version
+from abdf1_ros.paths import ShowVersion
 from abdf1_ros.text import printable
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -63,7 +63,7 @@ def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=usage.split()[0], usage=usage, description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--version', action='version', version=f'abdf1_ros {package_version()}')
+    parser.add_argument('--version', action=ShowVersion)
     return parser
 
 
