@@ -366,8 +366,9 @@ class OldSlc(Ears):
     def _answer(self, command: Packet) -> Packet:
         reply = self._plc.serve(command)
         if command.cmd == 0x06:  # type and name of M 10-4
-            return reply._replace(data=reply.data[:3] + b'\x18' + reply.data[4:5]
-                           + b'5/01'.ljust(11) + reply.data[16:])
+            data = reply.data
+            return reply._replace(
+                data=data[:3] + b'\x18' + data[4:5] + b'5/01'.ljust(11) + data[16:])
         self.writes += [command.data[1]] if command.data[0] == 0xAA else []
         if command.data[1] <= 82:
             return reply
