@@ -310,8 +310,8 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench(SPEED)
     left_over = Event(Message.ERR_WRONG_MESSAGE, (1, 0, 7), 1)
+    bench.node.link.stop()  # nothing else comes, which would show that the station answers us
     bench.node._may_have_left_over = {1}
-    bench.node.link.stop()  # nothing else comes
     for _ in range(2):
         bench.node.happened(left_over)
     lines = [line.partition('[abdf1]: ')[2]
