@@ -61,7 +61,8 @@ def bridge(arguments: dict[str, str]) -> Node:
         if event.returncode == FAULTY:
             return [LogInfo(msg=f'{event.process_name}: not started again after status {FAULTY}, '
                                 'which is for faulty files or parameters')]
-        return [TimerAction(period=RESPAWN_DELAY, actions=[bridge(arguments)])]
+        return [LogInfo(msg=f'{event.process_name}: to be started again in {RESPAWN_DELAY:g} s'),
+                TimerAction(period=RESPAWN_DELAY, actions=[bridge(arguments)])]
 
     # Typed, because a bare string that reads like a number would become one.
     given = {name: ParameterValue(TextSubstitution(text=arguments[name]), value_type=kind)
