@@ -21,6 +21,7 @@ import os
 from pathlib import Path
 import re
 import signal
+import time
 
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.launching import parameter_types
@@ -177,8 +178,8 @@ def test_killed_bridge_is_started_again_until_the_launch_ends(launch: Starter) -
         match = re.search(r'pid \[(\d+)\]', started)
         assert match
         os.kill(int(match[1]), signal.SIGKILL)
-    # Launch does not end at all if SIGINT comes while it is still busy with the end of a process.
     process.wait_for('node-2: to be started again in 2 s')
+    time.sleep(0.5)  # SIGINT ends the task of launch that runs just then, and launch waits for it
     process.send(signal.SIGINT)
     process.result()
     assert process.text.count('process started with pid') == 2
