@@ -208,19 +208,25 @@ class Interlocks:
         if not self:
             return None
         self.expire(now)
-        free = [number for number in self._numbers
-                if number not in busy and now >= self._free_from(number)]
+        at_once = {number for number in self._numbers if number not in busy
+                   and now >= self._free_from(number, is_first_try=True)}
+        free = [number for number in at_once if now >= self._free_from(number)]
         late = [number for number in free if not self._stations[number].replies_in_time]
-        own = self._first_of({*free}.difference(late), now, busy)
+        own = self._first_of({*free}.difference(late), at_once, now)
         # Those that reply late take turns: the one goes first that was tried the longest ago.
         for number in sorted(late, key=self._pause_end):
-            own = own or self._first_of({number}, now, busy)
+            own = own or self._first_of({number}, at_once, now)
         return own
 
-    def _first_of(self, free: Container[int], now: float,
-                  busy: Container[int]) -> OwnWrite | None:
-        """Return what has to be written next to one of some stations, None for nothing."""
-        return self._zero(now, free) or self._fallback(now, free, busy) or self._beat(now, free)
+    def _first_of(self, free: Container[int], at_once: Container[int],
+                  now: float) -> OwnWrite | None:
+        """
+        Return what has to be written next to one of some stations, None for nothing.
+
+        ``at_once`` are those to which the first try of a fallback may go.
+        """
+        return self._zero(now, free) or self._fallback(now, free, at_once) \
+            or self._beat(now, free)
 
     def _free_from(self, station: int, is_first_try: bool = False) -> float:
         """
@@ -266,13 +272,11 @@ class Interlocks:
         return f'no message of {topic} in time' if topic else ''
 
     def _fallback(self, now: float, free: Container[int],
-                  busy: Container[int]) -> OwnWrite | None:
+                  at_once: Container[int]) -> OwnWrite | None:
         youngest = self._writes.youngest()
         for row in self.fallbacks:
-            mapping, station = row.mapping, row.mapping.station
-            is_first = row.is_first_try and station not in busy \
-                and now >= self._free_from(station, is_first_try=True)
-            if mapping.serves or not (station in free or is_first) \
+            mapping = row.mapping
+            if mapping.serves or mapping.station not in (at_once if row.is_first_try else free) \
                     or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
                 continue
             write = row.take(now)
