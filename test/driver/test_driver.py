@@ -146,7 +146,7 @@ def test_values_are_published_again_each_period() -> None:
 
 def test_read_soon_after_a_late_one_is_published_too() -> None:
     mapping = make_mapping('N7:0', period=100)
-    bench, plc = make_bench(mapping)
+    bench, plc = make_bench(mapping, network=Network(baud=115200, timeout=200))
     recording = RecordingPlc(bench, plc)
     bench._stations[:] = [recording]
     bench.open()
@@ -912,7 +912,7 @@ def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> Non
 
 def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
-    bench, plc = make_bench(fast, long)
+    bench, plc = make_bench(fast, long, network=Network(baud=115200, timeout=200))
     bench.open()
     job, = (job for job in bench.driver._reads.jobs if job.block.mappings == (long,))
     bench.run_until(lambda: job.is_under_way)  # while the fast one has the line
