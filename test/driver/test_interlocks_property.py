@@ -70,14 +70,14 @@ class World:
         beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=300, heartbeat=Heartbeat())
         read = make_mapping('N9:0', period=100)
         self.network = Network(
-            baud=38400, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
+            baud=19200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
             **MODES[mode])  # type: ignore[arg-type]
         self.listener = Recorder(self.clock)
         self.driver = Driver(self.network, [*self.rows, beat, read], DriverSettings(),
                              self.listener)
         self.plc = simulated_plc(1, 'PLC5', self.clock, ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
         far = self._peer() if mode == 'Peer' else self._slave()
-        self.line = VirtualLine(self.driver.machine, far, baud=38400, chunk=8, seed=seed)
+        self.line = VirtualLine(self.driver.machine, far, baud=19200, chunk=8, seed=seed)
         self.published: dict[int, float] = {}
         self.beats: list[tuple[float, int]] = []
         self.executed: list[tuple[float, int, int, float]] = []
