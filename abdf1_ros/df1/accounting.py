@@ -87,8 +87,13 @@ class Accounting:
         self.counters.stale_messages += 1
         self.report(wrong_message(reply, reply.src))
 
-    def complete(self, task: Task, reply: Packet) -> None:
-        """End a task with the reply to its command, or as WrongCommandCode where not its (S0)."""
+    def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
+        """
+        End a task with the reply to its command, or as WrongCommandCode where not its (S0).
+
+        A gateway replies in place of a PLC that it does not reach, maybe after a long time: this
+        is as good as no reply in time, where waiting for it keeps others waiting.
+        """
         station = self._stations[reply.src]
         expected = task.command.cmd | REPLY_BIT
         if reply.cmd != expected:
@@ -98,7 +103,9 @@ class Accounting:
             task.fail(WrongCommandCode(*details))
             return
         station.replies += 1
-        station.overdue = station.returns = 0
+        station.returns = 0
+        is_reached = self._stations.via(reply.src) == reply.src or not reply.is_of_gateway
+        station.overdue = 0 if is_reached else station.overdue + keeps_others_waiting
         station.last_tns = reply.tns
         self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
         task.reply(reply)

@@ -108,7 +108,7 @@ class HalfDuplexMaster:
             if number == BROADCAST:
                 task.reply(reply)
             else:
-                self._line.complete(task, reply)
+                self._line.complete(task, reply, keeps_others_waiting=True)
 
     def _collect_for_slave(self, number: int, command: Packet) -> Talk:
         """Poll for the reply to a command that was passed on (M 3-8)."""

@@ -353,11 +353,11 @@ class MasterLine:
             packet = packet._replace(dst=command.src)
         return packet.answers(command)
 
-    def complete(self, task: Task, reply: Packet) -> None:
+    def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""
-        if reply.sts == 0 or reply.sts & 0xF0:  # else a gateway has sent it in its place (M 8-2)
+        if not reply.is_of_gateway:
             self.stations.heard(reply.src, self.machine.now)
-        self.accounting.complete(task, reply)
+        self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 
     def take_unwanted(self, number: int, packet: Packet) -> None:
         """

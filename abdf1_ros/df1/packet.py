@@ -73,6 +73,11 @@ class Packet(NamedTuple):
         return bool(self.cmd & REPLY_BIT)
 
     @property
+    def is_of_gateway(self) -> bool:
+        """Tell whether a node on the way has replied in place of the destination (M 8-2)."""
+        return 0 < self.sts < 0x10
+
+    @property
     def is_sound(self) -> bool:
         """
         Tell whether the header can be whole: a command has STS 0 (M 6-3..6-8).

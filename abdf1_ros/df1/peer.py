@@ -399,7 +399,7 @@ class FullDuplexPeer:
             self._accounting.stale(packet)
             return
         self._stations.heard(packet.src, self._machine.now)
-        self._accounting.complete(entry.task, packet)
+        self._accounting.complete(entry.task, packet, keeps_others_waiting=True)
 
     def _expire(self) -> None:
         """End the commands whose reply is overdue (S0, counter 2545)."""

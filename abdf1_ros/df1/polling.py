@@ -277,7 +277,7 @@ class StandardPollingMaster:
         if entry is None or not self._line.answers(packet, entry.task.command):
             return False
         del self._outstanding[packet.src]
-        self._line.complete(entry.task, packet)
+        self._line.complete(entry.task, packet, keeps_others_waiting=False)
         return True
 
     def _is_over(self, entry: Outstanding, is_message: bool) -> bool:

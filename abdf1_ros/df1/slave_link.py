@@ -128,9 +128,9 @@ class SlaveLink:
             self._accounting.stale(reply)
             return
         self._outstanding = None
-        if reply.sts == 0 or reply.sts & 0xF0:  # else a node on the way has sent it (M 8-2)
+        if not reply.is_of_gateway:
             self._stations.heard(reply.src, self._machine.now)
-        self._accounting.complete(entry.task, reply)
+        self._accounting.complete(entry.task, reply, keeps_others_waiting=True)
 
     def _look_after(self, source: TaskSource) -> None:
         """End what is overdue."""

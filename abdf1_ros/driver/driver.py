@@ -484,7 +484,7 @@ class Driver:
         is_news = is_refusal and job in self._reads.jobs
         change = self._refusals.refused(job.block) if is_news else None
         is_divided = change is not None and list(change.old) == [job.block]
-        for point in job.points:
+        for point in self._affected(job.station, job.points):
             if is_divided:
                 point.fail(f'{reason} (or another address read with it has this fault)')
             else:
@@ -498,15 +498,18 @@ class Driver:
             self._reads.replace(old, map(self._job, change.new), self.machine.now)
 
     def _link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
-        """Fail the points of a transaction without a reply; all of a station that is silent."""
+        """Fail the points of a transaction without a reply."""
         if station == BROADCAST:
             return
         self.stations[station].failures += 1
-        if not self.stations[station].replies_in_time:
-            points = (point for point in self.points.values()
-                      if point.mapping.station == station)
-        for point in points:
+        for point in self._affected(station, points):
             point.fail(str(error))
+
+    def _affected(self, station: int, points: Iterable[ReadPoint]) -> Iterable[ReadPoint]:
+        """Return the points of a failed transaction, all of the station where it is silent."""
+        if self.stations[station].replies_in_time:
+            return points
+        return [point for point in self.points.values() if point.mapping.station == station]
 
     def _write_steps(self, write: Write) -> Steps[None]:
         station, begun = write.mapping.station, self.machine.now

@@ -19,8 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome
@@ -141,6 +142,33 @@ def test_plc_that_the_gateway_does_not_reach_costs_the_other_nothing(polling: st
     assert bench.driver.stations[SECOND].last_heard is None
     bench.plcs[1].faults.silent = False
     bench.run(3.0)
+    assert bench.listener.values(bench.second)
+
+
+@pytest.mark.parametrize('polling', POLLING)
+def test_gateway_that_takes_long_to_say_so_does_not_take_the_line(polling: str) -> None:
+    bench = Bench(polling)
+    answer, ready = bench.gateway.handle, [0.0]
+
+    def answer_late(symbol: Symbol) -> bytes:
+        if isinstance(symbol, Poll) and bench.clock() < ready[0]:
+            return frames.EOT if symbol.station == GATEWAY else b''
+        if isinstance(symbol, Frame) and Packet.decode(symbol.data).dst == SECOND:
+            ready[0] = bench.clock() + 0.4  # of the 0.5 s of Cmd_Timeout
+        return answer(symbol)
+
+    bench.gateway.handle = answer_late  # type: ignore[method-assign]
+    bench.plcs[1].faults.silent = True
+    bench.run(10.0)
+    bench.listener.reads.clear()
+    bench.run(20.0)
+    assert bench.driver.stations[SECOND].active  # the gateway is
+    assert len(bench.listener.values(bench.third)) > 140  # of 200
+    if polling == 'Message':  # otherwise the gateway keeps only its own waiting
+        assert len(bench.listener.values(bench.first)) > 140
+    bench.plcs[1].faults.silent = False
+    bench.gateway.handle = answer  # type: ignore[method-assign]
+    bench.run(10.0)
     assert bench.listener.values(bench.second)
 
 
