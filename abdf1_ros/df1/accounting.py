@@ -104,7 +104,7 @@ class Accounting:
             return
         station.replies += 1
         station.returns = 0
-        is_reached = self._stations.via(reply.src) == reply.src or not reply.is_of_gateway
+        is_reached = not reply.is_of_gateway or self._stations.via(reply.src) == reply.src
         station.overdue = 0 if is_reached else station.overdue + keeps_others_waiting
         station.last_tns = reply.tns
         self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
