@@ -104,8 +104,8 @@ class Accounting:
             return
         station.replies += 1
         station.returns = 0
-        is_reached = not reply.is_of_gateway or self._stations.via(reply.src) == reply.src
-        station.overdue = 0 if is_reached else station.overdue + keeps_others_waiting
+        station.is_out_of_reach = reply.is_of_gateway
+        station.overdue = station.overdue + keeps_others_waiting if station.is_out_of_reach else 0
         station.last_tns = reply.tns
         self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
         task.reply(reply)

@@ -42,6 +42,7 @@ class Station:
     nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
     message whose addresses cannot be right. ``overdue`` counts the commands in a row that
     were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
+    ``is_out_of_reach`` tells that the last reply to a command was that of a gateway in its place.
     ``returns`` counts how often it has become active again since its last reply to a command.
     """
 
@@ -56,6 +57,7 @@ class Station:
     remote_errors: int = 0
     silent_since: float | None = None
     overdue: int = 0
+    is_out_of_reach: bool = False
     returns: int = 0
 
     @property

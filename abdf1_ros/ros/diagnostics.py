@@ -259,22 +259,18 @@ class Diagnostics:
         if not station.active:
             since = now - (station.silent_since or now)
             return ERROR, f'station {station.number} inactive since {since:.1f} s'
-        if not station.replies_in_time:
-            return WARN, self._why_late(station.number)
+        if station.is_out_of_reach:
+            return WARN, f'station {station.number} is out of reach of its gateway'
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
+        if not station.replies_in_time:
+            return WARN, f'station {station.number} takes commands, but does not reply in time'
         why = processor_fault(self._driver.health.known(station.number).identity)
         if why is not None:
             return WARN, f'station {station.number} active, but {why}'
         if (wrong := self._wrong_type(station.number)) is not None:
             return WARN, wrong
         return OK, f'station {station.number} active'
-
-    def _why_late(self, station: int) -> str:
-        via = self._driver.stations.via(station)
-        if via == station:
-            return f'station {station} takes commands, but does not reply in time'
-        return f'gateway {via} does not reach station {station}, or brings no reply in time'
 
     def deaf_stations(self, now: float) -> list[int]:
         """Return the stations of a master that are heard, but not with replies to commands."""

@@ -1339,6 +1339,19 @@ def test_replies_that_do_not_come_in_time_are_counted_until_one_does() -> None:
     assert peer.stations[1].overdue == 0
 
 
+def test_replies_of_a_gateway_in_place_of_a_station_are_counted_like_late_ones() -> None:
+    """M 8-2: the low half of STS is for nodes on the way, the high half for the PLC."""
+    peer = bench()
+    seen = []
+    for number, sts in enumerate((0x02, 0x07, 0x10, 0x02, 0x00), start=1):
+        peer.begin(later(COMMAND, number))
+        peer.said()
+        peer.hear(ACK)
+        peer.hear_packet(later(REPLY, number)._replace(sts=sts))
+        seen.append((peer.stations[1].overdue, peer.stations[1].is_out_of_reach))
+    assert seen == [(1, True), (2, True), (0, False), (1, True), (0, False)]
+
+
 def test_refusing_station_is_probed_with_one_try() -> None:
     peer = bench()
     lose(peer)
