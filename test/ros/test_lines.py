@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+import os
 from pathlib import Path
 import resource
 import signal
@@ -188,11 +189,14 @@ def handlers(monkeypatch: pytest.MonkeyPatch) -> dict[int, Callable[..., None]]:
 @pytest.fixture
 def plant(tmp_path: Path, handlers: dict[int, Callable[..., None]],
           monkeypatch: pytest.MonkeyPatch) -> Iterator[Plant]:
+    left: list[int] = []  # what does not end in time is left, which would end all tests too
+    monkeypatch.setattr(os, '_exit', left.append)
     with ExitStack() as stack:
         plant = Plant(tmp_path, stack)
         monkeypatch.setattr(module, 'BridgeNode', plant.make_node)
         yield plant
         plant.end(handlers)
+        assert left == []
         assert not get_default_context().ok()
 
 
