@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-import os
 from pathlib import Path
 import resource
 import signal
 import threading
 import time
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.errors import ConfigurationError
@@ -190,7 +190,7 @@ def handlers(monkeypatch: pytest.MonkeyPatch) -> dict[int, Callable[..., None]]:
 def plant(tmp_path: Path, handlers: dict[int, Callable[..., None]],
           monkeypatch: pytest.MonkeyPatch) -> Iterator[Plant]:
     left: list[int] = []  # what does not end in time is left, which would end all tests too
-    monkeypatch.setattr(os, '_exit', left.append)
+    monkeypatch.setattr(module, 'os', SimpleNamespace(_exit=left.append))
     with ExitStack() as stack:
         plant = Plant(tmp_path, stack)
         monkeypatch.setattr(module, 'BridgeNode', plant.make_node)
