@@ -84,8 +84,13 @@ _Result = TypeVar('_Result')
 
 
 def here(seconds: float) -> float:
-    """Return a time limit (s), longer where more programs run than there are processors."""
-    return seconds * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+    """
+    Return a time limit (s), longer where more programs run than there are processors.
+
+    The load is a mean of minutes, which does not know yet of tests that have just begun.
+    """
+    programs = max(os.getloadavg()[0], int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1')))
+    return seconds * max(1.0, programs / (os.cpu_count() or 1))
 
 
 class Process:
