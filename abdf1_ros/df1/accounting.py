@@ -21,7 +21,7 @@ from collections.abc import Callable
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, FrameFault, MAX_LINK_DATA
-from abdf1_ros.df1.packet import HEADER_SIZE, Packet, REPLY_BIT
+from abdf1_ros.df1.packet import HEADER_SIZE, is_local_status, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandTimeout, WrongCommandCode
@@ -104,8 +104,8 @@ class Accounting:
             return
         station.replies += 1
         station.returns = 0
-        station.is_out_of_reach = reply.is_of_gateway
-        station.overdue = station.overdue + keeps_others_waiting if station.is_out_of_reach else 0
+        station.local_status = reply.sts if is_local_status(reply.sts) else 0
+        station.overdue = station.overdue + keeps_others_waiting if station.local_status else 0
         station.last_tns = reply.tns
         self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
         task.reply(reply)

@@ -37,7 +37,7 @@ from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Poll, Unknown
 from abdf1_ros.df1.machine import Heard, LISTEN_ON, Machine, Silence, Step
-from abdf1_ros.df1.packet import BROADCAST, Packet, source
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, source, STS_NOT_DELIVERED
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
@@ -76,7 +76,6 @@ _MOMENT = 0.0001
 # message that has broken off.
 _QUIET_CHARACTERS = 10
 
-_NOT_DELIVERED = 0x02  # STS: the destination does not acknowledge (M 8-2)
 
 Talk = Generator[Step, Heard, None]
 
@@ -355,7 +354,7 @@ class MasterLine:
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""
-        if not reply.is_of_gateway:
+        if not is_local_status(reply.sts):
             self.stations.heard(reply.src, self.machine.now)
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 
@@ -411,7 +410,7 @@ class MasterLine:
     def _refuse(self, packet: Packet) -> None:
         """Answer a command that cannot be passed on."""
         if not packet.is_reply and packet.src != self.settings.station:
-            self._forwards.append(packet.reply(sts=_NOT_DELIVERED))
+            self._forwards.append(packet.reply(sts=STS_NOT_DELIVERED))
 
     @contextmanager
     def _probe_of(self, number: int) -> Iterator[None]:

@@ -28,6 +28,14 @@ REPLY_BIT = 0x40
 PRIORITY_BIT = 0x20
 BROADCAST = 255
 
+STS_NOT_DELIVERED = 0x02
+"""The destination does not acknowledge (M 8-2)."""
+
+
+def is_local_status(sts: int) -> bool:
+    """Tell whether STS is of a node on the way: the command may not have got there (M 8-2)."""
+    return 0 < sts < 0x10
+
 
 def source(link_data: bytes) -> int:
     """Return SRC of link data that hold a header."""
@@ -71,11 +79,6 @@ class Packet(NamedTuple):
     def is_reply(self) -> bool:
         """Tell whether this is a reply, not a command."""
         return bool(self.cmd & REPLY_BIT)
-
-    @property
-    def is_of_gateway(self) -> bool:
-        """Tell whether a node on the way has replied in place of the destination (M 8-2)."""
-        return 0 < self.sts < 0x10
 
     @property
     def is_sound(self) -> bool:

@@ -27,7 +27,7 @@ from collections.abc import Callable
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.link import LinkStatus
 from abdf1_ros.df1.machine import Machine, Procedure, Silence, Step
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, TaskSource
@@ -128,7 +128,7 @@ class SlaveLink:
             self._accounting.stale(reply)
             return
         self._outstanding = None
-        if not reply.is_of_gateway:
+        if not is_local_status(reply.sts):
             self._stations.heard(reply.src, self._machine.now)
         self._accounting.complete(entry.task, reply, keeps_others_waiting=True)
 

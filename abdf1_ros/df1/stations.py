@@ -42,7 +42,8 @@ class Station:
     nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
     message whose addresses cannot be right. ``overdue`` counts the commands in a row that
     were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
-    ``is_out_of_reach`` tells that the last reply to a command was that of a gateway in its place.
+    ``local_status`` is the STS of the last reply to a command where a node on the way, such as a
+    gateway, has sent that in its place, 0 where it is its own.
     ``returns`` counts how often it has become active again since its last reply to a command.
     """
 
@@ -57,7 +58,7 @@ class Station:
     remote_errors: int = 0
     silent_since: float | None = None
     overdue: int = 0
-    is_out_of_reach: bool = False
+    local_status: int = 0
     returns: int = 0
 
     @property

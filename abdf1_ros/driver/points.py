@@ -21,10 +21,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
+from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
-from abdf1_ros.pccc.status import is_local
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, Publish
 from abdf1_ros.settings.values import Values, ValueType
@@ -203,7 +203,7 @@ class WriteResult:
     def is_unconfirmed(self) -> bool:
         """Tell whether the PLC may have executed a packet that it has not confirmed."""
         if isinstance(self.error, RemoteError):
-            return is_local(self.error)
+            return is_local_status(self.error.sts)
         return self.error is not None and self.error.sent
 
     def __str__(self) -> str:

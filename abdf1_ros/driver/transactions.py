@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
@@ -29,7 +29,7 @@ from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.plc5 import identity as plc5
-from abdf1_ros.pccc.status import check_status, is_local, STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
@@ -79,7 +79,7 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
             detail = (yield from _send(write, packet)) or detail
             done += 1
     except RemoteError as error:
-        outcome = Outcome.UNKNOWN if is_local(error) else Outcome.FAILED
+        outcome = Outcome.UNKNOWN if is_local_status(error.sts) else Outcome.FAILED
         return _ended_early(write, outcome, clock(), done, error)
     except LinkError as error:
         outcome = Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT

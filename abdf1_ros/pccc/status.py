@@ -160,8 +160,3 @@ def is_address_fault(error: RemoteError) -> bool:
     if error.ext_sts is not None:
         return error.ext_sts in _ADDRESS_FAULTS
     return error.sts in (STS_ILLEGAL_COMMAND, STS_ADDRESS)
-
-
-def is_local(error: RemoteError) -> bool:
-    """Tell whether a node on the way reports that the command may not have got there (M 8-2)."""
-    return error.sts & 0xF0 == 0

@@ -26,6 +26,7 @@ from abdf1_ros.driver.points import Freshness, ReadPoint, WriteResult
 from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.status import status_text
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen
@@ -259,8 +260,9 @@ class Diagnostics:
         if not station.active:
             since = now - (station.silent_since or now)
             return ERROR, f'station {station.number} inactive since {since:.1f} s'
-        if station.is_out_of_reach:
-            return WARN, f'station {station.number} is out of reach of its gateway'
+        if station.local_status:
+            return WARN, f'commands do not get to station {station.number}: ' \
+                         f'{status_text(station.local_status)}'
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
         if not station.replies_in_time:

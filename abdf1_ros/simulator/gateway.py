@@ -20,13 +20,11 @@ from collections.abc import Sequence
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Symbol
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.slave import HalfDuplexSlave, Responder, SlaveSettings
 from abdf1_ros.pccc.diagnostics import CMD, ECHO, STATUS
 from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-
-_NOT_DELIVERED = 0x02  # STS: the node does not acknowledge (M 8-2)
 
 # Its identity, as pccc/gateways.py reads it: a module with its name.
 _IDENTITY = (bytes((0x00, 0xFE, 0x2C, 0x00, 0x00)) + b'1770-KF3'.ljust(11)).ljust(24, b'\0')
@@ -54,7 +52,7 @@ class SimulatedGateway:
             return _answer_for_itself(command)
         plc = self._plcs.get(command.dst)
         if plc is None or plc.faults.silent:
-            return command.reply(sts=_NOT_DELIVERED)
+            return command.reply(sts=STS_NOT_DELIVERED)
         return plc.serve(command)
 
 

@@ -1348,8 +1348,8 @@ def test_replies_of_a_gateway_in_place_of_a_station_are_counted_like_late_ones()
         peer.said()
         peer.hear(ACK)
         peer.hear_packet(later(REPLY, number)._replace(sts=sts))
-        seen.append((peer.stations[1].overdue, peer.stations[1].is_out_of_reach))
-    assert seen == [(1, True), (2, True), (0, False), (1, True), (0, False)]
+        seen.append((peer.stations[1].overdue, peer.stations[1].local_status))
+    assert seen == [(1, 0x02), (2, 0x07), (0, 0), (1, 0x02), (0, 0)]
 
 
 def test_refusing_station_is_probed_with_one_try() -> None:

@@ -322,8 +322,10 @@ def test_station_that_does_not_reply_in_time(bench: Bench) -> None:
 
 
 def test_plc_that_its_gateway_does_not_reach(bench: Bench) -> None:
-    bench.driver.stations[1].is_out_of_reach = True  # and has not been heard yet
-    assert bench.says('station 1') == (WARN, 'WARN: station 1 is out of reach of its gateway')
+    bench.driver.stations[1].local_status = 0x02  # and has not been heard yet
+    assert bench.says('station 1') == (WARN, (
+        'WARN: commands do not get to station 1: '
+        'STS 02: destination does not acknowledge, delivery not guaranteed'))
 
 
 def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
