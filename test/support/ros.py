@@ -72,7 +72,8 @@ _DOMAIN, _CLAIM = _claim_domain()
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN),
-    'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0'}
+    'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0',
+    'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('dds.xml'))}
 
 EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 
