@@ -117,7 +117,7 @@ def test_ends_well_while_values_come_in(
         observer: Observer, files: Files, signals: tuple[signal.Signals, ...]) -> None:
     speeds = observer.listen(Int16MultiArray, '/ending/read/speeds')
     with files.start_simulator() as simulator, \
-            Process('node', *files.args(), '-r', '__node:=ending') as node:
+            Process('node', *files.args(), '-r', '__node:=ending', is_forked=False) as node:
         speeds.first()
         node.end(*signals)
         simulator.end()
@@ -173,7 +173,7 @@ def hangups() -> Iterator[None]:
 
 @pytest.mark.usefixtures('hangups')
 def test_ends_with_its_terminal(files: Files) -> None:
-    with Process('node', *files.args()) as node:
+    with Process('node', *files.args(), is_forked=False) as node:
         node.wait_for('cannot open the port')
         node.end(signal.SIGHUP)
 

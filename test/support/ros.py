@@ -50,6 +50,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile
+from support.forked import Forked
 
 
 def _claim_domain() -> tuple[int, socket.socket]:
@@ -95,15 +96,23 @@ def here(seconds: float) -> float:
 
 
 class Process:
-    """A module of the package, or a file, as a process; all it says is kept, line by line."""
+    """
+    A command of the package, or a file, as a process; all it says is kept, line by line.
 
-    def __init__(self, module: str | Path, *args: str) -> None:
+    In tests a command is a fork, unless ``is_forked`` is false; what measures starts interpreters.
+    """
+
+    def __init__(self, program: str | Path, *args: str, is_forked: bool = True) -> None:
         self.lines: list[str] = []
         self._said = threading.Condition()
-        program = [module] if isinstance(module, Path) else ['-m', 'abdf1_ros', module]
-        self._process = subprocess.Popen(
-            [sys.executable, *program, *args], text=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self._process: Any
+        if isinstance(program, str) and is_forked and 'PYTEST_CURRENT_TEST' in os.environ:
+            self._process = Forked([program, *args])
+        else:
+            before = ['-m', 'abdf1_ros'] if isinstance(program, str) else []
+            self._process = subprocess.Popen(
+                [sys.executable, *before, program, *args], text=True,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self._readers = [
             threading.Thread(target=self._read, args=(stream,))
             for stream in (self._process.stdout, self._process.stderr)]
