@@ -225,7 +225,7 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
         bench, _, ears = make_bench(
             *mappings, network=replace(network, baud=115200), period=period)
         bench.open()
-        bench.run(5.0)
+        bench.run(2.5)
         waits.append(max(longest_wait(bench, mapping) for mapping in mappings))
         assert all(bool(heard.times(STATUS)) == bool(period) for heard in ears)
     transaction = 0.012 if network.polling == 'Message' else 0.02

@@ -685,7 +685,7 @@ def test_writes_to_an_inactive_station_do_not_hold_up_the_others() -> None:
 
 def test_writes_to_a_station_that_replies_late_do_not_hold_up_the_others() -> None:
     living, late = make_mapping('N7:0', period=0), make_mapping('N7:0', 'Write', station=2)
-    bench, _ = make_bench(living, late, network=Network(baud=115200, cmd_timeout=500))
+    bench, _ = make_bench(living, late, network=Network(baud=19200, cmd_timeout=500))
     bench.plc(2, 'PLC5', ('N7:0', 4)).faults.delay = 1.0
     bench.open()
     best = _rates(bench, living, 5.0)

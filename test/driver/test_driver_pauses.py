@@ -100,7 +100,7 @@ def test_no_command_of_a_write_goes_out_after_it_has_become_too_old(
     read = make_mapping('N7:0')
     bench, plc = bench_of(read, write, polling=polling)
     asked = []
-    for number in range(20):
+    for number in range(20 if length > 1 else 8):  # until a write has come to its end
         bench.run(1.0)
         asked.append(bench.clock())
         bench.write(write, [number] * length)

@@ -147,7 +147,7 @@ class LateBench(DriverBench):
         self.late = {*range(1, late + 1)}
         rows = [row for number in self.late for row in self._rows(number, via)]
         super().__init__([self.living, *rows], start=False, network=Network(
-            baud=115200, timeout=50, cmd_timeout=cmd_timeout))
+            baud=9600, timeout=50, cmd_timeout=cmd_timeout))
         self.plc(LIVING, 'PLC5', ('N7:0', 4))
         self.asked: list[int] = []
         if via is None:
