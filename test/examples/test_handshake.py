@@ -76,7 +76,7 @@ def test_job_is_done_when_the_plc_has_its_number() -> None:
 
 
 def test_done_of_the_job_before_counts_for_nothing() -> None:
-    status, lines, requests = run(lambda request, state: None, [4, 4], '--begin-within', '3')
+    status, lines, requests = run(lambda request, state: None, [4, 4], '--begin-within', '2')
     assert (status, lines[-2:]) == (1, [
         'job 5: the PLC has not begun; request: written', 'job 5: the PLC has not begun'])
     assert requests[-1] == 0  # the request has been taken back
@@ -87,12 +87,12 @@ def test_job_that_begins_when_it_is_given_up_is_not_lost() -> None:
         if not request:
             state[:] = [5, 5]
 
-    status, lines, _ = run(begin_late, [4, 4], '--begin-within', '3')
+    status, lines, _ = run(begin_late, [4, 4], '--begin-within', '2')
     assert (status, lines[-1]) == (0, 'job 5: done')
 
 
 def test_request_that_nobody_confirms_leaves_it_unknown() -> None:
-    status, lines, _ = run(lambda request, state: None, [4, 4], '--begin-within', '4',
+    status, lines, _ = run(lambda request, state: None, [4, 4], '--begin-within', '2',
                            result='unknown whether written: no reply')
     assert (status, lines[-2:]) == (3, [
         'job 5: the PLC has not begun; request: unknown whether written: no reply',

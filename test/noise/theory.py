@@ -22,7 +22,7 @@ from random import Random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Symbol
 from noise.wire import Kind, strike
 
 _TRIALS = 10_000
@@ -42,6 +42,7 @@ class Theory:
         self._samples, self._checksum, self._duplex = samples, checksum, duplex
         self._kinds, self._rate = kinds, rate
         self._random = Random(1)
+        self._originals = {frame: self._decoded(frame) for frame in samples}
         is_bcc = checksum is Checksum.BCC
         self._single = self._share(is_several=False) if is_bcc else self._zero_in_front()
         self._several = self._share(is_several=True) if is_bcc and rate else 0.0
@@ -88,13 +89,10 @@ class Theory:
         return bytes(arrives + frame[begin:])
 
     def _is_missed(self, sent: bytes, arrives: bytes) -> bool:
+        return any(isinstance(symbol, Frame) and symbol.fault is None
+                   and [symbol] != self._originals[sent] for symbol in self._decoded(arrives))
+
+    def _decoded(self, data: bytes) -> list[Symbol]:
         decoder = FrameDecoder(self._checksum, self._duplex)
-        decoder.feed(arrives)
-        heard = []
-        while (symbol := decoder.next_symbol()) is not None:
-            heard.append(symbol)
-        good = [symbol for symbol in heard if isinstance(symbol, Frame) and symbol.fault is None]
-        whole = FrameDecoder(self._checksum, self._duplex)
-        whole.feed(sent)
-        original = whole.next_symbol()
-        return any(symbol != original for symbol in good)
+        decoder.feed(data)
+        return list(iter(decoder.next_symbol, None))

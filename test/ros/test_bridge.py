@@ -221,7 +221,8 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         status = until_status(bridge.diagnostics, 'link', WARN)
         assert status.message == 'WARN: port open, 1 of 2 stations do not answer'
         status = until_status(bridge.diagnostics, 'mappings', ERROR,
-                              lambda status: details(status)['failed'] == '12')
+                              lambda status: details(status)['failed'] == '12'
+                              and details(status)['late'] == '0')
         assert re.fullmatch(
             r'failed: C5:2\.ACC at station 2, last read \d+\.\d s ago; '
             r'2509 ERR_INACTIVE_STATION: Slave Station \(2\) Inactive',
