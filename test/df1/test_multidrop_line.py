@@ -225,7 +225,7 @@ def test_noise(mode: str, rate: float, chunk: int) -> None:
 
 @pytest.mark.parametrize('mode', MODES)
 def test_line_that_goes_and_comes_again(mode: str) -> None:
-    rig = Rig(mode)
+    rig = Rig(mode, chunk=14)
     for _ in range(2):
         rig.run(5)
         rig.line.noise = Noise(lost=1.0)

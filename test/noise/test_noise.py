@@ -59,7 +59,7 @@ def test_noise(mode: str, rate: float, error_code: str) -> None:
 @pytest.mark.parametrize('kind', Kind)
 def test_bcc_misses_as_many_as_theory_says(kind: Kind) -> None:
     case = Case('Message', 'BCC', (kind,), 1e-2)
-    assert case.run(seed=5, hours=0.3) == 0
+    assert case.run(seed=5, hours=0.2) == 0
     assert case.theory is not None
     expected = case.theory.expected(
         case.sums['singles'], case.sums['several'], case.sums['refused'])

@@ -48,8 +48,7 @@ MODES = ('Message', 'Standard', 'Peer', 'Slave')
 BAUD = 9600
 FLOOD = 1500  # to each mapping, which is more than are kept
 
-# A fault lasts up to so long (s), and so long a quiet line until the next.
-_LONGEST, _PAUSE = 20.0, 20.0
+_LONGEST = 20.0  # s; so long a fault lasts at most
 
 
 class Sink:
@@ -119,10 +118,12 @@ class FaultyLine:
     A line with a driver in one of ``MODES``, and its faults.
 
     Masters have two PLCs, a liar and a dead station; a peer and a slave have another driver at
-    the far end, as peer and as master.
+    the far end, as peer and as master. The line is quiet for ``pause`` s at most from one fault
+    to the next.
     """
 
-    def __init__(self, mode: str, seed: int = 1) -> None:
+    def __init__(self, mode: str, seed: int = 1, pause: float = 20.0) -> None:
+        self._pause = pause
         self.asked = 0
         self.faults: Counter[str] = Counter()
         self._random = Random(seed)
@@ -172,7 +173,7 @@ class FaultyLine:
         for name in self._random.sample([*self.kinds], len(self.kinds)):
             self.faults[name] += 1
             self.kinds[name]()
-            self.run(self._random.uniform(0.0, _PAUSE))
+            self.run(self._random.uniform(0.0, self._pause))
 
     def settle(self) -> None:
         """Let all queues run empty; then every write has had its one result."""

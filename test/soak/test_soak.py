@@ -28,7 +28,7 @@ MOST_GROWTH = 150_000
 
 @pytest.mark.parametrize('mode', MODES)
 def test_faults_cannot_grow_memory(mode: str) -> None:
-    rig = FaultyLine(mode)
+    rig = FaultyLine(mode, pause=5.0)
     rig.disturb()  # fills caches, and what is learned at first
     rig.settle()
     before = kept_bytes(rig)

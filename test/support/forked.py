@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Commands of the package as processes that need not import it: forks of a server that has done so.
+Programs as processes that need not import the package: forks of a server that has done so.
 
 The imports of a node take 0.4 s of processor time, and the tests start hundreds of processes.
 A fork has arguments, environment, folder, standard streams and an exit status of its own.
@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 import os
+from pathlib import Path
 import runpy
 import signal
 import subprocess
@@ -38,14 +39,14 @@ _CONTEXT.set_forkserver_preload([
 
 
 class Forked:
-    """``python -m abdf1_ros ...`` without a new interpreter; as much of Popen as tests need."""
+    """A program of Python without a new interpreter; as much of Popen as tests need."""
 
-    def __init__(self, args: Sequence[str]) -> None:
-        """Start it; its standard streams are pipes."""
+    def __init__(self, program: str | Path, args: Sequence[str]) -> None:
+        """Start a command of the package, or a file; its standard streams are pipes."""
         (stdin, to_it), (out, stdout), (errors, stderr) = (
             _CONTEXT.Pipe(duplex=False) for _ in range(3))
         self._process = _CONTEXT.Process(target=_run, args=(
-            args, dict(os.environ), os.getcwd(), (stdin, stdout, stderr)))
+            program, args, dict(os.environ), os.getcwd(), (stdin, stdout, stderr)))
         self._process.start()
         for end in (stdin, stdout, stderr):
             end.close()
@@ -84,7 +85,7 @@ def _opened(descriptor: int, mode: str) -> IO[str]:
     return open(descriptor, mode, encoding='utf-8')
 
 
-def _run(args: Sequence[str], environment: dict[str, str], folder: str,
+def _run(program: str | Path, args: Sequence[str], environment: dict[str, str], folder: str,
          streams: Sequence[Connection]) -> None:
     """Be the process, in the child."""
     for number, stream in enumerate(streams):
@@ -95,5 +96,9 @@ def _run(args: Sequence[str], environment: dict[str, str], folder: str,
     os.environ.clear()
     os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # the server ignores it
-    sys.argv = ['abdf1_ros', *args]
-    runpy.run_module('abdf1_ros', run_name='__main__', alter_sys=True)
+    if isinstance(program, Path):
+        sys.argv = [str(program), *args]
+        runpy.run_path(str(program), run_name='__main__')
+    else:
+        sys.argv = ['abdf1_ros', program, *args]
+        runpy.run_module('abdf1_ros', run_name='__main__', alter_sys=True)

@@ -99,15 +99,15 @@ class Process:
     """
     A command of the package, or a file, as a process; all it says is kept, line by line.
 
-    In tests a command is a fork, unless ``is_forked`` is false; what measures starts interpreters.
+    In tests it is a fork, unless ``is_forked`` is false; what measures starts interpreters.
     """
 
     def __init__(self, program: str | Path, *args: str, is_forked: bool = True) -> None:
         self.lines: list[str] = []
         self._said = threading.Condition()
         self._process: Any
-        if isinstance(program, str) and is_forked and 'PYTEST_CURRENT_TEST' in os.environ:
-            self._process = Forked([program, *args])
+        if is_forked and 'PYTEST_CURRENT_TEST' in os.environ:
+            self._process = Forked(program, args)
         else:
             before = ['-m', 'abdf1_ros'] if isinstance(program, str) else []
             self._process = subprocess.Popen(

@@ -88,4 +88,4 @@ def ros2(*args: str) -> Process:
     """Start ``ros2`` with these arguments."""
     program = shutil.which('ros2')
     assert program is not None
-    return Process(Path(program), *args)
+    return Process(Path(program), *args, is_forked=False)
