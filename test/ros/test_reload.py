@@ -140,6 +140,7 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
     assert results.next().message == 'written'
     bench.write_map(SPEED, 'recipe,Write,N7:8,1,PLC5,2')
     assert bench.reload()[0]
+    bench.observer.until(lambda: bench.node.driver.is_online, 'the port')
     publisher.publish(Int16MultiArray(data=[3, 4]))
     result = results.next()
     assert (result.message, details(result)['address']) == ('written', 'N7:8')
