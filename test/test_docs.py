@@ -27,6 +27,7 @@ import io
 import os
 from pathlib import Path
 import re
+from xml.etree import ElementTree
 
 from abdf1_ros.cli.main import COMMANDS as MAINS
 from abdf1_ros.messages import Message
@@ -223,3 +224,11 @@ def test_troubleshooting_quotes_what_is_printed() -> None:
             phrase = piece.strip(' :,(){}')
             if len(phrase.split()) > 1:
                 assert phrase in printed(), span
+
+
+def test_profile_of_dds_is_the_one_that_these_tests_run_with() -> None:
+    page = (ROOT / 'docs' / 'deployment.md').read_text('utf-8')
+    (block,) = re.findall(r'^```xml\n(.*?)^```', page, re.DOTALL | re.MULTILINE)
+    ours = (ROOT / 'test' / 'support' / 'dds.xml').read_text('utf-8')
+    assert ElementTree.canonicalize(block, strip_text=True) \
+        == ElementTree.canonicalize(ours, strip_text=True)
