@@ -95,6 +95,10 @@ class Silence(NamedTuple):
 # After a step that was not to wait.
 _NOTHING = Silence()
 
+# An operating system or USB adapter may hold a byte back for so long (s). No wait is shorter, so
+# Timeout = 0, which S0 allows, means "as short as the equipment can do".
+MIN_RESPONSE_TIME = 0.02
+
 
 # What an operating system or a device server may hold bytes of a frame back (s).
 _HELD_BACK = 0.1
@@ -335,7 +339,8 @@ class Machine:
         if self._pending is not None:
             self._transmit(self._pending)
         else:
-            if self._echo_due:
+            # A short rest after an ACK is no proof: its echo may be held back.
+            if self._echo_due and now >= self._line_free + MIN_RESPONSE_TIME:
                 self._forget_echo()
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))

@@ -36,16 +36,19 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Poll, Unknown
-from abdf1_ros.df1.machine import Heard, LISTEN_ON, Machine, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    LISTEN_ON,
+    Machine,
+    MIN_RESPONSE_TIME,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, source, STS_NOT_DELIVERED
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
-
-# An operating system or USB adapter may hold a byte back for so long (s). No wait is shorter, so
-# Timeout = 0, which S0 allows, means "as short as the equipment can do".
-MIN_RESPONSE_TIME = 0.02
 
 # No station answers a broadcast; after one the master waits so long (s) for the slaves.
 BROADCAST_PAUSE = 0.05

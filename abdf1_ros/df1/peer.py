@@ -53,7 +53,14 @@ from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
 from abdf1_ros.df1.link import LinkStatus, NO_STATUS
-from abdf1_ros.df1.machine import Heard, Machine, Procedure, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    Machine,
+    MIN_RESPONSE_TIME,
+    Procedure,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
@@ -69,8 +76,6 @@ _NAK_PAUSE = 0.25
 
 # Replies that wait for their turn on the line; with more, commands are answered with NAK.
 MAX_WAITING_REPLIES = 8
-
-_MIN_RESPONSE_TIME = 0.02
 
 # A response may come so late (s): after its time-out, after another response, or after the reply
 # that overtook it.
@@ -137,7 +142,7 @@ class FullDuplexPeer:
         self._report = report
         self._accounting = Accounting(machine.counters, stations, report)
         self._note = self._accounting.note
-        self._timeout = max(settings.timeout, _MIN_RESPONSE_TIME)
+        self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._forget()
 
     def status(self) -> LinkStatus:

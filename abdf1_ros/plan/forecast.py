@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from abdf1_ros.df1.master_line import MIN_RESPONSE_TIME
+from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 
-from abdf1_ros.df1.master_line import MIN_RESPONSE_TIME
+from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.settings.csv_table import Row

@@ -712,3 +712,18 @@ def test_background_is_asked_when_the_machine_is_woken() -> None:
     bench.machine.start(1.0)
     bench.machine.wake(1.5)
     assert clockwork.done == [1.5]
+
+
+# echo
+
+
+@pytest.mark.parametrize(('rest', 'data', 'heard'), [
+    (0.015, ACK + MESSAGE + EOT, SAID_EOT),  # held back, as USB does for 16 ms
+    (0.5, ACK, SAID_ACK)])  # not there any more
+def test_echo_of_an_ack_is_expected_for_as_long_as_it_may_be_held_back(
+        rest: float, data: bytes, heard: Symbol) -> None:
+    bench = Bench(Step(ACK, 0, is_echoed=True), Step(None, rest), Step(MESSAGE, 1.0))
+    bench.machine.start(5.0)
+    bench.machine.handle_timeout(5.0 + rest)
+    bench.machine.receive_data(data, 6.0)
+    assert bench.got == [None, None, heard]

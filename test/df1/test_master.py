@@ -21,9 +21,9 @@ from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame, STX
-from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.machine import LineTiming, MIN_RESPONSE_TIME
 from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings, MIN_RESPONSE_TIME, MOST_QUEUED
+from abdf1_ros.df1.master_line import MasterSettings, MOST_QUEUED
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
 import pytest
