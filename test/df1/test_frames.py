@@ -21,6 +21,7 @@ from abdf1_ros.df1.frames import (
     ACK,
     Code,
     Control,
+    Damaged,
     Duplex,
     ENQ,
     EOT,
@@ -390,3 +391,41 @@ def test_frame_is_read_behind_any_garbage_after_a_reset(decoder: FrameDecoder,
     decoder.reset()
     decoder.feed(EOT + b'\x10')
     assert drain(decoder) == [Control(Code.EOT)]
+
+
+# Characters that the UART has found damaged
+
+# The vector of M 4-5's kind of message: DLE STX, seven bytes, DLE ETX, BCC.
+MESSAGE = bytes.fromhex('10 02 01 00 06 00 01 00 00 10 03 F8')
+
+
+@pytest.mark.parametrize('at', range(len(MESSAGE)))
+def test_message_with_a_damaged_character_is_not_a_good_one(at: int) -> None:
+    decoder = FrameDecoder(BCC, FULL)
+    decoder.feed(MESSAGE)
+    good = decoder.next_symbol()
+    assert isinstance(good, Frame) and good.fault is None
+    decoder.feed(MESSAGE[:at])
+    symbols = [decoder.next_symbol()]
+    decoder.feed(Damaged(MESSAGE[at:at + 1]))
+    symbols.append(decoder.next_symbol())
+    decoder.feed(MESSAGE[at + 1:])
+    symbols.append(decoder.next_symbol())
+    # Without a byte 00 the BCC is right all the same.
+    assert not [symbol for symbol in symbols if isinstance(symbol, Frame) and not symbol.fault]
+    decoder.feed(MESSAGE[:2])  # a message begins anew
+    decoder.next_symbol()
+    decoder.feed(MESSAGE[2:])
+    found = []
+    while (symbol := decoder.next_symbol()) is not None:
+        found.append(symbol)
+    assert good in found
+
+
+@pytest.mark.parametrize('at', [0, 1])
+def test_damaged_control_symbol_is_not_believed(at: int) -> None:
+    decoder = FrameDecoder(BCC, FULL)
+    for number, byte in enumerate(ACK + ACK[1:]):  # its half that is left begins no other
+        piece = bytes([byte])
+        decoder.feed(Damaged(piece) if number == at else piece)
+        assert decoder.next_symbol() is None

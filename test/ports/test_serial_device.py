@@ -25,8 +25,7 @@ import struct
 import termios
 from typing import Any
 
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Damaged, Duplex, FrameDecoder
+from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.ports import serial_device
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import mark_damage, SerialDevice
@@ -166,41 +165,6 @@ def test_system_doubles_what_looks_like_a_mark(pty: Pty, wake: int) -> None:
     assert attributes & termios.INPCK
     assert attributes & termios.PARMRK
     port.close()
-
-
-# The vector of M 4-5's kind of message: DLE STX, seven bytes, DLE ETX, BCC.
-MESSAGE = bytes.fromhex('10 02 01 00 06 00 01 00 00 10 03 F8')
-
-
-@pytest.mark.parametrize('at', range(len(MESSAGE)))
-def test_message_with_a_damaged_character_is_not_a_good_one(at: int) -> None:
-    decoder = FrameDecoder(Checksum.BCC, Duplex.FULL)
-    decoder.feed(MESSAGE)
-    good = decoder.next_symbol()
-    assert good is not None
-    decoder.feed(MESSAGE[:at])
-    symbols = [decoder.next_symbol()]
-    decoder.feed(Damaged(MESSAGE[at:at + 1]))
-    symbols.append(decoder.next_symbol())
-    decoder.feed(MESSAGE[at + 1:])
-    symbols.append(decoder.next_symbol())
-    assert good not in symbols
-    decoder.feed(MESSAGE[:2])  # a message begins anew
-    decoder.next_symbol()
-    decoder.feed(MESSAGE[2:])
-    found = []
-    while (symbol := decoder.next_symbol()) is not None:
-        found.append(symbol)
-    assert good in found
-
-
-@pytest.mark.parametrize('at', [0, 1])
-def test_damaged_control_symbol_is_not_believed(at: int) -> None:
-    decoder = FrameDecoder(Checksum.BCC, Duplex.FULL)
-    for number, byte in enumerate(b'\x10\x06'):
-        piece = bytes([byte])
-        decoder.feed(Damaged(piece) if number == at else piece)
-        assert decoder.next_symbol() is None
 
 
 # Counts of the UART, and the end
