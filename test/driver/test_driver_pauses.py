@@ -126,6 +126,8 @@ def test_repetition_of_a_lost_command_is_too_old_after_a_pause() -> None:
     bench.line.pause(bench.driver.machine, 6.0)
     bench.far.hear = bytes
     bench.run(10.0)
+    counters = bench.driver.machine.counters
+    assert counters.messages_sent == counters.commands_sent  # none of them twice
     assert plc.executed == []
     assert [str(result) for result in bench.listener.results] == [
         'unknown whether written: too old to be sent once more; '

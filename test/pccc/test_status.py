@@ -73,6 +73,12 @@ def test_failure_in_words(sts: int, data: bytes, ext_sts: int | None, text: str)
     assert (error.sts, error.ext_sts, str(error)) == (sts, ext_sts, text)
 
 
+def test_extended_codes_with_words_are_those_of_the_manual() -> None:
+    """M 8-4."""
+    assert [code for code in range(0x100) if 'unknown code' not in str(
+        failure(0xF0, bytes((code,))))] == [*range(0x01, 0x1C), 0x1E, 0x1F, 0x22, 0x23, 0x24]
+
+
 @for_all('sts', range(1, 256))
 def test_every_other_status_is_a_failure(sts: int) -> None:
     assert str(failure(sts)) == status_text(sts)

@@ -166,7 +166,7 @@ def test_data_are_what_is_no_command(
 def test_offer_that_is_not_ours_is_refused_once(
         ends: tuple[Rfc2217Port, socket.socket], wake: int) -> None:
     port, server = ends
-    server.sendall(bytes([255, 251, 1, 255, 252, 1, 255, 251, 3]) + b'x')
+    server.sendall(bytes([255, 251, 1, 255, 252, 5, 255, 251, 3]) + b'x')
     assert read(port, wake, 1) == b'x'
     assert server.recv(100) == bytes([255, 254, 1])  # DONT ECHO; SGA was asked for
 
