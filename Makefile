@@ -33,8 +33,8 @@ ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH
 endif
 
-# The tests start some 300 processes. Told to write no bytecode, each would compile the package
-# again, which takes as much processor time as a third of the tests; so they keep it in .venv.
+# Told to write no bytecode, each interpreter that the tests start would compile the package again;
+# so they keep it in .venv.
 ifdef PYTHONDONTWRITEBYTECODE
 TEST_ENV := env -u PYTHONDONTWRITEBYTECODE PYTHONPYCACHEPREFIX='$(CURDIR)/$(VENV)/bytecode'
 endif
