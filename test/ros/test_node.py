@@ -38,6 +38,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import (  # noqa: I101
+    Bool,
     Float32MultiArray,
     Int16MultiArray,
     MultiArrayDimension,
@@ -530,6 +531,23 @@ def test_duplicate_name_is_told_and_forgotten(
     told = ''.join(capfd.readouterr())
     assert '[abdf1]: another node is called /abdf1 too' in told
     assert 'no other node is called /abdf1 any more' in told
+
+
+def test_end_of_another_type_on_a_topic_is_told(
+        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str]) -> None:
+    make_bench(SPEED)
+    said = ['']
+
+    def is_told() -> bool:
+        said[0] += capfd.readouterr().err
+        return 'std_msgs/msg/Bool,' in said[0]
+
+    with Observer() as other:  # a participant of its own, as one has no topic with two types
+        other.node.create_subscription(Bool, '/abdf1/read/speed', print, 10)
+        observer.until(is_told, 'a line of the log')
+    (line,) = [line for line in said[0].splitlines() if 'std_msgs/msg/Bool' in line]
+    assert line.startswith('[WARN] ')
+    assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; somebody uses it as' in line
 
 
 @pytest.mark.parametrize('has_speed', [True, False])
