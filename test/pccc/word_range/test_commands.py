@@ -20,7 +20,13 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from abdf1_ros.pccc.plc5.commands import SystemAddress
-from abdf1_ros.pccc.word_range.commands import WordBitWrite, WordRangeRead, WordRangeWrite
+from abdf1_ros.pccc.word_range.commands import (
+    MAX_READ,
+    MAX_WRITE,
+    WordBitWrite,
+    WordRangeRead,
+    WordRangeWrite,
+)
 import pytest
 from support.vectors import vector, without_area
 
@@ -68,3 +74,8 @@ def test_bit_write() -> None:
 def test_what_is_no_bit_write(data: str) -> None:
     with pytest.raises(FormatError):
         WordBitWrite.read(Reader(bytes.fromhex(data)), ExtendedAddress.read)
+
+
+def test_limits_of_the_manual() -> None:
+    """M 7-34, 7-35."""
+    assert (MAX_READ, MAX_WRITE) == (244, 240)
