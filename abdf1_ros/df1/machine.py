@@ -339,7 +339,7 @@ class Machine:
         if self._pending is not None:
             self._transmit(self._pending)
         else:
-            # A short rest after an ACK is no proof: its echo may be held back.
+            # A short rest after an ACK proves nothing: its echo may be held back.
             if self._echo_due and now >= self._line_free + MIN_RESPONSE_TIME:
                 self._forget_echo()
             decoder = self.decoder
