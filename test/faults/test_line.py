@@ -77,7 +77,9 @@ def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iter
 @pytest.fixture
 def line(shared: Boxed) -> Boxed:
     """Return a rig that is well, with its box."""
-    shared[0].begin()
+    rig, box = shared
+    box.mend()
+    rig.begin()
     return shared
 
 
@@ -90,7 +92,7 @@ def test_only_one_direction_works(line: Boxed, way: str) -> None:
     rig.status('link', ERROR, 'port open, but none of 2 stations answers')
     rig.status('mappings', ERROR, '25 failed')
     assert rig.write(4.0) == NOT_SENT + NO_ANSWER
-    setattr(box, way, True)
+    box.mend()
     rig.recovers(3.0)
     rig.told('[INFO]', 'station 2 answers again')
     assert rig.has_read_only(SETPOINT, 3.0)
@@ -113,7 +115,7 @@ def test_line_babbles(line: Boxed) -> None:
     assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
                for text in results)
     rig.told('[INFO]', '2514 NTC_INVALID_SYMBOL')
-    box.babbles = False
+    box.mend()
     rig.recovers(6.0)
     assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
 

@@ -50,6 +50,7 @@ def shared_line(
 @pytest.fixture
 def line(shared_line: Line) -> Iterator[Line]:
     """Return a line that is well; nothing that is done to it makes it lie."""
+    shared_line.box.mend()
     shared_line.works()
     yield shared_line
     shared_line.check()
@@ -93,15 +94,20 @@ def test_slave_is_killed_and_returns(line: Line) -> None:
     assert not line.slave.was_told(value)
 
 
-@pytest.mark.parametrize('way, result', [
-    ('to_node', TOO_OLD), ('to_plc', UNKNOWN + '2519 ')], ids=['not-to-slave', 'not-to-master'])
-def test_only_one_direction_works(line: Line, way: str, result: str) -> None:
+# The master polls a station that it does not hear seldom, so a message may be too old before it
+# has been sent as often as it may be.
+@pytest.mark.parametrize('way, results', [
+    ('to_node', TOO_OLD),
+    ('to_plc', (UNKNOWN + '2519 ', UNKNOWN + 'too old to be sent once more; '))],
+    ids=['not-to-slave', 'not-to-master'])
+def test_only_one_direction_works(
+        line: Line, way: str, results: str | tuple[str, ...]) -> None:
     setattr(line.box, way, False)
     lose_slave(line)
     line.slave.status('mappings', ERROR)
     value = next(line.values)
-    assert line.slave.write(value).startswith(result)
-    setattr(line.box, way, True)
+    assert line.slave.write(value).startswith(results)
+    line.box.mend()
     line.recovers(3.0)
     line.works()
     assert not line.master.was_told(value)
@@ -114,7 +120,7 @@ def test_line_babbles_at_the_slave(line: Line) -> None:
         for writer, reader in ((line.master, line.slave), (line.slave, line.master)):
             value = next(line.values)
             written.append((reader, value, writer.write(value)))
-    line.box.babbles = False
+    line.box.mend()
     line.recovers(3.0)
     line.works()
     for reader, value, result in written:

@@ -69,6 +69,11 @@ class FaultBox:
         self._unplug()
         self._lose_far()
 
+    def mend(self) -> None:
+        """Let both directions work, and nothing babble."""
+        self.to_plc = self.to_node = True
+        self.babbles = False
+
     def unplug(self) -> None:
         """Let the device of the node vanish."""
         self._do(self._unplug)
