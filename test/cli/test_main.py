@@ -31,8 +31,13 @@ NAMES = {'node': ('rclpy', 0), 'lines': ('yaml', 0), 'monitor': ('rclpy', 0), 'd
          'simulator': ('serial', 0), 'sniff': ('serial', 0), 'check': ('difflib', 130),
          'plc': ('serial', 130)}
 
-# Stands in for a slow import: it says that it has begun, and does not end by itself soon.
-SLOW = "import select\nprint('importing', flush=True)\nselect.select([], [], [], 30)\n"
+# Stands in for a slow import: it says that it has begun, and does not end by itself soon. Python
+# sees a signal that comes just before a wait after it, so no wait is long.
+SLOW = """import select
+print('importing', flush=True)
+for _ in range(300):
+    select.select([], [], [], 0.1)
+"""
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
