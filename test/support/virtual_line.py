@@ -35,6 +35,7 @@ from abdf1_ros.df1.machine import Machine
 
 BITS_PER_CHARACTER = 10
 _A_BIT = 0.1  # of a character
+_BYTES = [bytes((byte,)) for byte in range(256)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,8 @@ class Noise:
     def bytes_for(self, byte: int, random: Random) -> bytes:
         """Return what arrives in place of ``byte``."""
         chance = random.random()
+        if chance >= self.lost + self.flipped + self.doubled + self.inserted:
+            return _BYTES[byte]
         if chance < self.lost:
             return b''
         chance -= self.lost
@@ -57,13 +60,11 @@ class Noise:
         chance -= self.flipped
         if chance < self.doubled:
             return bytes((byte, byte))
-        if chance - self.doubled < self.inserted:
-            return bytes((random.randrange(256), byte))
-        return bytes((byte,))
+        return bytes((random.randrange(256), byte))
 
     def damage(self, data: bytes, random: Random) -> bytes:
         """Return what arrives in place of ``data``."""
-        return b''.join(self.bytes_for(byte, random) for byte in data)
+        return b''.join([self.bytes_for(byte, random) for byte in data])
 
 
 class Damage(Protocol):
@@ -153,22 +154,24 @@ class VirtualLine:
 
     def _advance(self, end: float = math.inf) -> bool:
         """Carry out the next event; return False when there is none up to ``end``."""
-        arrival = self._arrivals[0][0] if self._arrivals else math.inf
-        deadline = min(self._calls)
-        if min(arrival, deadline) > end or math.inf == deadline and not self._arrivals:
+        arrivals, calls = self._arrivals, self._calls
+        arrival = arrivals[0][0] if arrivals else math.inf
+        deadline = min(calls)
+        if arrival > end < deadline or math.inf == deadline and not arrivals:
             return False
         if arrival <= deadline:
-            self.now, number, first, data = heapq.heappop(self._arrivals)
-            if self.now < self._away[first]:
-                heapq.heappush(self._arrivals, (self._away[first], number, first, data))
+            self.now, number, first, data = heapq.heappop(arrivals)
+            machine, away = self._machines[first], self._away[first]
+            if self.now < away:
+                heapq.heappush(arrivals, (away, number, first, data))
                 return True
-            if self.now == self._away[first]:
+            if self.now == away:
                 data += self._rest_for(first)
-                self._machines[first].handle_timeout(self.now)  # in the order of LinkThread
-            self._machines[first].receive_data(data, self.now)
-            self._away[first] = self.now + self._machines[first].spare_time
+                machine.handle_timeout(self.now)  # in the order of LinkThread
+            machine.receive_data(data, self.now)
+            self._away[first] = self.now + machine.spare_time
         else:
-            first = self._calls.index(deadline)
+            first = calls.index(deadline)
             self.now = max(self.now, deadline)
             self._machines[first].handle_timeout(self.now)
         self._take(first)
@@ -194,11 +197,12 @@ class VirtualLine:
                 self._send(data, start, receiver)
 
     def _send(self, data: bytes, start: float, receiver: int) -> None:
+        noise = None if self.noise is QUIET else self.noise
         for at in range(0, len(data), self.chunk):
             part = data[at:at + self.chunk]
             here = start + (at + len(part)) * self.char_time + self._propagation
-            if self.noise is not QUIET:
-                part = self.noise.damage(part, self._random)
+            if noise:
+                part = noise.damage(part, self._random)
             if part:
                 self._count += 1  # keeps the order of what arrives at one instant
                 heapq.heappush(self._arrivals, (here, self._count, receiver, part))
