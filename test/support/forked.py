@@ -15,7 +15,7 @@
 """
 Programs as processes that need not import the package: forks of a server that has done so.
 
-The imports of a node take 0.4 s of processor time, and the tests start hundreds of processes.
+The imports of a node take 0.5 s of processor time, and the tests start hundreds of processes.
 A fork has arguments, environment, folder, standard streams and an exit status of its own.
 """
 
@@ -35,7 +35,9 @@ from typing import IO
 _CONTEXT = get_context('forkserver')
 _CONTEXT.set_forkserver_preload([
     'abdf1_ros.ros.node', 'abdf1_ros.ros.lines', 'abdf1_ros.cli.simulator', 'abdf1_ros.cli.sniff',
-    'abdf1_ros.cli.plc.command'])
+    'abdf1_ros.cli.plc.command',
+    # What rclpy imports only when a node is made:
+    'rosidl_generator_py', 'service_msgs.msg', 'type_description_interfaces.msg'])
 
 
 class Forked:
