@@ -8,7 +8,7 @@ SOAK_HOURS ?= 24
 LONG_RUN_MINUTES ?= 60
 KILLS ?= 20
 PYTEST_ARGS ?=
-TEST_WORKERS ?= 4
+TEST_WORKERS ?= 5
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -44,7 +44,7 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
-	@echo 'TEST_WORKERS (4: processes of test, more than processors, as many tests wait),'
+	@echo 'TEST_WORKERS (5: processes of test, more than processors, as many tests wait),'
 	@echo 'MUTANTS (of mutate), FUZZ_SECONDS (of fuzz), SOAK_HOURS (of soak), LONG_RUN_MINUTES (of long-run), KILLS.'
 
 .PHONY: setup
