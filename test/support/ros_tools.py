@@ -37,6 +37,7 @@ from support.ros import Process
 SOURCE = Path(__file__).resolve().parents[2]
 TOOLS = ('launch', 'launch_ros', 'ros2launch', 'ros2topic', 'sros2', 'ament_copyright',
          'ament_flake8', 'ament_pep257', 'ament_xmllint')
+_INSTALLED = ('config', 'deploy', 'examples', 'launch', 'wireshark')
 
 
 def found() -> list[str]:
@@ -67,7 +68,8 @@ def install(folder: Path) -> None:
     marker.parent.mkdir(parents=True)
     marker.touch()
     commands.mkdir(parents=True)
-    (share / 'abdf1_ros').symlink_to(SOURCE)
+    for name in _INSTALLED:  # and no more: launch would find the files of a build as well
+        shutil.copytree(SOURCE / name, share / 'abdf1_ros' / name, copy_function=os.symlink)
     for name in COMMANDS:
         command = commands / name
         command.write_text(
