@@ -99,7 +99,6 @@ _NOTHING = Silence()
 # Timeout = 0, which S0 allows, means "as short as the equipment can do".
 MIN_RESPONSE_TIME = 0.02
 
-
 # What an operating system or a device server may hold bytes of a frame back (s).
 _HELD_BACK = 0.1
 

@@ -79,7 +79,6 @@ _MOMENT = 0.0001
 # message that has broken off.
 _QUIET_CHARACTERS = 10
 
-
 Talk = Generator[Step, Heard, None]
 
 
