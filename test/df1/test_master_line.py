@@ -30,7 +30,7 @@ from abdf1_ros.df1.master_line import (
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.errors import StationInactive
+from abdf1_ros.errors import PortLost, StationInactive
 import pytest
 from support.multidrop import MasterBench, Slave
 from support.vectors import vector
@@ -370,6 +370,19 @@ def test_station_that_a_message_names_is_no_station_of_ours(
     assert [station.number for station in rig.master.stations] == [7]
     assert rig.master.stations.words() == [1 << 7, *[0] * 15]
     assert rig.master.changes == []
+
+
+def test_message_to_pass_on_is_dropped_with_the_line() -> None:
+    rig = bench(False, 7, 8)
+    rig.message(7, 8)
+    rig.start()
+    rig.ask(7)
+    rig.line.run(rig.master.link._line.has_forwards, 1.0)
+    rig.master.machine.stop(PortLost('gone'))
+    rig.master.machine.start(rig.clock())
+    poll(rig, 7, 8)
+    assert [packet.src for packet in rig[8].served] == [MASTER]
+    assert rig[7].heard == []
 
 
 def test_replies_to_nothing_are_not_kept_without_end() -> None:

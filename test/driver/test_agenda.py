@@ -410,6 +410,26 @@ def test_stations_that_reply_late_take_no_more_than_an_eighth_of_a_busy_line() -
     assert abs(reads[1] - reads[2]) <= 1
 
 
+def test_writes_and_reads_take_turns_at_a_silent_station() -> None:
+    silent, living = make_job(station=2, period=0), make_job(period=0)
+    bench = Bench(silent, living)
+    bench.stations.lost(2, 0.0)
+    now, turns = 0.0, ''
+    while now < 200:
+        bench.write(make_mapping('N7:5', 'Write', station=2), 1, now)
+        job, begun = bench.agenda.next(now), now
+        now += 0.02 if job is living else 1.0
+        if isinstance(job, Write):
+            bench.agenda.write_ended(job, begun, now)
+            turns += 'w'
+        else:
+            assert isinstance(job, ReadJob)
+            bench.finish(job, begun, now)
+            turns += 'r' * (job is silent)
+    assert len(turns) > 20
+    assert turns in 'wr' * len(turns)
+
+
 def test_station_that_replies_in_time_again_has_all_its_reads_at_once() -> None:
     late, other, living = make_job(), make_job('N9:0'), make_job(station=2)
     bench = Bench(late, other, living)

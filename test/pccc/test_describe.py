@@ -32,6 +32,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('A2 08 07 89 1E 00', 'protected typed logical read N7:30, 4 words'),
     ('A2 02 05 87 02 02', 'protected typed logical read C5:2.ACC, 1 word'),
     ('A2 0C 04 86 01 00', 'protected typed logical read T4:1, 2 elements'),
+    ('A2 02 04 86 01 03', 'protected typed logical read T4:1 + 3 words, 1 word'),
     ('A2 08 08 8A 04 00', 'protected typed logical read F8:4, 2 elements'),
     ('A2 02 01 8C 01 03', 'protected typed logical read I:1.3, 1 word'),
     ('A2 54 09 8D 01 00', 'protected typed logical read ST9:1, 1 element'),

@@ -144,8 +144,14 @@ def test_name_of_an_slc_counts_more_than_its_code(
     assert identity.processor is processor
 
 
+# Those of modules of another type or size also stand in 1747-UM005B, 7-3.
 @pytest.mark.parametrize(('code', 'text'), [
     (0x0022, 'major error 0x0022 (watchdog: scan time exceeded)'),
+    (0x0150, 'major error 0x0150 (slot 1: chassis data error)'),
+    (0x1E54, 'major error 0x1E54 (slot 30: module is not of the configured type)'),
+    (0x0255,
+     'major error 0x0255 (slot 2: module has another number of I/O points than configured)'),
+    (0x0056, 'major error 0x0056 (slot 0: chassis configuration is not that of the program)'),
     (0x0352, 'major error 0x0352 (slot 3: module is missing or was removed)'),
     (0x0122, 'major error 0x0122'), (0x0099, 'major error 0x0099')])
 def test_major_errors(code: int, text: str) -> None:

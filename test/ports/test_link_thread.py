@@ -32,7 +32,7 @@ from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Silence, Step
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import DescriptorPort, Port, READ_SIZE
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import _Attempt, LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -632,7 +632,8 @@ class Stuck:
 
 def test_neither_another_machine_nor_the_end_waits_for_a_name_server() -> None:
     stuck = Stuck()
-    thread = LinkThread(Script().machine, stuck.open)
+    faults: list[Exception] = []
+    thread = LinkThread(Script().machine, stuck.open, on_fault=faults.append)
     thread.start()
     assert stuck.is_asked.wait(PATIENCE)
     assert thread.exchange(Script().machine, lambda: None, reopen=False)
@@ -640,8 +641,18 @@ def test_neither_another_machine_nor_the_end_waits_for_a_name_server() -> None:
     thread.stop()
     assert time.monotonic() - began < PATIENCE / 2
     assert not stuck.closed.is_set()
+    assert faults == []
     stuck.go_on.set()  # the port that nobody waits for any more
     assert stuck.closed.wait(PATIENCE)
+
+
+def test_port_that_opens_while_the_end_begins_is_closed() -> None:
+    stuck = Stuck()
+    stuck.go_on.set()
+    attempt = _Attempt(stuck.open, lambda: None)
+    attempt.run()
+    attempt.abandon()
+    assert stuck.closed.is_set()
 
 
 def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: Link) -> None:

@@ -289,17 +289,20 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
 def test_internal_error_at_the_start_of_a_line(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
-    faults = iter([AttributeError('a bug')])
+    monkeypatch.setattr(module, '_RESTART_AFTER', 0.5)
+    made: list[float] = []
 
     def make(name: str, **named: Any) -> BridgeNode:
-        if name == 'b' and (fault := next(faults, None)):
-            raise fault
+        if name == 'b':
+            made.append(time.monotonic())
+            if len(made) == 1:
+                raise AttributeError('a bug')
         return plant.make_node(name, **named)
 
     monkeypatch.setattr(module, 'BridgeNode', make)
     plant.start()
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    assert made[1] - made[0] >= 0.5
     assert line_status(plant, OK)['restarts'] == '1'
     assert "begins again: AttributeError('a bug')" in capfd.readouterr().err
 
