@@ -26,6 +26,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
 from support.commands import call
+from support.ptys import wait_until
 from support.ros import Observer, PATIENCE, Process
 from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files
@@ -129,6 +130,8 @@ def answered(write: Write) -> Iterator[Answered]:
         answers: list[Answer] = []
 
         def take(message: Int16MultiArray) -> None:
+            # DDS may find one end of a process later than the other, and nothing is kept for it.
+            wait_until(lambda: results.get_subscription_count() > 0)
             label = message.layout.dim[0].label
             for tag, text, request in answers[-1](list(message.data)):
                 pairs = [KeyValue(key='request', value=label if request == OURS else request),

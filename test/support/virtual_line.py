@@ -157,7 +157,7 @@ class VirtualLine:
         arrivals, calls = self._arrivals, self._calls
         arrival = arrivals[0][0] if arrivals else math.inf
         deadline = min(calls)
-        if arrival > end < deadline or math.inf == deadline and not arrivals:
+        if min(arrival, deadline) > end or math.inf == deadline and not arrivals:
             return False
         if arrival <= deadline:
             self.now, number, first, data = heapq.heappop(arrivals)
@@ -201,7 +201,7 @@ class VirtualLine:
         for at in range(0, len(data), self.chunk):
             part = data[at:at + self.chunk]
             here = start + (at + len(part)) * self.char_time + self._propagation
-            if noise:
+            if noise is not None:
                 part = noise.damage(part, self._random)
             if part:
                 self._count += 1  # keeps the order of what arrives at one instant
