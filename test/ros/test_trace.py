@@ -47,7 +47,9 @@ def test_trace_of_a_running_node_tells_what_it_has_read(files: Files) -> None:
     assert 'protected typed logical read F8:4, 1 element' in texts
     assert '21.5' in texts
     assert (summary['check'], summary['duplex'], summary['baud']) == ('CRC', 'half', 115200)
-    assert (summary['damaged'], summary['noise'], summary['marks']) == (0, 0, {})
+    assert (summary['damaged'], summary['noise']) == (0, 0)
+    # On a busy host the simulator may be slow, and is asked again.
+    assert summary['marks'].keys() <= {'retransmission'}
     assert set(summary['counts']) <= {
         kind.value for kind in (Kind.COMMAND, Kind.REPLY, Kind.POLL, Kind.ACK, Kind.EOT,
                                 Kind.UNANSWERED)}
