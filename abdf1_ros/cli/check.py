@@ -236,12 +236,15 @@ def _line_text(report: Report) -> str:
 
 def _rows_text(report: Report) -> str:
     """Return a table of the rows, with topic and message type of each."""
-    head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms'
-    rows = []
-    for entry in _rows(report.mappings, report):
-        rows.append([printable(entry['tag']), entry['address'], str(entry['station']),
-                     ' '.join(entry['topics']), entry['message'], str(entry['length']),
-                     entry['value'], '' if entry['stale_ms'] is None else str(entry['stale_ms'])])
+    head = ['tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms']
+    entries = _rows(report.mappings, report)
+    rows = [[printable(entry['tag']), entry['address'], str(entry['station']),
+             ' '.join(entry['topics']), entry['message'], str(entry['length']), entry['value'],
+             '' if entry['stale_ms'] is None else str(entry['stale_ms'])] for entry in entries]
+    if any(entry['description'] for entry in entries):
+        head.append('description')
+        for row, entry in zip(rows, entries, strict=True):
+            row.append(printable(entry['description']))
     return table(head, rows, right=(2, 5, 7))
 
 
@@ -264,7 +267,8 @@ def _row(mapping: Mapping, stale: float | None) -> dict[str, Any]:
         'station': mapping.station, 'topics': topics,
         'message': mapping.message_type.message if topics else '', 'length': mapping.length,
         'value': mapping.type.value + _formula(mapping.scaling),
-        'stale_ms': None if stale is None else math.ceil(stale * 1000)}
+        'stale_ms': None if stale is None else math.ceil(stale * 1000),
+        'description': mapping.description}
 
 
 def _formula(scaling: Scaling | None) -> str:

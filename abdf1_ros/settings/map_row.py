@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 import math
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
@@ -100,6 +100,32 @@ class RowReader:
                 self._fault(column, f'{column} is missing')
         if self.faults:
             return None
+        cells = self._independent() | self._dependent()
+        if self.faults:
+            return None
+        mapping = Mapping(item=self._row.item, file_line=self._row.line, **cells)
+        self._check(mapping)
+        mapping = self._with_conditions(mapping)
+        if self.faults:
+            return None
+        remarks = tuple(row_remarks(self._row, mapping))
+        return replace(mapping, remarks=remarks) if remarks else mapping
+
+    def _independent(self) -> dict[str, Any]:
+        """Return by attribute what stands in a cell and depends on no other cell."""
+        return {
+            'tag': self._row.get('Tag'),
+            'length': self._number('Length', 1, 65535, 1),
+            'period': self._number('Period', 0, MAX_PERIOD, None),
+            'publish': self._choice('Publish', Publish, Publish.ALWAYS),
+            'minimum': self._decimal('Min', -math.inf),
+            'maximum': self._decimal('Max', math.inf),
+            'word_order': self._choice('Word_Order', WordOrder, WordOrder.LOW),
+            'scaling': self._scaling(),
+            'description': self._row.get('Description')}
+
+    def _dependent(self) -> dict[str, Any]:
+        """Return by attribute what depends on other cells as well."""
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
         command = self._choice('Command', Command, None)
@@ -108,33 +134,16 @@ class RowReader:
         station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
                                MAX_STATION + 1)
         via = self._via(command, station)
+        kind = self._choice('Type', ValueType, None) if self._row.get('Type') else None
         plc_type = self._plc_type()
-        length = self._number('Length', 1, 65535, 1)
-        period = self._number('Period', 0, MAX_PERIOD, None)
-        publish = self._choice('Publish', Publish, Publish.ALWAYS)
-        minimum = self._decimal('Min', -math.inf)
-        maximum = self._decimal('Max', math.inf)
-        word_order = self._choice('Word_Order', WordOrder, WordOrder.LOW)
-        scaling = self._scaling()
-        value_type = self._choice('Type', ValueType, None) if self._row.get('Type') else None
         access = self._access(plc_type, command) if plc_type else None
         address = self._address(plc_type, access) if plc_type else None
         processor = self._processor(plc_type, command, address) if plc_type else None
-        if (self.faults or not name or not topic or not command or not publish
-                or not plc_type or not address or not word_order or station is None
-                or length is None):
-            return None
-        mapping = Mapping(
-            self._row.item, self._row.line, self._row.get('Tag'), name, command, address,
-            station, plc_type, length, value_type or _natural_type(address), topic,
-            period, publish, minimum, maximum, word_order, scaling, access, processor, via,
-            self._is_read_only(command))
-        self._check(mapping)
-        mapping = self._with_conditions(mapping)
-        if self.faults:
-            return None
-        remarks = tuple(row_remarks(self._row, mapping))
-        return replace(mapping, remarks=remarks) if remarks else mapping
+        return {
+            'name': name, 'topic': topic, 'command': command, 'station': station, 'via': via,
+            'type': kind or (address and _natural_type(address)), 'plc_type': plc_type,
+            'access': access, 'is_read_only': self._is_read_only(command), 'address': address,
+            'processor': processor}
 
     def _with_conditions(self, mapping: Mapping) -> Mapping:
         """Return the mapping with its heartbeat, fallback and condition for values."""

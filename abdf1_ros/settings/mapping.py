@@ -69,7 +69,7 @@ class Publish(Enum):
     CHANGE = 'Change'
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mapping:
     """
     One checked row.
@@ -81,7 +81,7 @@ class Mapping:
     is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
     ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
-    ``remarks`` say what is odd about the row.
+    ``description`` is for people. ``remarks`` say what is odd about the row.
     """
 
     item: int
@@ -103,8 +103,9 @@ class Mapping:
     scaling: Scaling | None = None
     access: Access | None = None
     processor: Processor | None = None
-    via: int | None = None
     is_read_only: bool = False
+    via: int | None = None
+    description: str = ''
     heartbeat: Heartbeat | None = None
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None

@@ -113,10 +113,11 @@ class Listener:
 
 def block_of(station: int) -> Mapping:
     """Return the row that reads ten words of a station, as often as the line allows."""
+    name = f's{station}'
     return Mapping(
-        station, station, f's{station}', f's{station}', Command.READ,
-        parse_address('N7:0', PlcType.SLC), station, PlcType.SLC, WORDS, ValueType.INT16,
-        f's{station}', 0)
+        item=station, file_line=station, tag=name, name=name, command=Command.READ,
+        address=parse_address('N7:0', PlcType.SLC), station=station, plc_type=PlcType.SLC,
+        length=WORDS, type=ValueType.INT16, topic=name, period=0)
 
 
 def simulated(station: int, network: Network, delay: float = 0.0) -> SimulatedPlc:

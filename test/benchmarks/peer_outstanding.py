@@ -38,7 +38,7 @@ import sys
 import threading
 import time
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 
 from abdf1_ros.df1.frames import Duplex, STX  # noqa: E402
 from abdf1_ros.df1.machine import LineTiming, Machine  # noqa: E402
@@ -47,14 +47,13 @@ from abdf1_ros.df1.stations import ActiveStationList  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
-from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.ports.link_thread import Port  # noqa: E402
-from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.settings.values import ValueType  # noqa: E402
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc  # noqa: E402
 from paced_line import BITS, Listener, paced_line  # noqa: E402
+from support.mappings import make_mapping  # noqa: E402
 
 BLOCKS = range(20, 30)  # file numbers
 WORDS = 10
@@ -110,10 +109,8 @@ class ThinkingPort:
 
 def mappings() -> list[Mapping]:
     """Return ten rows that no command can read together."""
-    return [Mapping(
-        number, number, f'n{number}', f'n{number}', Command.READ,
-        parse_address(f'N{number}:0', PlcType.PLC5), 1, PlcType.PLC5, WORDS, ValueType.INT16,
-        f'n{number}', 0) for number in BLOCKS]
+    return [make_mapping(f'N{number}:0', length=WORDS, item=number, period=0)
+            for number in BLOCKS]
 
 
 def measure(outstanding: int, baud: int, think: float,

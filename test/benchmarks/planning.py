@@ -44,21 +44,18 @@ import random
 import sys
 import time
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 
-from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import line_model  # noqa: E402
 from abdf1_ros.plan.line_model import ReadRequest  # noqa: E402
 from abdf1_ros.plan.partition import Span  # noqa: E402
 from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
-from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.settings.values import ValueType  # noqa: E402
+from support.mappings import make_mapping  # noqa: E402
 
 PERIODS = (100, 100, 250, 500, 1000, 1000, 5000)
-FILES = {'N': ValueType.INT16, 'F': ValueType.FLOAT32, 'T': ValueType.INT16,
-         'C': ValueType.INT16}
 MOST_WAYS = 20_000  # kept at a time
 PLACES = (
     (1, PlcType.PLC5, ('N7', 'N7', 'B3', 'B3', 'F8', 'T4', 'C5', 'I', 'O')),
@@ -69,11 +66,8 @@ PLACES = (
 def row(number: int, text: str, station: int, plc_type: PlcType, length: int,
         period: int) -> Mapping:
     """Return a row that reads."""
-    address = parse_address(text, plc_type)
-    kind = FILES[text[0]] if address.bit is None else ValueType.BOOL
-    return Mapping(
-        number, number, f't{number}', f't{number}', Command.READ, address, station, plc_type,
-        length, kind, f't{number}', period)
+    return make_mapping(text, station=station, plc=plc_type.value, length=length, item=number,
+                        tag=f't{number}', period=period)
 
 
 def realistic_map(tags: int) -> list[Mapping]:

@@ -35,17 +35,16 @@ import statistics
 import sys
 import time
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
-from abdf1_ros.pccc.families import parse_address  # noqa: E402
-from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import poll_cycle  # noqa: E402
-from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
 from abdf1_ros.settings.values import Values, ValueType  # noqa: E402
 from paced_line import answering_line, far_end, Listener  # noqa: E402
+from support.mappings import make_mapping  # noqa: E402
 
 STATION = 1
 INT16, UINT16, FLOAT32 = ValueType.INT16, ValueType.UINT16, ValueType.FLOAT32
@@ -69,10 +68,9 @@ class Watch(Listener):
 
 def mappings() -> list[Mapping]:
     """Return the map."""
-    return [Mapping(
-        number, number, text, f'row{number}', Command.READ,
-        parse_address(text, PlcType.PLC5), STATION, PlcType.PLC5, length, kind, f'row{number}', 0)
-        for number, (text, length, kind) in enumerate(ROWS)]
+    return [make_mapping(text, station=STATION, length=length, kind=kind.value, item=number,
+                         tag=f'row{number}', period=0)
+            for number, (text, length, kind) in enumerate(ROWS)]
 
 
 def measure(network: Network, response: float, seconds: float) -> tuple[float, float, int]:

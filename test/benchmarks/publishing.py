@@ -27,21 +27,21 @@ from __future__ import annotations
 
 import argparse
 from array import array
+from pathlib import Path
+import sys
 import time
 
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.ros.messages import encoder, MESSAGES, read_qos
-from abdf1_ros.settings.mapping import Command, Mapping
-from abdf1_ros.settings.values import ValueType
-import rclpy
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
+sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
+
+from abdf1_ros.ros.messages import encoder, MESSAGES, read_qos  # noqa: E402
+import rclpy  # noqa: E402
+from rclpy.event_handler import PublisherEventCallbacks  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import QoSProfile  # noqa: E402
+from support.mappings import make_mapping  # noqa: E402
 
 ROUNDS, CHUNK = 3, 50
-MAPPING = Mapping(1, 2, 'level', 'level', Command.READ, parse_address('N7:0', PlcType.PLC5), 1,
-                  PlcType.PLC5, 1, ValueType.INT16, 'level')
+MAPPING = make_mapping(tag='level')
 STALE_TIME = 3.1
 PROMISES = {
     'none (Publish = Change)': (), 'lifespan': ('lifespan',), 'deadline': ('deadline',),

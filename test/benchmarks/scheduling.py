@@ -50,15 +50,14 @@ sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.driver.points import WriteResult  # noqa: E402
-from abdf1_ros.pccc.families import parse_address  # noqa: E402
-from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import block_time, intervals, line_model, load  # noqa: E402
 from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
 from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.settings.values import Values, ValueType  # noqa: E402
+from abdf1_ros.settings.values import Values  # noqa: E402
 from paced_line import answering_line, far_end, Listener, WORDS  # noqa: E402
 from support.driver_bench import DriverBench  # noqa: E402
+from support.mappings import make_mapping  # noqa: E402
 
 STATION = 1
 FAST, MIDDLE, SLOW = 100, 500, 2000
@@ -68,9 +67,8 @@ FIRST_FILE = 9
 
 def row(file: int, period: int | None, command: Command, words: int) -> Mapping:
     """Return a row with a file of its own."""
-    return Mapping(
-        file, file, f'n{file}', f'n{file}', command, parse_address(f'N{file}:0', PlcType.SLC),
-        STATION, PlcType.SLC, words, ValueType.INT16, f'n{file}', period)
+    return make_mapping(f'N{file}:0', command.value, station=STATION, plc='SLC', length=words,
+                        item=file, period=period)
 
 
 WRITTEN = row(7, None, Command.WRITE, 1)

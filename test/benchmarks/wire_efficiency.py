@@ -39,7 +39,7 @@ import statistics
 import sys
 import time
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+sys.path[:0] = map(str, Path(__file__).resolve().parents[1:3])
 
 from abdf1_ros.df1 import frames  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
@@ -48,9 +48,9 @@ from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
-from abdf1_ros.settings.mapping import Command, Mapping  # noqa: E402
+from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.settings.values import Values, ValueType  # noqa: E402
+from abdf1_ros.settings.values import Values  # noqa: E402
 from paced_line import (  # noqa: E402
     answering_line,
     answering_pty,
@@ -59,6 +59,7 @@ from paced_line import (  # noqa: E402
     far_end,
     Listener,
 )
+from support.mappings import make_mapping  # noqa: E402
 
 SIZES = (1, 10, 50, 110)
 SPEEDS = (9600, 19200, 38400, 115200)
@@ -81,9 +82,7 @@ class Watch(Listener):
 def measure(mode: str, baud: int, words: int, count: int) -> tuple[float, list[float], int]:
     """Return byte time and times of transactions (s), and troubles."""
     network = Network(mode=mode, baud=baud, timeout=2000)
-    mapping = Mapping(
-        1, 1, 'n', 'n', Command.READ, parse_address('N7:0', PlcType.SLC), STATION, PlcType.SLC,
-        words, ValueType.INT16, 'n', 0)
+    mapping = make_mapping(station=STATION, plc='SLC', length=words, period=0)
     watch = Watch()
     driver = Driver(network, [mapping], DriverSettings(processor_period=0.0), watch)
     with answering_line(driver.machine, far_end(network, STATION, [mapping]), baud):
@@ -99,9 +98,7 @@ def measure_bare(mode: str, baud: int, words: int, count: int) -> list[float]:
     """Return the times (s) that the same bytes take without a driver."""
     network = Network(mode=mode, baud=baud, timeout=2000)
     address = parse_address('N7:0', PlcType.SLC)
-    mapping = Mapping(
-        1, 1, 'n', 'n', Command.READ, address, STATION, PlcType.SLC, words, ValueType.INT16,
-        'n', 0)
+    mapping = make_mapping(station=STATION, plc='SLC', length=words)
     cmd, body = SlcDialect().read(address, words)
     ack, check = len(frames.ACK), network.checksum
     times = []

@@ -69,6 +69,17 @@ def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     assert out.endswith('no errors, no warnings\n')
 
 
+def test_descriptions_are_shown_where_there_are_any(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(files[0], NET_HEADER, [GOOD_NET])
+    write_csv(files[1], MAP_HEADER + ',Description', [
+        GOOD_ROW + ',"Roller, hall 3"', 'door,Read,B3:0/1,1,PLC5,1,100,'])
+    assert main([*map(str, files)]) == 0
+    head, roller, door = capsys.readouterr().out.splitlines()[3:6]
+    assert head.endswith('stale ms  description') and roller.endswith('  Roller, hall 3')
+    assert 'hall' not in door
+
+
 @pytest.mark.parametrize('prefix', ['', 'peer_', 'heartbeat_'])
 def test_files_of_the_package_are_good(prefix: str, capsys: pytest.CaptureFixture[str]) -> None:
     names = [str(config_file(f'{prefix}{kind}.csv')) for kind in ('net', 'map')]
@@ -145,7 +156,8 @@ def test_rows_tell_what_a_ros_user_gets(files: tuple[Path, Path],
     assert level == {
         'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
         'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
-        'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms']}
+        'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms'],
+        'description': ''}
     assert 300 < level['stale_ms'] < 600
     assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
 

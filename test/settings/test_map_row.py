@@ -35,11 +35,13 @@ from support.mappings import fault, faults, load_rows, one, row, slc
 def test_row_with_every_column() -> None:
     mapping = one(Tag='Line speed', Command='readwrite', Address='n7:10', Station='254',
                   PLC_Type='slc', Length='4', Type='FLOAT32', Topic='cell/1 speed',
-                  Period='250', Publish='change', Min='-1.5', Max='99')
+                  Period='250', Publish='change', Min='-1.5', Max='99',
+                  Description='"Roller, hall 3"')
     assert mapping == Mapping(
-        1, 2, 'Line speed', 'Line_speed', Command.READ_WRITE, mapping.address, 254,
-        PlcType.SLC, 4, ValueType.FLOAT32, 'cell/t1_speed', 250, Publish.CHANGE, -1.5, 99.0,
-        access=Access.SLOT)
+        item=1, file_line=2, tag='Line speed', name='Line_speed', command=Command.READ_WRITE,
+        address=mapping.address, station=254, plc_type=PlcType.SLC, length=4,
+        type=ValueType.FLOAT32, topic='cell/t1_speed', period=250, publish=Publish.CHANGE,
+        minimum=-1.5, maximum=99.0, access=Access.SLOT, description='Roller, hall 3')
     assert str(mapping.address) == 'N7:10'
 
 

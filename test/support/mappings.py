@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 import tempfile
+from typing import Any
 
 from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
@@ -26,10 +26,8 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import COLUMNS
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
-from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 HEADER = ','.join(COLUMNS)
@@ -37,24 +35,23 @@ HEADER = ','.join(COLUMNS)
 
 def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
                  plc: str = 'PLC5', length: int = 1, kind: str | None = None,
-                 period: int | None = None, publish: str = 'Always', tag: str | None = None,
-                 topic: str | None = None, minimum: float = -math.inf,
-                 maximum: float = math.inf, item: int = 1, word_order: str = 'Low',
-                 scaling: Scaling | None = None, access: str | None = None,
-                 processor: str | None = None, heartbeat: Heartbeat | None = None,
-                 fallback: Fallback | None = None,
-                 publish_while: PublishWhile | None = None, via: int | None = None) -> Mapping:
-    """Return what a row of these cells becomes; its name is the address unless told."""
+                 publish: str = 'Always', tag: str | None = None, topic: str | None = None,
+                 item: int = 1, word_order: str = 'Low', access: str | None = None,
+                 processor: str | None = None, **others: Any) -> Mapping:
+    """
+    Return what a row of these cells becomes; its name is the address unless told.
+
+    ``others`` are attributes of the mapping.
+    """
     way = Access(access) if access else None
     address = parse_address(text, PlcType(plc), way)
-    natural = types_of(address)[0]
     name = tag or f'{text}_{station}_{command}_{length}'
     return Mapping(
-        item, item + 1, name, name, Command(command), address, station, PlcType(plc), length,
-        ValueType(kind) if kind else natural, topic or name, period, Publish(publish),
-        minimum, maximum, word_order=WordOrder(word_order), scaling=scaling,
-        access=way, processor=Processor(processor) if processor else None, heartbeat=heartbeat,
-        fallback=fallback, publish_while=publish_while, via=via)
+        item=item, file_line=item + 1, tag=name, name=name, command=Command(command),
+        address=address, station=station, plc_type=PlcType(plc), length=length,
+        type=ValueType(kind) if kind else types_of(address)[0], topic=topic or name,
+        publish=Publish(publish), word_order=WordOrder(word_order), access=way,
+        processor=Processor(processor) if processor else None, **others)
 
 
 def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:
