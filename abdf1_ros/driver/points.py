@@ -254,10 +254,7 @@ class Write:
 
     def overlaps(self, other: Write) -> bool:
         """Tell whether both write to the same words, or to bits of them."""
-        one, two = self.mapping, other.mapping
-        first, second = one.address.offset, two.address.offset
-        return (one.station, one.address.area) == (two.station, two.address.area) \
-            and first < second + two.codec.words and second < first + one.codec.words
+        return self.mapping.extent.meets(other.mapping.extent)
 
     def is_held(self, words: bytes) -> bool:
         """Tell whether the mapping's ``words`` hold the values of this write."""

@@ -27,7 +27,6 @@ import math
 
 from abdf1_ros.driver.points import Write, WriteResult
 from abdf1_ros.plan.planner import Block
-from abdf1_ros.settings.mapping import Mapping
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +56,7 @@ class ReadBacks:
             now: float) -> None:
         """Take an unconfirmed write; report at once where none of ``blocks`` reads its words."""
         entry = _UnconfirmedWrite(write, result, now)
-        if any(_shows(block, write.mapping) for block in blocks):
+        if any(block.extent.holds(write.mapping.extent) for block in blocks):
             self._waiting.append(entry)
             self._plan()
         else:
@@ -67,7 +66,7 @@ class ReadBacks:
         """Compare the data of a block whose read ``started`` at that clock value (s)."""
         for entry in self._waiting[:]:
             mapping = entry.write.mapping
-            if started >= entry.since and _shows(block, mapping):
+            if started >= entry.since and block.extent.holds(mapping.extent):
                 is_held = entry.write.is_held(data[block.slice_of(mapping)])
                 which = 'the value' if is_held else 'another value'
                 self._end(entry, f'read back: the PLC holds {which}', now)
@@ -101,11 +100,3 @@ class ReadBacks:
         write, result = entry.write, entry.result
         self._report(replace(result, detail=f'{result.detail}; {finding}',
                              latency=now - write.requested))
-
-
-def _shows(block: Block, mapping: Mapping) -> bool:
-    """Tell whether all words of a mapping are in a block."""
-    first = mapping.address.offset
-    return (block.station, block.start.area) == (mapping.station, mapping.address.area) \
-        and block.start.offset <= first \
-        and first + mapping.codec.words <= block.start.offset + block.words

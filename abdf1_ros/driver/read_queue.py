@@ -35,7 +35,7 @@ import itertools
 import math
 
 from abdf1_ros.driver.job_tasks import Steps
-from abdf1_ros.driver.points import ReadPoint, Write
+from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.driver.transactions import words_of
 from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
 from abdf1_ros.plan.planner import Block
@@ -68,6 +68,7 @@ class ReadJob:
         self.points = tuple(points)
         # Needed at every read, and always the same.
         self._commands = block.commands()
+        self.extent = block.extent
         self._reply_sizes = block.reply_sizes()
         self.slices = [block.slice_of(point.mapping) for point in points]
         self.due = 0.0
@@ -141,15 +142,6 @@ class ReadJob:
         """Take note that a read has failed: no interval spans an outage."""
         self.interval = self._last_done = None
         self._packets = []
-
-    def covers(self, write: Write) -> bool:
-        """Tell whether the block has words that ``write`` has changed."""
-        mapping, start = write.mapping, self.block.start
-        if (self.station, start.area) != (mapping.station, mapping.address.area):
-            return False
-        end = start.offset + sum(request.words for request in self.block.requests)
-        first = mapping.address.offset
-        return first < end and start.offset < first + mapping.codec.words
 
 
 _QueueEntry = tuple[float, int, ReadJob]

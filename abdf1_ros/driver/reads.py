@@ -148,7 +148,7 @@ class Reads:
         """Make the reads of all words that ``write`` changed due at once."""
         self.release(write.mapping.station, now)
         for job in self._due.jobs:
-            if job.covers(write):
+            if job.extent.meets(write.mapping.extent):
                 job.is_refresh, job.refreshed = True, now
                 if job.due > now:
                     self._due.put(job, now)

@@ -24,6 +24,7 @@ from abdf1_ros.errors import Place, Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.server import Server
@@ -132,8 +133,9 @@ class Served:
         if reply.sts:
             table.take_back()  # all or nothing
         for mapping in self._mappings:
-            if any(_overlap(mapping, address, len(before) // 2)
-                   for address, before in table.changed):
+            if any(mapping.extent.meets(Extent(
+                    mapping.station, address.area, address.offset,
+                    address.offset + len(before) // 2)) for address, before in table.changed):
                 self._on_write(mapping, self.words_of(mapping))
         return reply
 
@@ -212,10 +214,3 @@ def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:
 
 def _first_word(mapping: Mapping) -> Address:
     return mapping.address.at_offset(mapping.address.offset)
-
-
-def _overlap(mapping: Mapping, address: Address, words: int) -> bool:
-    if mapping.address.area != address.area:
-        return False
-    first = mapping.address.offset
-    return first < address.offset + words and address.offset < first + mapping.codec.words

@@ -31,6 +31,7 @@ import math
 
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
@@ -82,6 +83,11 @@ class Block:
     def span(self) -> Span:
         """Return the words of the block."""
         return Span(self.start.offset, self.start.offset + self.words)
+
+    @property
+    def extent(self) -> Extent:
+        """Return where the words of the block are."""
+        return Extent(self.station, self.start.area, self.span.first, self.span.end)
 
     @property
     def transfer(self) -> Transfer:

@@ -26,6 +26,7 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
@@ -113,15 +114,19 @@ class Mapping:
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False, compare=False)
     dialect: Dialect = field(init=False, repr=False, compare=False)
+    extent: Extent = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Make the codec and find the dialect."""
+        """Make codec and extent, and find the dialect."""
         packed = self.type is ValueType.STRING \
             and self.address.file_type is not FileType.STRING
         codec = Codec(self.type, self.length, self.address.bit or 0, self.word_order, packed)
         object.__setattr__(self, 'codec', codec)
         object.__setattr__(
             self, 'dialect', dialect_of(self.plc_type, self.access, self.processor))
+        first = self.address.offset
+        object.__setattr__(self, 'extent', Extent(
+            self.station, self.address.area, first, first + codec.words))
 
     @property
     def message_type(self) -> ValueType:
@@ -160,19 +165,14 @@ class Mapping:
 
     def shares_words(self, other: Mapping) -> bool:
         """Tell whether both have words of one station in common; for bits, the same bits."""
-        if (self.station, self.address.area) != (other.station, other.address.area):
-            return False
-        unit = 1 if self.type is other.type is ValueType.BOOL else 16
-        first, second = self._extent(unit), other._extent(unit)
-        return first.start < second.stop and second.start < first.stop
+        if self.type is not ValueType.BOOL or other.type is not ValueType.BOOL:
+            return self.extent.meets(other.extent)
+        return self.extent.meets(other.extent) and self._first_bit < other._first_bit \
+            + other.length and other._first_bit < self._first_bit + self.length
 
-    def _extent(self, unit: int) -> range:
-        """Return its place in the area, in steps of ``unit`` bits."""
-        start = self.address.offset * 16
-        if unit == 16:
-            return range(start, start + self.codec.words * 16)
-        start += self.address.bit or 0
-        return range(start, start + self.length)
+    @property
+    def _first_bit(self) -> int:
+        return self.address.offset * 16 + (self.address.bit or 0)
 
     def cell(self, column: str) -> str:
         """Return a column's value as text, defaults filled in."""

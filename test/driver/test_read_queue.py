@@ -25,7 +25,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.points import ReadPoint, Write
+from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.plan.forecast import block_time, intervals, load, PATIENCE
@@ -255,12 +255,3 @@ def test_long_read_begins_anew_after_an_error() -> None:
     assert job.started == 3.0
     job.interrupted()
     assert not job.is_under_way
-
-
-def test_coverage_of_a_write_is_by_words() -> None:
-    job = make_job(text='N7:5')
-    for text, length, covered in [
-            ('N7:5', 1, True), ('N7:4', 1, False), ('N7:6', 1, False), ('N7:4', 2, True),
-            ('N7:5/3', 1, True), ('N7:4/15', 2, True), ('N7:4/14', 2, False)]:
-        mapping = make_mapping(text, 'Write', plc='SLC', length=length)
-        assert job.covers(Write(mapping, [0] * length, 0.0)) is covered, text
