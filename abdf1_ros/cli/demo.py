@@ -310,7 +310,7 @@ class Demo:
     def _take_control(self, speed: Speed) -> None:
         """Let a person press reset, and the publisher command a speed."""
         for _ in range(_RESETS):
-            self._wait('a steady heartbeat', lambda: time.monotonic() > 3.5 + self._lamps.get(
+            self._wait('a steady heartbeat', lambda: time.monotonic() > 4.5 + self._lamps.get(
                 _ALIVE, math.inf))
             self._command('reset 2')
             if self._spin_until(lambda: _IN_CONTROL in self._lamps, 1.0):

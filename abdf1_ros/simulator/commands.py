@@ -23,6 +23,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import InjectedFaults, numbers, SimulatedPlc
 
 COMMANDS = """\
@@ -39,6 +40,7 @@ commands, on standard input or with --at:
   program, test, run STATION  the same as mode STATION program, test, remote
   download STATION            a program is loaded: words are as at the start, mode program
   power STATION               it loses power and comes back
+  scan STATION MS             a scan of its ladder takes so long (10 at the start)
   reset STATION               somebody presses the reset button of its ladder (--ladder)
   counters STATION            say what its port has counted
   msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
@@ -46,6 +48,7 @@ commands, on standard input or with --at:
 """
 
 _LONGEST = 3_600_000  # ms
+_SCANS = 1, 1000  # ms
 
 # Where a simulated PLC sends its messages: the default Station of a net CSV.
 _BRIDGE_STATION = Network().station
@@ -54,11 +57,26 @@ _BRIDGE_STATION = Network().station
 _MODES = {'program': Setting.PROGRAM, 'test': Setting.TEST, 'run': Setting.REMOTE}
 
 
-def _press_reset(plc: SimulatedPlc) -> None:
+def _ladder(plc: SimulatedPlc) -> Ladder:
     if plc.ladder is None:
         raise CommandError(f'station {plc.station} has no ladder; start with --ladder '
                            f'{plc.station}')
-    plc.ladder.press_reset()
+    return plc.ladder
+
+
+def _press_reset(plc: SimulatedPlc) -> None:
+    _ladder(plc).press_reset()
+
+
+def _set_scan_time(plc: SimulatedPlc, text: str) -> str:
+    value = whole_number(text)
+    low, high = _SCANS
+    if value is None or not low <= value <= high:
+        raise CommandError(
+            f'scan {plc.station} {text}: "{text}" should be ms from {low} to {high}')
+    plc.advance()
+    _ladder(plc).scan_time = value / 1000
+    return f'station {plc.station}: scan {value}'
 
 
 _ACTIONS: dict[str, Callable[[SimulatedPlc], None]] = {
@@ -82,6 +100,8 @@ def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = Fals
         return _send(plc, arguments[0], arguments[1:], report)
     if verb == 'mode' and len(arguments) == 1:
         return _set_mode(plc, arguments[0])
+    if verb == 'scan' and len(arguments) == 1:
+        return _set_scan_time(plc, arguments[0])
     if verb in _MODES and not arguments:
         return _set_mode(plc, _MODES[verb].value)
     if verb in _ACTIONS and not arguments:

@@ -20,7 +20,8 @@ is written by the bridge: word 0 its heartbeat, word 1 a command. The rest is th
 N11 (0 the snapshot, 1 the one before it, 2 the command that the machine may use, 3 the heartbeat
 of the program), T13 (0 watchdog, 1 stable, 2 the program's clock) and the lamps in B12:0.
 
-A scan takes 10 ms, which is the time base of its timers. Nothing moves between two scans.
+Nothing moves between two scans, so what stands for less than a scan may never be seen. The timers
+have a time base of 10 ms, and count from the scan on that starts them.
 """
 
 from __future__ import annotations
@@ -34,19 +35,22 @@ from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.file_types import FileType
 
-SCAN_TIME = 0.01
-"""Seconds between two scans, and the time base of the timers."""
-
 USUAL_PRESET = 300
-"""Of the watchdog, in scans: 3 s."""
+"""Of the watchdog, in units of the time base: 3 s."""
 
-_STABLE = 300
+STABLE = 100
+"""So much longer than the watchdog a heartbeat has to be alive before a reset is accepted."""
+
+_TIME_BASE = 0.01  # s
+_SCAN_TIME = 0.01  # s
 _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
 
 # After a pause of the simulator only so many seconds of scans are made up for: earlier ones would
 # not change the result.
-_MOST_SCANS = 6000
+_LONGEST_PAUSE = 60.0
+
+_ROUNDING = 1e-6
 
 _DONE, _TIMING, _ENABLED = 1 << 13, 1 << 14, 1 << 15
 _FIRST_PASS = 1 << 15  # S:1/15
@@ -65,18 +69,23 @@ class Lamp(IntEnum):
 
 @dataclass(slots=True)
 class _Timer:
-    """A TON: counts scans while its rung is true, and is done at its preset."""
+    """A TON: counts time (s) while its rung is true, and is done at its preset."""
 
     preset: int
-    accumulated: int = 0
+    time: float = 0.0
     is_done: bool = False
     is_enabled: bool = False
 
-    def scan(self, is_true: bool) -> None:
-        """Take the rung of this scan."""
+    def scan(self, is_true: bool, passed: float = 0.0) -> None:
+        """Take the rung of this scan, ``passed`` s after the last."""
+        self.time = self.time + passed if is_true and self.is_enabled else 0.0
         self.is_enabled = is_true
-        self.accumulated = min(self.accumulated + 1, self.preset) if is_true else 0
         self.is_done = is_true and self.accumulated >= self.preset
+
+    @property
+    def accumulated(self) -> int:
+        """Return the time in units of the time base."""
+        return min(int(self.time / _TIME_BASE + _ROUNDING), self.preset)
 
     @property
     def words(self) -> tuple[int, int, int]:
@@ -90,18 +99,20 @@ class Ladder:
     """
     The program of one PLC.
 
-    ``preset`` of the watchdog is in scans. ``on_lamp`` is called with the time (s), a lamp and
-    whether it is on, at every change. Raises NoSuchFile where a file that it needs has another
-    type.
+    ``preset`` of the watchdog is in units of 10 ms, ``scan_time`` in seconds. ``on_lamp`` is
+    called with the time (s), a lamp and whether it is on, at every change. Raises NoSuchFile where
+    a file that it needs has another type.
     """
 
     def __init__(self, table: DataTable, preset: int = USUAL_PRESET,
-                 on_lamp: Callable[[float, Lamp, bool], None] = lambda at, lamp, on: None) -> None:
+                 on_lamp: Callable[[float, Lamp, bool], None] = lambda at, lamp, on: None,
+                 scan_time: float = _SCAN_TIME) -> None:
+        self.scan_time = scan_time
         self._table = table
         self._addressing = family_of(table.plc_type).addressing
         self._on_lamp = on_lamp
         self._watchdog = _Timer(preset)
-        self._stable = _Timer(_STABLE)
+        self._stable = _Timer(preset + STABLE)
         self._clock = _Timer(_PLC_HEARTBEAT)
         self._lamps = 0
         self._button = False  # is pressed
@@ -133,10 +144,10 @@ class Ladder:
         if self._next_scan is None:
             self.enter_run(now)
         assert self._next_scan is not None
-        self._next_scan = max(self._next_scan, now - _MOST_SCANS * SCAN_TIME)
+        self._next_scan = max(self._next_scan, now - _LONGEST_PAUSE)
         while self._next_scan <= now:
             self._scan(self._next_scan)
-            self._next_scan += SCAN_TIME
+            self._next_scan += self.scan_time
 
     def stand_still(self) -> None:
         """Make no scans until ``enter_run``."""
@@ -149,10 +160,10 @@ class Ladder:
         self._put(11, 0, heartbeat)  # 0
         is_changed = heartbeat != before  # 1
         self._put(11, 1, heartbeat)  # 2
-        self._watchdog.scan(not is_changed)  # 3
+        self._watchdog.scan(not is_changed, self.scan_time)  # 3
         is_alive = (is_changed or self.is_on(Lamp.ALIVE)) and _signed(heartbeat) > 0 \
             and not self._watchdog.is_done and not self._is_first_pass  # 4
-        self._stable.scan(is_alive)  # 5
+        self._stable.scan(is_alive, self.scan_time)  # 5
         is_reset = self._button and not self._button_before  # 6
         in_control = is_alive and (
             is_reset and self._stable.is_done and command == 0
@@ -161,7 +172,7 @@ class Ladder:
         lamps = {Lamp.CHANGED: is_changed, Lamp.ALIVE: is_alive, Lamp.IN_CONTROL: in_control,
                  Lamp.RESET: is_reset, Lamp.STOPPED: heartbeat == 0,  # 10
                  Lamp.LOST: self._watchdog.is_done}  # 11
-        self._clock.scan(not self._clock.is_done)  # 12
+        self._clock.scan(not self._clock.is_done, self.scan_time)  # 12
         count = self._get(11, 3)
         if count >= _LAST_COUNT:  # 13
             count = 0

@@ -165,3 +165,16 @@ def test_download_power_and_reset() -> None:
     for verb in ('reset', 'power', 'download'):
         assert execute(f'{verb} 1', [plc]) == f'station 1: {verb}'
     assert plc.processor.setting is Setting.PROGRAM
+
+
+def test_scan_time_of_a_ladder() -> None:
+    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 4))
+    with pytest.raises(CommandError, match='no ladder; start with --ladder 1'):
+        execute('scan 1 60', [plc])
+    plc.run_ladder(Ladder(plc.table))
+    assert plc.ladder is not None
+    assert execute('scan 1 60', [plc]) == 'station 1: scan 60'
+    assert plc.ladder.scan_time == 0.06
+    for text in ('0', '1001', 'fast'):
+        with pytest.raises(CommandError, match=f'"{text}" should be ms from 1 to 1000'):
+            execute(f'scan 1 {text}', [plc])

@@ -12,26 +12,33 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ladder of the heartbeats, rung by rung, in virtual time."""
+"""The ladder of the heartbeats in virtual time: the simulator's, and that of the tutorial."""
 
 from __future__ import annotations
+
+from random import Random
 
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 import pytest
+from support.rungs import PageLadder, parse
+
+BOTH = pytest.mark.parametrize('kind', [Ladder, PageLadder])
 
 
 class Program:
     """A ladder whose bridge counts every second, as long as ``is_counting``."""
 
-    def __init__(self, preset: int = 300) -> None:
+    def __init__(self, kind: type[Ladder] = Ladder, preset: int = 300,
+                 scan_time: float = 0.01) -> None:
         self.table = DataTable(PlcType.SLC)
         self.table.create(parse_address('S:0', PlcType.SLC), 4)
         self.lamps: list[tuple[float, Lamp, bool]] = []
-        self.ladder = Ladder(self.table, preset,
-                             lambda at, lamp, on: self.lamps.append((round(at, 3), lamp, on)))
+        self.ladder = kind(self.table, preset,
+                           lambda at, lamp, on: self.lamps.append((round(at, 3), lamp, on)),
+                           scan_time)
         self.now = 0.0
         self.is_counting = True
         self._beat = 0
@@ -54,7 +61,7 @@ class Program:
 
     def take_control(self) -> None:
         """Count until a reset is accepted."""
-        self.run(5.0)
+        self.run(5.5)
         self.ladder.press_reset()
         self.run(1.0)
         assert self.ladder.is_on(Lamp.IN_CONTROL)
@@ -64,8 +71,9 @@ class Program:
         return [at for at, lamp, on in self.lamps if lamp is Lamp.IN_CONTROL and not on][-1]
 
 
-def test_nothing_is_in_control_before_a_person_has_reset() -> None:
-    program = Program()
+@BOTH
+def test_nothing_is_in_control_before_a_person_has_reset(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.put('N10:1', 0)
     program.run(10.0)
     assert program.ladder.is_on(Lamp.ALIVE)
@@ -75,8 +83,9 @@ def test_nothing_is_in_control_before_a_person_has_reset() -> None:
     assert program.ladder.is_on(Lamp.IN_CONTROL)
 
 
-def test_command_reaches_the_machine_only_while_ros_is_in_control() -> None:
-    program = Program()
+@BOTH
+def test_command_reaches_the_machine_only_while_ros_is_in_control(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.take_control()
     program.put('N10:1', 42)
     program.run(1.0)
@@ -88,14 +97,15 @@ def test_command_reaches_the_machine_only_while_ros_is_in_control() -> None:
     assert program.ladder.is_on(Lamp.STOPPED)
 
 
-def test_reset_is_refused_while_a_command_is_there_or_too_early() -> None:
-    program = Program()
+@BOTH
+def test_reset_is_refused_while_a_command_is_there_or_too_early(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.put('N10:1', 7)
     program.run(5.0)
     program.ladder.press_reset()
     program.run(1.0)
     assert not program.ladder.is_on(Lamp.IN_CONTROL)
-    early = Program()
+    early = Program(kind)
     early.run(2.0)
     early.ladder.press_reset()
     early.run(1.0)
@@ -103,8 +113,9 @@ def test_reset_is_refused_while_a_command_is_there_or_too_early() -> None:
 
 
 @pytest.mark.parametrize('preset', [150, 300])
-def test_silence_is_lost_after_the_preset(preset: int) -> None:
-    program = Program(preset)
+@BOTH
+def test_silence_is_lost_after_the_preset(kind: type[Ladder], preset: int) -> None:
+    program = Program(kind, preset)
     program.take_control()
     program.is_counting = False
     last = program.now - 1.0
@@ -113,8 +124,9 @@ def test_silence_is_lost_after_the_preset(preset: int) -> None:
     assert program.dropped() == pytest.approx(last + preset * 0.01, abs=0.03)
 
 
-def test_control_does_not_come_back_by_itself() -> None:
-    program = Program()
+@BOTH
+def test_control_does_not_come_back_by_itself(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.take_control()
     program.is_counting = False
     program.run(5.0)
@@ -124,8 +136,9 @@ def test_control_does_not_come_back_by_itself() -> None:
     assert not program.ladder.is_on(Lamp.IN_CONTROL)
 
 
-def test_negative_heartbeat_is_not_alive() -> None:
-    program = Program()
+@BOTH
+def test_negative_heartbeat_is_not_alive(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.is_counting = False
     for value in (0x8000, 0xFFFF, 0x8001):
         program.put('N10:0', value)
@@ -133,8 +146,9 @@ def test_negative_heartbeat_is_not_alive() -> None:
         assert not program.ladder.is_on(Lamp.ALIVE)
 
 
-def test_program_and_run_again_ends_tripped() -> None:
-    program = Program()
+@BOTH
+def test_program_and_run_again_ends_tripped(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.take_control()
     program.ladder.stand_still()
     program.ladder.enter_run(program.now)
@@ -143,8 +157,9 @@ def test_program_and_run_again_ends_tripped() -> None:
     assert not program.ladder.is_on(Lamp.IN_CONTROL)
 
 
-def test_program_has_a_heartbeat_of_its_own_that_begins_anew() -> None:
-    program = Program()
+@BOTH
+def test_program_has_a_heartbeat_of_its_own_that_begins_anew(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.run(2.0)
     count = program.get('N11:3')
     program.run(1.1)
@@ -154,8 +169,9 @@ def test_program_has_a_heartbeat_of_its_own_that_begins_anew() -> None:
     assert program.get('N11:3') < 5
 
 
-def test_first_pass_shows_in_the_status_file() -> None:
-    program = Program()
+@BOTH
+def test_first_pass_shows_in_the_status_file(kind: type[Ladder]) -> None:
+    program = Program(kind)
     program.ladder.advance(0.0)
     assert program.get('S:1') >> 15 == 1
     program.run(0.1)
@@ -167,3 +183,84 @@ def test_file_of_another_type_is_refused() -> None:
     table.create(parse_address('B10:0', PlcType.SLC), 1)
     with pytest.raises(NoSuchFile, match='file 10 is of type B already'):
         Ladder(table)
+
+
+@BOTH
+@pytest.mark.parametrize('scan_time', [0.01, 0.06, 0.25])
+def test_one_beat_of_a_dead_bridge_and_a_reset_at_any_time_give_no_control(
+        kind: type[Ladder], scan_time: float) -> None:
+    program = Program(kind, 795, scan_time)
+    program.is_counting = False
+    program.run(1.0)
+    program.put('N10:0', 4711)
+    for _ in range(150):
+        program.ladder.press_reset()
+        program.run(0.1)
+    assert (Lamp.ALIVE, True) in {(lamp, on) for _, lamp, on in program.lamps}
+    assert Lamp.IN_CONTROL not in {lamp for _, lamp, _ in program.lamps}
+
+
+@BOTH
+def test_what_stands_for_less_than_a_scan_is_not_seen(kind: type[Ladder]) -> None:
+    for stood, is_seen in ((0.05, False), (0.11, True)):
+        program = Program(kind, scan_time=0.1)
+        program.take_control()
+        program.now = round(program.now, 1) + 0.02
+        program.ladder.advance(program.now)
+        program.put('N10:0', 0)
+        program.ladder.advance(program.now + stood)
+        program.put('N10:0', 1)
+        program.ladder.advance(program.now + 1.0)
+        assert program.ladder.is_on(Lamp.IN_CONTROL) is not is_seen
+
+
+def test_page_and_simulator_are_the_same_program() -> None:
+    for seed in range(4):
+        dice = Random(seed)
+        scan_time = dice.choice([0.01, 0.02, 0.06, 0.25])
+        pair = [Program(kind, 60, scan_time) for kind in (Ladder, PageLadder)]
+        now, beat, is_counting = 0.0, 0, True
+        seen = set()
+        for _ in range(300):
+            now += dice.choice([0.01, 0.1, 0.3])
+            is_counting ^= dice.random() < 0.02
+            beat = beat % 32767 + 1 if is_counting else dice.choice([beat, beat, beat, 0, -3])
+            command = dice.choice([0, 0, 7]) if dice.random() < 0.3 else None
+            is_pressed = dice.random() < 0.2
+            is_begin = dice.random() < 0.005
+            for program in pair:
+                program.put('N10:0', beat & 0xFFFF)
+                if command is not None:
+                    program.put('N10:1', command)
+                if is_pressed:
+                    program.ladder.press_reset()
+                if is_begin:
+                    program.ladder.enter_run(now)
+                program.ladder.advance(now)
+            words = [[program.get(text) for text in (
+                'N11:0', 'N11:1', 'N11:2', 'N11:3', 'B12:0', 'T13:0', 'T13:0.PRE', 'T13:0.ACC',
+                'T13:1', 'T13:1.PRE', 'T13:1.ACC', 'T13:2', 'T13:2.ACC')] for program in pair]
+            assert words[0] == words[1], (seed, now)
+            seen |= {number for number in range(6) if words[0][4] >> number & 1}
+        assert pair[0].lamps == pair[1].lamps
+        assert seen == set(range(6))
+
+
+def test_a_rung_that_cannot_be_read_is_refused() -> None:
+    for text in ('0 XIC B3:0/0 OTL B3:0/1', '0 OTE B3:0/1 lamp', '0 [XIC B3:0/0 | XIC B3:0/1]]'):
+        with pytest.raises(ValueError, match='is not an instruction|is too much'):
+            parse(text)
+
+
+@pytest.mark.parametrize('rung', range(15))
+def test_heartbeat_that_is_written_in_the_middle_of_a_scan_is_one_value_for_all_rungs(
+        rung: int) -> None:
+    program = Program(PageLadder)
+    program.take_control()
+    assert isinstance(program.ladder, PageLadder)
+    program.ladder.before_rung = lambda number: program.put('N10:0', 0) if number == rung else None
+    program.ladder.advance(program.now + 0.01)
+    is_seen = program.ladder.is_on(Lamp.STOPPED)
+    assert is_seen is (rung == 0)
+    assert program.ladder.is_on(Lamp.ALIVE) is not is_seen
+    assert program.ladder.is_on(Lamp.IN_CONTROL) is not is_seen
