@@ -31,6 +31,7 @@ from collections.abc import Callable
 import csv
 from datetime import datetime, UTC
 import math
+import os
 import signal
 import sys
 import threading
@@ -120,7 +121,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('file', help='CSV file to write; one that exists is replaced')
+    parser.add_argument('file', help='CSV file to write; one that exists is left alone')
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
     parser.add_argument('--seconds', type=float, default=math.inf, help='end after so many')
     parser.add_argument('--wait', type=float, default=10.0,
@@ -131,7 +132,7 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     try:
-        with open(options.file, 'w', newline='', encoding='utf-8') as file:
+        with open(options.file, 'x', newline='', encoding='utf-8') as file:
             return run(options, file, ended)
     except OSError as error:
         print(f'{options.file}: cannot be written: {error.strerror}', file=sys.stderr)
@@ -147,6 +148,8 @@ def run(options: argparse.Namespace, file: TextIO, ended: threading.Event) -> in
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
+    if not found:
+        os.unlink(options.file)  # nothing is in it, and it would be in the way of the next try
     print(f'{node.rows} messages in {options.file}' if found else
           f'{options.node} is not there, or has no read topic')
     return 0 if found else 1

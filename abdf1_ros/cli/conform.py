@@ -38,6 +38,7 @@ from abdf1_ros.cli.terminal import (
     command_parser,
     drop_output,
     interruptible,
+    may_replace,
     prepare_output,
     reason_of,
     seconds_option,
@@ -161,18 +162,28 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
     facts = {'target': target.value, 'station': str(options.station), 'check': wire.check.value,
              'port': options.tcp or options.pty or network.port, 'baud': str(network.baud),
              'answer time': f'{options.answer_time:g} s', 'abdf1_ros': package_version()}
-    if options.junit:
-        Path(options.junit).write_text(as_junit(facts, results) + '\n', encoding='utf-8')
     if options.json:
         print(as_json(facts, results))
     elif options.report:
         print(as_issue(facts, results))
     else:
         print(summary_of(results))
+    if options.junit:
+        try:
+            Path(options.junit).write_text(as_junit(facts, results) + '\n', encoding='utf-8')
+        except OSError as error:
+            print(f'conform: --junit: {reason_of(options.junit, error)}', file=sys.stderr)
+            return _EXIT_USAGE
     if not wire.has_heard:
         print(f'conform: {_NOBODY}', file=sys.stderr)
         return _EXIT_FAILED
     return _EXIT_FAILED if any(result.verdict is Verdict.FAIL for result in results) else 0
+
+
+def _is_result(path: Path) -> bool:
+    """Tell whether a file is a result of ``--junit``, so that a new one may replace it."""
+    with path.open('rb') as file:
+        return b'<testsuite name="conform ' in file.read(100)
 
 
 def _chosen(target: Target, names: Sequence[str]) -> list[Case]:
@@ -281,6 +292,9 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')
     if not 0 <= options.station <= MAX_STATION:
         parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
+    if options.junit and not may_replace(options.junit, _is_result):
+        parser.error(f'--junit: {options.junit} is there and was not made by --junit; give '
+                     'another name')
     if not 1 <= options.count <= 100:
         parser.error(f'--count {options.count} should be from 1 to 100')
     if options.tcp is not None and not re.fullmatch(r'[^:]*:\d{1,5}', options.tcp):

@@ -35,11 +35,12 @@ import signal
 import sys
 import time
 
-from abdf1_ros.cli.sniff_report import ReportBundle
+from abdf1_ros.cli.sniff_report import is_bundle, ReportBundle
 from abdf1_ros.cli.terminal import (
     command_parser,
     has_reader_left,
     interruptible,
+    may_replace,
     prepare_output,
     reason_of,
     seconds_option,
@@ -261,6 +262,9 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--binary is for files')
     if options.report and (not options.files or options.binary):
         parser.error('--report is for captures: record one with --save, or trace_file of the node')
+    if options.report and not may_replace(options.report, is_bundle):
+        parser.error(f'--report: {options.report} is there and is not a bundle of --report; give '
+                     'another name')
     if not options.report and (options.settings or options.conformance or options.anonymous):
         parser.error('--settings, --conformance and --anonymous are for --report')
     return options

@@ -21,15 +21,16 @@ tables: the data of messages, and the names of tags and topics.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 import csv
 from dataclasses import dataclass, field, replace
 import io
+from itertools import count
 import json
 from pathlib import Path
 import platform
 import re
-from zipfile import ZIP_DEFLATED, ZipFile
+from zipfile import is_zipfile, ZIP_DEFLATED, ZipFile
 
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.df1.packet import Packet
@@ -45,6 +46,9 @@ _STATUS_REQUEST = 0x06, b'\x03'  # CMD, and FNC as the first byte of its data
 # A bundle has to be small enough for mail: of a long recording it has the first entries as text;
 # the capture has all.
 _MOST_ENTRIES = 100_000
+
+# By which a bundle is known again.
+_COMMENT = b'abdf1_ros sniff --report'
 
 _PRIVATE = re.compile('tag|topic', re.IGNORECASE)
 
@@ -114,14 +118,16 @@ class ReportBundle:
             texts['entries.json'] = '\n'.join(map(json_line, map(_without_data, self._entries)))
         else:
             texts['entries.txt'] = '\n'.join(map(text_line, self._entries))
-            texts |= {f'capture/{Path(name).name}': Path(name).read_text('ascii', 'replace')
-                      for name in self.captures}
+            for name in self.captures:
+                texts[_free_name('capture', name, texts)] = Path(name).read_text(
+                    'ascii', 'replace')
         for folder, names in (('settings', self.settings), ('conformance', self.conformance)):
             for name in names:
                 text = Path(name).read_text('utf-8-sig', 'replace')
-                texts[f'{folder}/{Path(name).name}'] = (
+                texts[_free_name(folder, name, texts)] = (
                     _without_names(text) if self.is_anonymous and folder == 'settings' else text)
         with ZipFile(path, 'w', ZIP_DEFLATED) as bundle:
+            bundle.comment = _COMMENT
             bundle.writestr('README.txt', self._readme(texts))
             for name, text in texts.items():
                 bundle.writestr(name, text + '\n')
@@ -139,6 +145,21 @@ class ReportBundle:
             lines.append('The recording shows the values that were in the data tables. '
                          '--anonymous leaves them out.')
         return '\n'.join([*lines, ''])
+
+
+def is_bundle(path: Path) -> bool:
+    """Tell whether a file is a bundle, so that a new one may replace it."""
+    if not is_zipfile(path):
+        return False
+    with ZipFile(path) as bundle:
+        return bundle.comment == _COMMENT
+
+
+def _free_name(folder: str, path: str, taken: Container[str]) -> str:
+    """Return the name of a file in the bundle; files of one name are told apart by a number."""
+    name = Path(path).name
+    names = (f'{folder}/{number}_{name}' if number else f'{folder}/{name}' for number in count())
+    return next(name for name in names if name not in taken)
 
 
 def _versions() -> dict[str, str]:

@@ -121,6 +121,15 @@ def reason_of(name: str, error: OSError) -> str:
     return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
 
 
+def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
+    """Tell whether a file may be written: it is new, empty, no file, or one of this command."""
+    place = Path(path)
+    try:
+        return not place.is_file() or not place.stat().st_size or is_ours(place)
+    except OSError:
+        return False
+
+
 def called(name: str) -> str:
     """Return how a command of the package is called in this environment."""
     if shutil.which(name):

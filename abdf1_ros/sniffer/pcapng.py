@@ -51,7 +51,7 @@ _VERDICTS = {None: 0, True: 1, False: 2}
 
 class PcapngWriter:
     """
-    Write entries to ``path``, a file or a named pipe; a file that is there has to be pcapng.
+    Write entries to ``path``, a file or a named pipe; a file that is there has to be of ours.
 
     A file is replaced; a pipe waits for its reader. Raises OSError where it cannot be written, or
     is something else, which is left alone. Other users may not read it: it holds the values of a
@@ -60,15 +60,12 @@ class PcapngWriter:
 
     def __init__(self, path: str) -> None:
         place = Path(path)
-        if place.exists() and not place.is_fifo() and not _is_pcapng(place):
-            raise OSError(f'{path} is there and is not pcapng; give another name')
+        if place.exists() and not place.is_fifo() and not _is_ours(place):
+            raise OSError(f'{path} is there and is not pcapng of ours; give another name')
         self.begun = 0.0
         place.touch(0o640)
         self._file = place.open('wb', buffering=0)
-        self._file.write(
-            _block(_SECTION, struct.pack('<IHHQ', _BYTE_ORDER, 1, 0, _NO_LENGTH))
-            + _block(_INTERFACE, struct.pack('<HHI', LINK_TYPE, 0, _SNAP_LENGTH)
-                     + _option(_NAME, b'DF1') + _option(0, b'')))
+        self._file.write(_head())
 
     def begin(self, begun: str) -> None:
         """Take the time of day (ISO 8601) from which the entries that follow count."""
@@ -93,11 +90,18 @@ class PcapngWriter:
         self._file.close()
 
 
-def _is_pcapng(path: Path) -> bool:
+def _head() -> bytes:
+    """Return the blocks with which each file of ours begins."""
+    return _block(_SECTION, struct.pack('<IHHQ', _BYTE_ORDER, 1, 0, _NO_LENGTH)) + _block(
+        _INTERFACE, struct.pack('<HHI', LINK_TYPE, 0, _SNAP_LENGTH)
+        + _option(_NAME, b'DF1') + _option(0, b''))
+
+
+def _is_ours(path: Path) -> bool:
     if not path.is_file():
         return False
     with path.open('rb') as file:
-        return file.read(4) in (b'', struct.pack('<I', _SECTION))
+        return file.read(len(_head())) in (b'', _head())
 
 
 def _padded(data: bytes) -> bytes:

@@ -59,6 +59,20 @@ def test_result_is_told_in_lines_and_as_junit(
     assert (suite.get('tests'), suite.get('failures'), suite.get('skipped')) == ('3', '0', '1')
 
 
+def test_only_a_result_of_its_own_is_replaced(
+        port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine, result = tmp_path / 'net.csv', tmp_path / 'result.xml'
+    mine.write_text('Station', encoding='utf-8')
+    with pytest.raises(SystemExit) as end:
+        main(['slave', '--port', port, '--junit', str(mine), *QUICK])
+    assert end.value.code == 2 and mine.read_text(encoding='utf-8') == 'Station'
+    assert 'was not made by --junit' in capsys.readouterr().err
+    options = ('slave', '--port', port, '--only', 'poll-idle', '--junit')
+    assert [main([*options, str(result)]) for _ in range(2)] == [0, 0]
+    assert main([*options, str(tmp_path / 'none' / 'x.xml')]) == 2
+    assert 'conform: --junit: ' in capsys.readouterr().err
+
+
 def test_failure_is_the_exit_status_and_shows_the_bytes(
         port: str, capsys: pytest.CaptureFixture[str]) -> None:
     options = ('--port', port, '--station', '2', '--answer-time', '0.05', '--only',

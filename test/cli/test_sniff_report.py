@@ -118,6 +118,36 @@ def test_file_that_cannot_be_had_is_named(
     assert '/nowhere/' in capsys.readouterr().err
 
 
+def test_only_a_bundle_is_replaced(tmp_path: Path, capture: str,
+                                   capsys: pytest.CaptureFixture[str]) -> None:
+    bundle_of(tmp_path, capture)
+    assert 'capture/line.cap' in bundle_of(tmp_path, capture)
+    foreign = tmp_path / 'foreign.zip'
+    with ZipFile(foreign, 'w') as bundle:
+        bundle.writestr('README.txt', 'mine')
+    (tmp_path / 'empty').touch()
+    for path in (capture, str(tmp_path / 'map.csv'), str(foreign)):
+        before = Path(path).read_bytes()
+        with pytest.raises(SystemExit) as end:
+            main([capture, '--summary', '--report', path])
+        assert end.value.code == 2 and Path(path).read_bytes() == before
+        assert f'{path} is there and is not a bundle' in capsys.readouterr().err
+    assert main([capture, '--summary', '--report', str(tmp_path / 'empty')]) == 0
+
+
+def test_files_of_one_name_are_all_in_the_bundle(tmp_path: Path, capture: str) -> None:
+    names = []
+    for folder in ('one', 'two', 'three'):
+        (tmp_path / folder).mkdir()
+        names.append(str(tmp_path / folder / 'net.csv'))
+        Path(names[-1]).write_text(f'Station\n{len(names)}\n', encoding='utf-8')
+    report = str(tmp_path / 'report.zip')
+    assert main([capture, '--summary', '--report', report, '--settings', *names]) == 0
+    with ZipFile(report) as bundle:
+        assert [bundle.read(f'settings/{name}')[:9] for name in (
+            'net.csv', '1_net.csv', '2_net.csv')] == [b'Station\n1', b'Station\n2', b'Station\n3']
+
+
 @pytest.mark.parametrize('args', [
     ('--report', 'x.zip', '--port', 'pty'), ('--anonymous', 'line.cap'),
     ('--report', 'x.zip', '--binary', 'line.bin')])

@@ -89,6 +89,7 @@ def test_bridge_that_is_not_there_is_said(tmp_path: Path) -> None:
     with Process(EXAMPLE, str(tmp_path / 'x.csv'), '--node', '/x', '--wait', '0.5') as recorder:
         assert recorder.result() == 1
     assert recorder.lines == ['/x is not there, or has no read topic']
+    assert not (tmp_path / 'x.csv').exists()
 
 
 def test_file_that_cannot_be_written_is_said(tmp_path: Path) -> None:
@@ -96,6 +97,15 @@ def test_file_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     with Process(EXAMPLE, str(path)) as recorder:
         assert recorder.result() == 2
     assert recorder.lines == [f'{path}: cannot be written: No such file or directory']
+
+
+def test_file_that_is_there_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / 'yesterday.csv'
+    path.write_text('mine', encoding='utf-8')
+    with Process(EXAMPLE, str(path)) as recorder:
+        assert recorder.result() == 2
+    assert recorder.lines == [f'{path}: cannot be written: File exists']
+    assert path.read_text(encoding='utf-8') == 'mine'
 
 
 # rosbag2

@@ -71,15 +71,16 @@ def test_time_of_day_that_is_none_counts_from_0(tmp_path: Path) -> None:
     assert packet[12:20] == bytes(8)
 
 
-def test_only_pcapng_is_replaced_and_nobody_else_may_read_it(tmp_path: Path) -> None:
+def test_only_a_file_of_ours_is_replaced_and_nobody_else_may_read_it(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     written(path, Entry(0.0, Direction.OUT, Kind.ACK, wire=b'\x10\x06'))
     assert written(path) == HEAD
     assert path.stat().st_mode & 0o007 == 0
-    path.write_text('mine')
-    with pytest.raises(OSError, match='is there and is not pcapng'):
-        PcapngWriter(str(path))
-    assert path.read_text() == 'mine'
+    for content in (b'mine', HEAD.replace(b'DF1', b'eth')):  # also a capture of Wireshark
+        path.write_bytes(content)
+        with pytest.raises(OSError, match='is there and is not pcapng of ours'):
+            PcapngWriter(str(path))
+        assert path.read_bytes() == content
 
 
 def test_a_named_pipe_is_written_as_it_goes(tmp_path: Path) -> None:
