@@ -417,11 +417,12 @@ class MasterLine:
     @contextmanager
     def _probe_of(self, number: int) -> Iterator[None]:
         """Count what goes on as a probe, if the station is silent."""
-        begun = None if self.stations[number].replies_in_time else self.machine.now
+        was_silent, begun = not self.stations[number].replies_in_time, self.machine.now
         try:
             yield
         finally:
-            self.stations.tried(number, self.machine.now, probe_begun=begun, is_message=True)
+            self.stations.tried(
+                number, begun, self.machine.now, was_silent=was_silent, is_message=True)
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""

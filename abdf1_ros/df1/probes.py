@@ -27,11 +27,12 @@ class Probes:
     Two kinds of askers take turns: whoever asks one silent station after the other, from ``next``
     on (clock value, s), and a message that is for one of them. A message cannot wait; one that
     comes too early gets nowhere, but the next turn is then kept free for one like it.
-    ``usual`` is the seconds that a probe takes, ``pause`` those that are left to others after it.
+    ``pause`` is the seconds that are left to others after the last probe; before the first one
+    ``usual`` stands for what that takes.
     """
 
     def __init__(self, usual: float) -> None:
-        self.usual, self.pause = usual, _OTHERS_SHARE * usual
+        self.pause = _OTHERS_SHARE * usual
         self._free = self._put_off = 0.0
         self._is_kept_for_message = False
         self._was_message = False
@@ -55,12 +56,17 @@ class Probes:
 
     def spent(self, seconds: float, now: float, *, is_message: bool = False) -> None:
         """Take note that a silent station has had the line for so long until now."""
-        self._free = max(self._free, now) + _OTHERS_SHARE * seconds
+        self.pause = _OTHERS_SHARE * seconds
+        self._free = max(self._free, now) + self.pause
         self._is_kept_for_message, self._was_message = False, is_message
 
-    def died(self, now: float) -> None:
-        """Take note that a station does not answer any more; only a message asks it at once."""
-        self._put_off = now + self.pause
+    def died(self, seconds: float, now: float) -> None:
+        """
+        Take note that a station does not answer any more, which took ``seconds`` until now.
+
+        Only a message asks it at once. Silence that was quickly told, by a gateway, costs little.
+        """
+        self._put_off = now + min(self.pause, _OTHERS_SHARE * seconds)
 
     def nobody_waits(self, now: float) -> None:
         """Take note that there is nobody whom probes keep waiting."""

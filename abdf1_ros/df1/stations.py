@@ -174,22 +174,21 @@ class ActiveStationList:
         """Return from when on (clock value, s) a message may go to an active station."""
         return -math.inf if self[number].replies_in_time else self.probes.next_message
 
-    def tried(self, number: int, now: float, *, probe_begun: float | None,
+    def tried(self, number: int, begun: float, now: float, *, was_silent: bool,
               is_message: bool = False) -> None:
         """
-        Take note that a station had the line until now; what a silent one took is its probes'.
+        Take note that a station had the line from ``begun`` until now (clock values, s).
 
-        ``probe_begun`` is from when on (clock value, s), None where it was not silent then.
+        What it took where it ``was_silent`` then is its probes'.
         """
         if self[number].replies_in_time or self.is_polled(number):
             return
         if not self._someone_waits:
             self.probes.nobody_waits(now)
-        elif probe_begun is None:
-            self.probes.died(now)
+        elif was_silent:
+            self.probes.spent(now - begun, now, is_message=is_message)
         else:
-            seconds = max(now - probe_begun, self.probes.usual)
-            self.probes.spent(seconds, now, is_message=is_message)
+            self.probes.died(now - begun, now)
 
     def polled_in_vain(self, begun: float, now: float) -> None:
         """Take note that the link has asked a silent station from ``begun`` until now."""

@@ -147,9 +147,9 @@ class Agenda:
         """Take note that a write has ended that had the line from ``begun`` on."""
         self.writes.ended(write)
         if write.mapping.station != BROADCAST:
-            self._stations.tried(write.mapping.station, now, is_message=True,
-                                 probe_begun=begun if write.is_probe else None)
+            self._stations.tried(write.mapping.station, begun, now, was_silent=write.is_probe,
+                                 is_message=True)
 
     def check_ended(self, check: Check, begun: float, now: float) -> None:
         """Take note that a check has ended that had the line from ``begun`` on."""
-        self._stations.tried(check.station, now, probe_begun=begun if check.is_probe else None)
+        self._stations.tried(check.station, begun, now, was_silent=check.is_probe)

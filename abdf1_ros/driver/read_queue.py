@@ -56,9 +56,10 @@ class ReadJob:
     between its last two good reads and ``longest`` the greatest of these; an outage of the
     station does not count. ``is_refresh`` tells that a write has changed words of the block, the
     last time at ``refreshed``. ``started`` is when the read under way or the last one began, and
-    ``late`` was ``Machine.late`` then. All packets of a read have to come within ``longest_read``
-    seconds. ``is_to_repeat`` tells that the last read was dropped, ``is_probe`` that it asks a
-    silent station. ``ticket`` is the number of its valid entry in the queue.
+    ``late`` was ``Machine.late`` then; its last packet was ``asked`` for. All packets of a read
+    have to come within ``longest_read`` seconds. ``is_to_repeat`` tells that the last read was
+    dropped, ``is_probe`` that it asks a silent station. ``ticket`` is the number of its valid
+    entry in the queue.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint],
@@ -76,7 +77,7 @@ class ReadJob:
         self.longest: float | None = None
         self.is_refresh = False
         self.refreshed = -math.inf
-        self.started = 0.0
+        self.started = self.asked = 0.0
         self.late = 0.0
         self.is_to_repeat = False
         self.is_probe = False
@@ -102,7 +103,7 @@ class ReadJob:
         Raises LinkError, and like ``words_of``; the next read then begins anew.
         """
         packets, self._packets = self._packets, []
-        number = len(packets)
+        number, self.asked = len(packets), now
         if not number:
             self.started, self.late, self.is_to_repeat = now, late, False
         packets.append(words_of(self.block, number, (yield self._commands[number])))

@@ -131,7 +131,7 @@ class Reads:
         station = self._stations[job.station]
         if not station.replies_in_time:
             is_probe = job.is_probe or station.active  # or a reply that is late once more
-            self._stations.tried(job.station, now, probe_begun=job.started if is_probe else None)
+            self._stations.tried(job.station, job.asked, now, was_silent=is_probe)
             self._put_off = now if self._due else now + job.block.period
             self._set_aside(job)
             return

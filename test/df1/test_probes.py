@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.df1.probes import Probes
 from abdf1_ros.df1.stations import ActiveStationList
+import pytest
 
 
 def test_seven_times_as_long_is_left_to_others() -> None:
@@ -32,7 +33,7 @@ def test_seven_times_as_long_is_left_to_others() -> None:
 def test_station_that_has_just_died_is_asked_at_once_for_a_message_only() -> None:
     probes = Probes(1.0)
     for now in (0.0, 4.0, 8.0):
-        probes.died(now)
+        probes.died(2.0, now)
     assert probes.next == 15.0
     assert probes.admits_message(8.0)
     probes.spent(1.0, 9.0, is_message=True)
@@ -54,13 +55,23 @@ def test_message_that_came_too_early_has_the_next_turn_and_the_round_the_one_aft
     assert probes.admits_message(24.0)
 
 
+def test_silence_that_was_told_quickly_costs_what_it_took() -> None:
+    probes = Probes(1.0)
+    probes.died(0.01, 0.0)
+    assert probes.next == pytest.approx(0.07)
+    probes.spent(0.01, 1.0)
+    assert probes.next == pytest.approx(1.07)
+    assert not probes.admits_message(1.06)
+    assert probes.next == pytest.approx(1.14)  # kept for a message
+
+
 def test_where_nobody_waits_nobody_is_put_off() -> None:
     stations = ActiveStationList((1, 2), probe_time=1.0)
     stations.lost(1, 0.0)
-    stations.tried(1, 0.0, probe_begun=None)
-    assert stations.probes.next == 7.0
+    stations.tried(1, 0.0, 1.0, was_silent=False)
+    assert stations.probes.next == 8.0
     stations.lost(2, 2.0)
-    stations.tried(2, 2.0, probe_begun=None)
+    stations.tried(2, 1.0, 2.0, was_silent=False)
     assert stations.probes.next == 2.0
     assert stations.admits_message(1, 2.0) and stations.admits_message(2, 2.0)
 
@@ -68,7 +79,7 @@ def test_where_nobody_waits_nobody_is_put_off() -> None:
 def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_asked() -> None:
     stations = ActiveStationList((1, 2, 3), probe_time=1.0)
     stations[1].overdue = 2
-    stations.tried(1, 5.0, probe_begun=3.0)
+    stations.tried(1, 3.0, 5.0, was_silent=True)
     assert stations.probes.next == 19.0
     stations.polled = {2}
     stations.lost(2, 20.0)

@@ -90,7 +90,7 @@ class Bench:
 
     def finish(self, job: ReadJob, started: float, now: float) -> None:
         """Give a read back that was made from ``started`` to ``now``."""
-        job.started = started
+        job.started = job.asked = started
         self.reads.ended(job, now)
 
     def write(self, mapping: Mapping, value: float, now: float) -> Write:
@@ -446,7 +446,8 @@ def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> Non
     bench.stations.lost(2, 0.0)
     assert {bench.read(0.0), bench.read(0.0), bench.read(0.01)} == {fast, slow, dead}
     bench.reads.begin(5.0)
-    assert [bench.read(5.0), bench.read(5.01), bench.read(5.02)] == [dead, fast, slow]
+    assert [bench.read(5.0, took=PROBE_TIME), bench.read(5.01), bench.read(5.02)] == [
+        dead, fast, slow]
     assert bench.read(5.03) is None
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from random import Random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
@@ -170,6 +171,31 @@ def test_gateway_that_takes_long_to_say_so_does_not_take_the_line(polling: str) 
     bench.gateway.handle = answer  # type: ignore[method-assign]
     bench.run(10.0)
     assert bench.listener.values(bench.second)
+
+
+@pytest.mark.parametrize('polling', POLLING)
+@pytest.mark.parametrize('sts', [0x01, 0x0F])
+def test_gateway_that_says_no_to_every_second_command_loses_half_of_them(
+        polling: str, sts: int) -> None:
+    bench = Bench(polling)
+    for plc in bench.plcs:
+        plc.serve = partial(_refuse_half, Random(plc.station), sts,  # type: ignore[method-assign]
+                            plc.serve)
+    bench.run(2.0)
+    bench.listener.reads.clear()
+    for number in range(100):
+        bench.write(bench.second, [number])
+        bench.run(0.3)
+    assert len(bench.listener.values(bench.first)) > 0.4 * 300
+    assert len(bench.listener.values(bench.second)) > 0.4 * 300
+    assert len(bench.listener.values(bench.third)) > 0.95 * 300
+    assert bench.listener.outcomes().count(Outcome.WRITTEN) > 40
+    assert bench.listener.outcomes().count(Outcome.NOT_SENT) <= 10
+
+
+def _refuse_half(dice: Random, sts: int, serve: Callable[[Packet], Packet],
+                 command: Packet) -> Packet:
+    return command.reply(sts=sts) if dice.random() < 0.5 else serve(command)
 
 
 @pytest.mark.parametrize('polling', POLLING)
