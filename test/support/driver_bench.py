@@ -20,9 +20,12 @@ from collections.abc import Callable, Sequence
 import heapq
 import itertools
 
-from abdf1_ros.df1.machine import LineTiming, Machine
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop, Responder
-from abdf1_ros.df1.stations import Station
+from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, WriteResult
@@ -126,7 +129,18 @@ class _FarEnd(Machine):
     """All stations of the line; what they hear and say goes through two filters."""
 
     def __init__(self, stations: Sequence[Responder], network: Network) -> None:
-        super().__init__(multidrop(stations), checksum=network.checksum,
+        def run_peer(machine: Machine) -> Procedure:
+            plc, = stations
+            assert isinstance(plc, SimulatedPlc)
+            settings = PeerSettings(network.checksum)
+
+            def serve(command: Packet) -> Packet:
+                return plc.serve(command)  # as it is then: a test may put its own
+
+            return FullDuplexPeer(machine, settings, ActiveStationList(), serve).run(plc)
+
+        super().__init__(multidrop(stations) if network.duplex is Duplex.HALF else run_peer,
+                         checksum=network.checksum, duplex=network.duplex,
                          timing=LineTiming(network.timing.char_time))
         self.hear: Callable[[bytes], bytes] = bytes
         self.say: Callable[[bytes], bytes] = bytes
@@ -145,6 +159,7 @@ class DriverBench:
     """
     The driver on one end of a line, stations on the other, whole frames at a time.
 
+    In Mode Peer there is one PLC.
     ``far.hear`` and ``far.say`` stand in the line: they return what comes through of a frame.
     ``chunk`` bytes are handed over together.
     """
@@ -163,7 +178,9 @@ class DriverBench:
             self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], None]]] = []
         self._count = itertools.count()
-        self.far.start(0.0)
+        self._mappings, self._settings = mappings, settings or DriverSettings()
+        if self.network.duplex is Duplex.HALF:
+            self.far.start(0.0)
         if start:
             self.open()
 
@@ -175,17 +192,28 @@ class DriverBench:
         """Put a PLC on the line."""
         made = simulated_plc(
             station, plc, self.clock, *areas, checksum=self.network.error_code)
+        if self.network.duplex is Duplex.FULL:
+            made.be_full_duplex()
         self.connect(made)
         return made
 
     def connect(self, station: Responder) -> None:
         """Put any station on the line."""
         self._stations.append(station)
+        if self.network.duplex is Duplex.FULL:
+            self.far.start(self.line.now)
 
     def open(self) -> None:  # noqa: A003
         """Open the port."""
         self.driver.machine.start(self.line.now)
         self.line.wake(self.driver.machine)
+
+    def restart(self) -> None:
+        """Kill the driver, and put a fresh one in its place."""
+        driver = Driver(self.network, self._mappings, self._settings, self.listener)
+        self.line.exchange(self.driver.machine, driver.machine)
+        self.driver = driver
+        self.open()
 
     def lose_port(self, reason: str = 'unplugged') -> None:
         """Lose the port."""

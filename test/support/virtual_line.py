@@ -92,7 +92,7 @@ class VirtualLine:
         self.now = 0.0
         self.noise = noise
         self.char_time = char_time(baud)
-        self._machines = machines
+        self._machines = list(machines)
         self._propagation = propagation
         self.chunk = chunk
         self._random = Random(seed)
@@ -125,6 +125,15 @@ class VirtualLine:
         sender = self._machines.index(machine)
         self._away[sender] = self.now + seconds
         self._look_at(sender)
+
+    def exchange(self, old: Machine, new: Machine) -> None:
+        """Put another machine in the place of one; it is started by who asks."""
+        place = self._machines.index(old)
+        self._machines[place] = new
+        new.unsent = partial(self._unsent, place)
+        self._arrivals = [entry for entry in self._arrivals if entry[2] != place]
+        heapq.heapify(self._arrivals)
+        self._away[place] = 0.0
 
     def run(self, until: Callable[[], bool], limit: float) -> None:
         """Let time pass until ``until()``; fail after ``limit`` seconds, or when all is still."""
