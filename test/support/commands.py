@@ -38,6 +38,12 @@ class Said:
         """Return the lines of its standard output, with single spaces."""
         return [' '.join(line.split()) for line in self.out.splitlines()]
 
+    @property
+    def good_lines(self) -> list[str]:
+        """Return the lines of a command that has to have ended well, without a warning."""
+        assert (self.status, self.err) == (0, '')
+        return self.lines
+
 
 def call(main: Callable[[Sequence[str]], int], capsys: pytest.CaptureFixture[str],
          *args: str) -> Said:

@@ -21,15 +21,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 import signal
-import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from support.clock import Stopwatch
 from support.fault_box import FaultBox
 from support.ros import (
     EVERYTHING,
-    here,
     Inbox,
     Observer,
     OK,
@@ -105,17 +104,17 @@ class Rig:
                             lambda status: all(word in status.message for word in words))
 
     def recovers(self, limit: float) -> None:
-        """Wait for new values of both stations, ``limit`` s at most here, and good diagnostics."""
-        began = time.monotonic()
+        """Wait for new values of both stations, ``limit`` s at most, and good diagnostics."""
+        watch = Stopwatch(self.node.number, self.simulator.number)
         self.diagnostics.clear()
         before = len(self.speeds), len(self.setpoint)
         self.observer.until(
             lambda: len(self.speeds) > before[0] and len(self.setpoint) > before[1],
             'new values')
-        duration = time.monotonic() - began
+        duration = watch.seconds
         self.until_well()
         print(f'values are back after {duration:.2f} s')
-        assert duration < here(limit)
+        assert duration < limit
 
     def write(self, value: float) -> str:
         """Write the set point of station 2; return the text of the result."""

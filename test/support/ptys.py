@@ -23,7 +23,7 @@ import select
 import time
 import tty
 
-PATIENCE = 10.0
+PATIENCE = 30.0  # s; what takes longer does not happen
 
 
 class Pty:

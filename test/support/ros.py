@@ -85,16 +85,6 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 _Result = TypeVar('_Result')
 
 
-def here(seconds: float) -> float:
-    """
-    Return a time limit (s), longer where more programs run than there are processors.
-
-    The load is a mean of minutes, which does not know yet of tests that have just begun.
-    """
-    programs = max(os.getloadavg()[0], int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1')))
-    return seconds * max(1.0, programs / (os.cpu_count() or 1))
-
-
 class Process:
     """
     A command of the package, or a file, as a process; all it says is kept, line by line.

@@ -21,17 +21,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-import time
 from typing import Any
 
 from abdf1_ros.ports.descriptor import DescriptorPort
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Int16MultiArray
+from support.clock import Stopwatch
 from support.fault_box import FaultBox
 from support.ptys import Pty
 from support.ros import (
     EVERYTHING,
-    here,
     Inbox,
     Observer,
     OK,
@@ -169,8 +168,8 @@ class Line:
         self.slave.until_well()
 
     def recovers(self, limit: float) -> None:
-        """Wait for new values at both ends, for ``limit`` s at most here, and good diagnostics."""
-        began = time.monotonic()
+        """Wait for new values at both ends, for ``limit`` s at most, and good diagnostics."""
+        watch = Stopwatch(self.master.node.number, self.slave.node.number)
         before = {end.name: len(end.theirs) for end in (self.master, self.slave)}
         back: dict[str, float] = {}
         for end in (self.master, self.slave):
@@ -179,12 +178,12 @@ class Line:
         def are_both_back() -> bool:
             for end in (self.master, self.slave):
                 if len(end.theirs) > before[end.name]:
-                    back.setdefault(end.name, time.monotonic() - began)
+                    back.setdefault(end.name, watch.seconds)
             return len(back) == len(before)
 
         self.observer.until(are_both_back, 'new values')
         print('values are back:', ', '.join(f'{end} {time:.2f} s' for end, time in back.items()))
-        assert max(back.values()) < here(limit)
+        assert max(back.values()) < limit
         self.until_well()
 
     def works(self) -> None:

@@ -69,7 +69,8 @@ class Search:
     def __init__(self, network: Network, stations: Sequence[int],
                  show: Callable[[str], None] = lambda text: None) -> None:
         self.traces: list[str] = []
-        self._network = replace(network, nak_retries=0, enq_retries=1, cmd_timeout=500)
+        self._network = replace(network, nak_retries=0, enq_retries=1,
+                                cmd_timeout=max(500, network.timeout))
         self._stations = stations
         self._show = show
 
