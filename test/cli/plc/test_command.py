@@ -410,7 +410,7 @@ def test_detect_tries_in_order_and_stops_at_the_first_answer(
         f'plc read N7:0 --station 2 --port {port} --baud 19200 --check BCC')
     assert said.lines[2:] == [
         'net.csv:', 'Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout',
-        f'5,Master,BCC,{port},19200,None,500']
+        f'5,Master,BCC,{port},19200,None,300']
 
 
 def test_detect_of_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
