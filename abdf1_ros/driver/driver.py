@@ -39,7 +39,7 @@ from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks import Interlocks, OwnWrite, Urgency
 from abdf1_ros.driver.job_tasks import JobTask, JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
-from abdf1_ros.driver.points import Outcome, ReadPoint, show, Write, WriteResult
+from abdf1_ros.driver.points import Guard, Outcome, ReadPoint, show, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.served import Served
@@ -440,30 +440,30 @@ class Driver:
             is_rare = point.period > period and not job.is_refresh  # others are for every read
             if is_rare and not point.is_due(now, period):
                 continue
-            reason = point.guard.why_not(job.started, now) if point.guard else ''
-            if not reason:
-                was_withheld = point.is_withheld
+            if point.guard is None:
                 self._update(point, data[place])
-                if was_withheld and not any(same.is_withheld for same in self._same_as(point)):
-                    self._listener.published_again(point.mapping, now - point.withheld_since)
-            elif point.withhold(reason, now):
-                self._tell_withheld(point, reason)
+            else:
+                self._guarded(point, point.guard, data[place], job.started)
         job.done(now)
         if has_recovered:
             self._change(self._refusals.recovered(job.block, self.blocks))
 
-    def _tell_withheld(self, point: ReadPoint, reason: str) -> None:
-        """Tell that a row is withheld, once for all that depend on the same (rule 15)."""
-        same = self._same_as(point)
-        if not any(other.is_withheld for other in same if other is not point):
-            more = f'; so are all {len(same)} rows that depend on it' if len(same) > 1 else ''
-            self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
+    def _guarded(self, point: ReadPoint, guard: Guard, words: bytes, started: float) -> None:
+        """
+        Update a guarded point, or withhold its value.
 
-    def _same_as(self, point: ReadPoint) -> list[ReadPoint]:
-        """Return the points whose values depend on the same condition."""
-        condition = _condition(point.mapping)
-        return [other for mapping, other in self.points.items()
-                if _condition(mapping) == condition]
+        Both are told once for all rows that depend on the same (rule 15).
+        """
+        now, was_withheld = self.machine.now, point in guard.withheld
+        reason, is_first = guard.why_not(point, started, now), not guard.withheld
+        if not reason:
+            self._update(point, words)
+            if was_withheld and not guard.withheld:
+                self._listener.published_again(point.mapping, now - point.withheld_since)
+        elif point.withhold(reason, now) and is_first:
+            count = len(guard.points)
+            more = f'; so are all {count} rows that depend on it' if count > 1 else ''
+            self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
 
     def _update(self, point: ReadPoint, words: bytes) -> None:
         try:
@@ -557,8 +557,3 @@ class Driver:
             self.stations[station].remote_errors += 1
         elif error is not None and not isinstance(error, CommandExpired):
             self._link_failed(station, (), error)
-
-
-def _condition(mapping: Mapping) -> tuple[int, str]:
-    """Return what the values of a row depend on: the mode or a counter of its station."""
-    return mapping.station, mapping.publish_while.text if mapping.publish_while else ''

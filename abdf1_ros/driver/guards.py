@@ -24,27 +24,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import math
 
-from abdf1_ros.driver.points import ReadPoint
+from abdf1_ros.driver.points import Guard, ReadPoint
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.interlocks import ANSWERS_IN_TIME
 
 
-class RunGuard:
-    """Permits values while a station answers every ``limit`` s that it is in RUN without fault."""
+class RunGuard(Guard):
+    """Permits values while a station answers, within their stale time, that it is in RUN."""
 
-    def __init__(self, limit: float) -> None:
-        self.limit = limit
+    def __init__(self) -> None:
+        super().__init__()
         self._told = -math.inf
-        self._since = math.inf
         self._state = 'its mode is not known'
+
+    @property
+    def status_period(self) -> float:
+        """Return how often (s) the station has to be asked for its mode."""
+        return min(self._since) / ANSWERS_IN_TIME
 
     def told(self, identity: Identity | None, asked: float) -> None:
         """Take an answer about the mode, None for one that cannot be used."""
         is_running = identity is not None and bool(identity.is_running) and not identity.faults
-        if not is_running:
-            self._since = math.inf
-        elif asked - self._told > self.limit or math.isinf(self._since):
-            self._since = asked
+        for limit, since in self._since.items():
+            if not is_running:
+                self._since[limit] = math.inf
+            elif asked - self._told > limit or math.isinf(since):
+                self._since[limit] = asked
         self._told = asked
         if identity is None:
             self._state = 'its mode is not known'
@@ -53,79 +58,76 @@ class RunGuard:
             if identity.faults:
                 self._state += f', {"; ".join(identity.faults)}'
 
-    def why_not(self, started: float, now: float) -> str:
+    def why_not(self, point: ReadPoint, started: float, now: float) -> str:
         """Return why a value read from ``started`` on is not to be published, empty if it is."""
-        if math.isinf(self._since):
+        since = self._since[point.patience]
+        if since == math.inf:
             return f'not in RUN: {self._state}'
-        if now - self._told > self.limit:
+        if now - self._told > point.patience:
             return f'it has not told its mode for {now - self._told:.1f} s'
-        return '' if started > self._since else 'it has begun to run during this read'
+        return '' if started > since else 'it has begun to run during this read'
 
 
-class CounterGuard:
-    """Permits values after two changes of a word in ``limit`` s each, until one is overdue."""
+class CounterGuard(Guard):
+    """Permits values after two changes of a word in time, until one is overdue."""
 
-    def __init__(self, tag: str, limit: float) -> None:
-        self.tag = tag
-        self._limit = limit
+    def __init__(self, tag: str) -> None:
+        super().__init__()
+        self._tag = tag
         self._word: bytes | None = None
         self._changed = -math.inf
-        self._since = math.inf  # when the second change in time was seen
 
     def read(self, word: bytes, now: float) -> None:
         """Take what was read of the word."""
         if self._word is not None and word != self._word:
-            is_in_time = now - self._changed <= self._limit
-            if not is_in_time:
-                self._since = math.inf
-            elif math.isinf(self._since):
-                self._since = now
+            for limit, since in self._since.items():
+                if now - self._changed > limit:
+                    self._since[limit] = math.inf
+                elif since == math.inf:
+                    self._since[limit] = now  # the second change in time
             self._changed = now
         self._word = word
 
-    def why_not(self, started: float, now: float) -> str:
+    def why_not(self, point: ReadPoint, started: float, now: float) -> str:
         """Return why a value read from ``started`` on is not to be published, empty if it is."""
-        if now - self._changed > self._limit:
-            self._since = math.inf
-        if math.isinf(self._since):
-            return f'{self.tag} has not changed twice within {self._limit:g} s'
-        return '' if started > self._since else f'{self.tag} has begun to change during this read'
+        limit = point.patience
+        if now - self._changed > limit:
+            self._since[limit] = math.inf
+        since = self._since[limit]
+        if since == math.inf:
+            return f'{self._tag} has not changed twice within {limit:g} s'
+        return '' if started > since else f'{self._tag} has begun to change during this read'
 
 
 class Guards:
     """The guards of all rows with Publish_While."""
 
     def __init__(self, points: Iterable[ReadPoint]) -> None:
-        self._runs: dict[int, list[RunGuard]] = {}
-        self._counters: dict[str, list[CounterGuard]] = {}
+        self._runs: dict[int, RunGuard] = {}
+        self._counters: dict[str, CounterGuard] = {}
         for point in points:
-            condition = point.mapping.publish_while
+            condition, station = point.mapping.publish_while, point.mapping.station
             if condition is None:
                 continue
-            if condition.tag is None or condition.timeout is None:
-                run = RunGuard(point.stale_time)
-                self._runs.setdefault(point.mapping.station, []).append(run)
-                point.guard = run
-            else:
-                counter = CounterGuard(condition.tag, condition.timeout / 1000)
-                self._counters.setdefault(condition.tag, []).append(counter)
-                point.guard = counter
+            if condition.tag is None:
+                self._runs.setdefault(station, RunGuard()).add(point)
+            else:  # a tag is there once in the map
+                self._counters.setdefault(condition.tag, CounterGuard(condition.tag)).add(point)
 
     def status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""
-        return {station: min(guard.limit for guard in guards) / ANSWERS_IN_TIME
-                for station, guards in self._runs.items()}
+        return {station: guard.status_period for station, guard in self._runs.items()}
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Take what a station has told about itself; it was ``asked`` at this clock value (s)."""
-        for guard in self._runs.get(station, ()):
-            guard.told(identity, asked)
+        if station in self._runs:
+            self._runs[station].told(identity, asked)
 
     def values_read(self, points: Sequence[ReadPoint], places: Sequence[slice], data: bytes,
                     now: float) -> None:
         """Give the counters among the words that were read to their guards."""
-        if not self._counters:
-            return
-        for point, place in zip(points, places, strict=True):
-            for counter in self._counters.get(point.mapping.tag, ()):
-                counter.read(data[place], now)
+        if self._counters:
+            for point, place in zip(points, places, strict=True):
+                counter = self._counters.get(point.mapping.tag)
+                if counter is not None:
+                    counter.read(data[place], now)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+import math
 
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
@@ -45,13 +45,6 @@ class Freshness(Enum):
     WAITING = 'waiting for the first read'
 
 
-class Guard(Protocol):
-    """What decides whether a value that was read may be published."""
-
-    def why_not(self, started: float, now: float) -> str:
-        """Return why a value read from ``started`` on is not to be published, empty if it is."""
-
-
 class ReadPoint:
     """
     What is known about one mapping that reads.
@@ -61,7 +54,8 @@ class ReadPoint:
     ``interval`` is the seconds between the last two good reads, None if a failed one was between
     them. ``error`` says why the last read gave no value, ``withheld`` why its value was not
     published. Values are withheld since ``withheld_since`` (clock value in s), and this is the
-    ``withholdings``-th time. ``guard`` decides that, where the row has one.
+    ``withholdings``-th time. ``guard`` decides that, where the row has one; what its condition
+    rests on may be as old as ``patience``, in seconds.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
@@ -78,7 +72,7 @@ class ReadPoint:
         self.withholdings = 0
         self._is_told = False
         timeout = mapping.publish_while.timeout if mapping.publish_while else None
-        self._patience = stale_time if timeout is None else timeout / 1000
+        self.patience = stale_time if timeout is None else timeout / 1000
         self._decode = mapping.codec.decoder()
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
@@ -93,6 +87,8 @@ class ReadPoint:
         """
         values = self._decode(words)
         is_same = self._is_on_change and not self._is_change(values) and self.error is None
+        if self.withheld and self.guard is not None:
+            self.guard.withheld.discard(self)
         if self.last_good is not None:
             self.interval = now - self.last_good if self.error is None else None
         self.last_good, self.error, self.withheld = now, None, ''
@@ -112,6 +108,8 @@ class ReadPoint:
     def fail(self, error: str) -> bool:
         """Take note that a read gave no value; return whether the reason is a new one."""
         is_news = error != self.error
+        if self.guard is not None:
+            self.guard.withheld.discard(self)
         self.error = error
         self.failures += 1
         return is_news
@@ -125,11 +123,13 @@ class ReadPoint:
         if not self.withheld:
             self.withheld_since, self._is_told = now, False
         self.withheld, self.error = reason, None
-        is_start = self.last_good is None and now - self.withheld_since < self._patience
+        is_start = self.last_good is None and now - self.withheld_since < self.patience
         is_news = not self._is_told and not is_start
         if is_news:
             self._is_told = True
             self.withholdings += 1
+        if self._is_told and self.guard is not None:
+            self.guard.withheld.add(self)
         return is_news
 
     @property
@@ -163,6 +163,30 @@ class ReadPoint:
         if age <= self._usual_age:
             return Freshness.FRESH
         return Freshness.STALE if age > self.stale_time else Freshness.LATE
+
+
+class Guard:
+    """
+    One condition of a station, and the ``points`` whose values may be published while it holds.
+
+    ``withheld`` are those of them that are withheld, which has been told.
+    """
+
+    def __init__(self) -> None:
+        self.points: list[ReadPoint] = []
+        self.withheld: set[ReadPoint] = set()
+        # From when on the condition holds (clock value in s), by the patience of points.
+        self._since: dict[float, float] = {}
+
+    def add(self, point: ReadPoint) -> None:
+        """Take a point that depends on the condition."""
+        self.points.append(point)
+        self._since[point.patience] = math.inf
+        point.guard = self
+
+    def why_not(self, point: ReadPoint, started: float, now: float) -> str:
+        """Return why a value read from ``started`` on is not to be published, empty if it is."""
+        raise NotImplementedError
 
 
 class Outcome(Enum):

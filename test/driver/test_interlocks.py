@@ -22,13 +22,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.guards import RunGuard
 from abdf1_ros.driver.heartbeats import LARGEST
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Freshness, Outcome
+from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -538,16 +539,20 @@ def test_rule_13_initially_run_is_not_believed() -> None:
 
 
 def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None:
-    guard, running = RunGuard(3.0), Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
-    assert guard.why_not(9.0, 9.0) == 'not in RUN: its mode is not known'
+    row = make_mapping('N11:0', publish_while=PublishWhile(None, None))
+    point, guard = ReadPoint(row, 1.0, 3.0), RunGuard()
+    guard.add(point)
+    why_not = partial(guard.why_not, point)
+    running = Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
+    assert why_not(9.0, 9.0) == 'not in RUN: its mode is not known'
     guard.told(running, 10.0)
     begun = 'it has begun to run during this read'
-    assert [guard.why_not(10.0, 10.5), guard.why_not(10.5, 13.0)] == [begun, '']
-    assert guard.why_not(13.0, 13.5) == 'it has not told its mode for 3.5 s'
+    assert [why_not(10.0, 10.5), why_not(10.5, 13.0)] == [begun, '']
+    assert why_not(13.0, 13.5) == 'it has not told its mode for 3.5 s'
     guard.told(running, 13.5)  # nobody knows what it did in between
-    assert [guard.why_not(13.5, 13.6), guard.why_not(13.6, 13.6)] == [begun, '']
+    assert [why_not(13.5, 13.6), why_not(13.6, 13.6)] == [begun, '']
     guard.told(replace(running, faults=('bad RAM',)), 14.0)
-    assert guard.why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM'
+    assert why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM'
 
 
 def counter_cell() -> tuple[Cell, Mapping]:

@@ -1,0 +1,59 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a transaction costs the driver, in instructions: no more for a larger map."""
+
+from __future__ import annotations
+
+from abdf1_ros.settings.heartbeats import PublishWhile
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from support.counting import instructions
+from support.driver_bench import DriverBench, store
+from support.mappings import make_mapping
+
+ROWS, FILES = 2000, 10
+
+
+def read_rows(condition: PublishWhile | None, rows: int) -> list[Mapping]:
+    """Return rows of one word each, in ten files."""
+    return [make_mapping(f'N{20 + number % FILES}:{number // FILES}', tag=f'row{number}',
+                         period=1000, publish_while=condition) for number in range(rows)]
+
+
+def work_of_reads(condition: PublishWhile | None, rows: int) -> int:
+    """Return the instructions of reading all rows while their condition ends and comes back."""
+    counter = make_mapping('N7:0', tag='alive', period=100)
+    bench = DriverBench([counter, *read_rows(condition, rows)],
+                        network=Network(baud=115200, timeout=200))
+    plc = bench.plc(1, 'PLC5', ('N7:0', 4), *(
+        (f'N{20 + number}:0', rows // FILES) for number in range(FILES)))
+    for beat in range(1, 25):
+        bench.at(0.15 * beat, lambda beat=beat: store(plc, 'N7:0', [beat]))  # type: ignore[misc]
+    for beat in range(1, 10):
+        bench.at(7.0 + 0.15 * beat,
+                 lambda beat=beat: store(plc, 'N7:0', [beat]))  # type: ignore[misc]
+    bench.run(2.5)
+    work = instructions(lambda: bench.run(6.5), 'driver')
+    if condition is not None:
+        assert [reason for _, reason in bench.listener.reasons] == [
+            'withheld: alive has not changed twice within 0.5 s; '
+            f'so are all {rows} rows that depend on it']
+        assert len(bench.listener.ends) == 1
+    return work
+
+
+def test_guarded_rows_cost_little_more_than_others() -> None:
+    plain = work_of_reads(None, ROWS)
+    guarded = work_of_reads(PublishWhile('alive', 500), ROWS)
+    assert guarded < 1.5 * plain
