@@ -100,7 +100,7 @@ class RowReader:
                 self._fault(column, f'{column} is missing')
         if self.faults:
             return None
-        cells = self._independent() | self._dependent()
+        cells = self._dependent() | self._independent()
         if self.faults:
             return None
         mapping = Mapping(item=self._row.item, file_line=self._row.line, **cells)
