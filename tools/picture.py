@@ -38,18 +38,16 @@ _MARGIN = 14
 _COLUMNS = 132  # longer lines are cut
 _COLOURS = (
     (re.compile(r'^\$ '), '#8bd5ca'),
-    (re.compile(r'^\[ERROR\]|ERROR:'), '#ed8796'),
-    (re.compile(r'^\[WARN\]|WARN:'), '#eed49f'),
-    (re.compile(r'^\[INFO\]|^simulator:'), '#939ab7'),
+    (re.compile(r'^node: ERROR |ERROR:'), '#ed8796'),
+    (re.compile(r'^node: WARN |WARN:'), '#eed49f'),
+    (re.compile(r'^(node|simulator): '), '#939ab7'),
     (re.compile(r'^\S'), '#8aadf4'),
 )
-_STAMP = re.compile(r'^(\[(?:INFO|WARN|ERROR)\]) \[\d+\.\d+\]')
 
 
 def picture(title: str, text: str) -> str:
-    """Return an SVG of a terminal with ``text`` on it; times of log lines are left out."""
-    lines = [f'$ {title}',
-             *(cut(_STAMP.sub(r'\1', line), _COLUMNS) for line in text.splitlines())]
+    """Return an SVG of a terminal with ``text`` on it."""
+    lines = [f'$ {title}', *(cut(line, _COLUMNS) for line in text.splitlines())]
     width = round(max(map(len, lines)) * _CHARACTER + 2 * _MARGIN)
     height = len(lines) * _LINE + 2 * _MARGIN
     rows = [

@@ -23,12 +23,13 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import math
 import os
 from pathlib import Path
+import re
 import shutil
 import signal
 import subprocess
@@ -50,9 +51,11 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-_PATIENCE = 15.0
+_PATIENCE = 30.0
+_BRIDGE = 'abdf1: '
 _RESETS = 5  # on a busy machine the heartbeat may falter
 _OK = DiagnosticStatus.OK
+_LOG_HEAD = re.compile(r'^\[(\w+)\] \[[\d.]+\] \[\w+\]: ')
 _WRITTEN = (211, 222, 233, 244)
 _TOO_LARGE = (1, 2, 3, 5000)
 _ALIVE, _IN_CONTROL = 'simulator: station 2: ROS alive', 'simulator: station 2: ROS in control'
@@ -88,15 +91,52 @@ FULL_DUPLEX = Scene(
     push='msg 1 N7:50 11 22 33 44')
 
 
-class Interrupted(Exception):
-    """The user or a process we started has ended the demo."""
+class Missed(Exception):
+    """What the demo promises has not happened; the text says what."""
+
+
+class Child:
+    """A process of ours; what it says is told between the lines of the story."""
+
+    def __init__(self, name: str, *args: str) -> None:
+        self._name = name
+        self._rest = b''
+        # By its executable, which a signal during the imports ends quietly. A session of its own:
+        # Ctrl-C is for us, who then end both in order.
+        code = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+        self.process = subprocess.Popen(
+            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, start_new_session=True)
+        os.set_blocking(self._out, False)
+
+    @property
+    def _out(self) -> int:
+        assert self.process.stdout is not None
+        return self.process.stdout.fileno()
+
+    def lines(self) -> Iterator[str]:
+        """Print what it has said since the last call, and yield it line by line."""
+        with suppress(BlockingIOError):
+            while data := os.read(self._out, 65536):
+                *lines, self._rest = (self._rest + data).split(b'\n')
+                for line in lines:
+                    text = _LOG_HEAD.sub(rf'{self._name}: \1 ', line.decode(errors='replace'))
+                    print(text, flush=True)
+                    yield text
+
+    def command(self, line: str) -> None:
+        """Write a line to its standard input."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f'{line}\n'.encode())
+        self.process.stdin.flush()
 
 
 class Watcher(Node):
     """The robot cell's side: subscribes to everything and remembers the last of each."""
 
-    def __init__(self, mappings: Sequence[Mapping]) -> None:
+    def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
         super().__init__('demo_watcher')
+        self._port = port
         self.values: dict[str, Any] = {}
         self.results: list[DiagnosticStatus] = []
         self.statuses: dict[str, DiagnosticStatus] = {}
@@ -108,7 +148,7 @@ class Watcher(Node):
                     self._taker(mapping), QoSProfile(
                         depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         self.create_subscription(
-            DiagnosticStatus, '/abdf1/write_results', self.results.append, 10)
+            DiagnosticStatus, '/abdf1/write_results', self._result, 10)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
     def expect(self, mapping: Mapping) -> float:
@@ -130,8 +170,15 @@ class Watcher(Node):
             self.values[mapping.tag] = message.data
         return take
 
+    def _result(self, message: DiagnosticStatus) -> None:
+        if message.hardware_id == self._port:
+            self.results.append(message)
+
     def _diagnostics(self, message: DiagnosticArray) -> None:
-        self.statuses.update({status.name: status for status in message.status})
+        """Keep the statuses of our bridge; others may publish theirs as well."""
+        self.statuses.update({
+            status.name.removeprefix(_BRIDGE): status for status in message.status
+            if status.name.startswith(_BRIDGE) and status.hardware_id.startswith(self._port)})
 
 
 class Speed:
@@ -159,7 +206,7 @@ class Speed:
 
 
 class Demo:
-    """Show the scenes; every step waits until it has happened."""
+    """Show the scenes; every step waits until it has happened, or raises Missed."""
 
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
@@ -170,69 +217,67 @@ class Demo:
         self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
                              '-p', f'map_file:={map_file}')
         self._simulator_args = ('--pty', str(link), *scene.simulator)
-        self._children: list[subprocess.Popen[bytes]] = []
+        self._children: list[Child] = []
         self._lamps: dict[str, float] = {}  # those that are on, and since when
-        self._rest = b''
+        self.step = 0  # the number of the one that is shown
+        self.last_step = 0
+        self.is_told = False
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self._watcher = Watcher(mappings)
+        self._watcher = Watcher(mappings, str(link))
         self._speed = Speed(self._watcher, self._mappings['speed']) if scene.guarded else None
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
-        self._simulator = self._start('simulator', *self._simulator_args, stdout=subprocess.PIPE)
-        assert self._simulator.stdout is not None
-        os.set_blocking(self._simulator.stdout.fileno(), False)
+        self._simulator = self._start('simulator', *self._simulator_args)
         self._bridge = self._start('node', *self._bridge_args)
-        self._title(self._scene.title)
-        if self._speed:
-            self._speed.live()
+        print(f'\n{self._scene.title}', flush=True)
         domain = os.environ['ROS_DOMAIN_ID']
         look_on = 'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor' \
             if shutil.which('ros2') else f'{Path(sys.executable).parent / "monitor"}'
         self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} {look_on}')
-        self._show_reads()
-        self._show_writes()
-        if self._scene.push:
-            self._show_push(self._scene.push)
-        self._show_failure(f'station {self._scene.failing_station}')
-        if self._speed and self._scene.guarded:
-            self._show_death_of_publisher(self._speed)
-            self._show_death_of_program(self._speed, self._scene.guarded)
-            self._show_death_of_bridge(self._speed)
-        self._show_diagnostics()
+        self._say('lines with "node:" and "simulator:" are what these two say meanwhile')
+        if self._speed:
+            self._say('a program publishes a speed; until its messages come, the node writes the '
+                      'Fallback, 0')
+            self._speed.live()
+        steps = self._steps()
+        self.last_step = len(steps)
+        for self.step, show in enumerate(steps, 1):
+            show()
+        self.is_told = True
         while not seconds or time.monotonic() - self._begin < seconds:
             self._pause(5.0)
-            self._title('Still running' + ('' if seconds else '; Ctrl-C ends it'))
+            print('\nStill running' + ('' if seconds else '; Ctrl-C ends it'), flush=True)
             self._print_values()
+
+    def _steps(self) -> list[Callable[[], None]]:
+        steps = [self._show_reads, self._show_writes, self._show_failure]
+        if self._scene.push:
+            steps.insert(2, self._show_push)
+        if self._speed:
+            steps += [self._show_death_of_publisher, self._show_death_of_program,
+                      self._show_death_of_bridge]
+        return [*steps, self._show_diagnostics]
 
     def close(self) -> None:
         """End both processes, the bridge first."""
-        for process in reversed(self._children):
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            process.wait(_PATIENCE)
+        for child in reversed(self._children):
+            if child.process.poll() is None:
+                child.process.send_signal(signal.SIGINT)
+            child.process.wait(_PATIENCE)
         self._relay()
         self._watcher.destroy_node()
         rclpy.try_shutdown()
 
-    def _start(self, name: str, *args: str, stdout: int | None = None) -> subprocess.Popen[bytes]:
-        # By its executable, which a signal during the imports ends quietly. A session of its own:
-        # Ctrl-C is for us, who then end both in order.
-        code = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
-        self._children.append(subprocess.Popen(
-            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, stdout=stdout,
-            start_new_session=True))
+    def _start(self, name: str, *args: str) -> Child:
+        self._children.append(Child(name, *args))
         return self._children[-1]
 
     def _relay(self) -> None:
-        """Print the output of the simulator, and remember which lamps of its PLC are on."""
-        assert self._simulator.stdout is not None
-        with suppress(BlockingIOError):
-            data = os.read(self._simulator.stdout.fileno(), 65536)
-            *lines, self._rest = (self._rest + data).split(b'\n')
-            for line in lines:
-                print(line.decode(), flush=True)
-                lamp, _, state = line.decode().rpartition(' ')
+        """Print what both say, and remember which lamps of the simulated PLC are on."""
+        for child in self._children:
+            for line in child.lines():
+                lamp, _, state = line.rpartition(' ')
                 self._lamps.pop(lamp, None)
                 if state == 'on':
                     self._lamps[lamp] = time.monotonic()
@@ -240,9 +285,11 @@ class Demo:
     def _show_reads(self) -> None:
         polled = {tag for tag, mapping in self._mappings.items() if mapping.polls}
         self._wait('every mapped topic', lambda: polled <= self._watcher.values.keys())
-        self._title(f'1. Reads: every row of config/{self._scene.map_file} is a topic')
+        self._title(f'Reads: every row of config/{self._scene.map_file} is a topic')
         self._print_values()
+        first = list(self._watcher.values.values())
         self._pause(2.0)
+        self._wait('values that change', lambda: list(self._watcher.values.values()) != first)
         self._say('two seconds later:')
         self._print_values()
 
@@ -254,15 +301,14 @@ class Demo:
                       f' {_shown(self._watcher.values[tag])}', flush=True)
 
     def _show_writes(self) -> None:
-        self._title('2. Writes: published to ~/write/<topic>, answered on ~/write_results')
-        self._write('recipe', _WRITTEN)
+        self._title('Writes: published to ~/write/<topic>, answered on ~/write_results')
+        self._write('recipe', _WRITTEN, 'written')
         self._wait('the value to come back',
                    lambda: tuple(self._watcher.values['recipe']) == _WRITTEN)
         self._say(f'and /abdf1/read/recipe now shows {_shown(self._watcher.values["recipe"])}')
-        self._write('recipe', _TOO_LARGE)
-        self._pause(1.0)
+        self._write('recipe', _TOO_LARGE, 'not written: refused')
 
-    def _write(self, tag: str, values: Sequence[int]) -> None:
+    def _write(self, tag: str, values: Sequence[int], expected: str) -> None:
         mapping = self._mappings[tag]
         publisher = self._watcher.create_publisher(
             MESSAGES[mapping.message_type], f'/abdf1/write/{mapping.topic}', 10)
@@ -270,25 +316,31 @@ class Demo:
         self._watcher.results.clear()
         publisher.publish(MESSAGES[mapping.message_type](data=values))
         self._say(f'publish {list(values)} to /abdf1/write/{mapping.topic}')
-        self._wait('the result', lambda: bool(self._watcher.results))
-        result = self._watcher.results[0]
+        self._wait('the result', lambda: bool(self._results(tag)))
+        result, = self._results(tag)
         latency = {pair.key: pair.value for pair in result.values}['latency_ms']
         self._say(f'result: {result.message} ({latency} ms)')
+        if not result.message.startswith(expected):
+            raise Missed(f'the result of {list(values)} should be "{expected}"')
 
-    def _show_push(self, command: str) -> None:
-        self._title('   Serve: the PLC writes to words of ours, without being asked')
+    def _results(self, tag: str) -> list[DiagnosticStatus]:
+        return [result for result in self._watcher.results if result.name == tag]
+
+    def _show_push(self) -> None:
+        self._title('Serve: the PLC writes to words of ours, without being asked')
         tag = next(tag for tag, mapping in self._mappings.items() if mapping.serves)
-        self._command(command)
+        self._simulator.command(self._scene.push or '')
         self._wait('the values', lambda: tag in self._watcher.values)
         self._say(f'/abdf1/read/{tag} shows {_shown(self._watcher.values[tag])}')
 
-    def _show_failure(self, station: str) -> None:
-        self._title(f'3. {station.capitalize()} loses its power')
+    def _show_failure(self) -> None:
+        station = f'station {self._scene.failing_station}'
+        self._title(f'{station.capitalize()} loses its power')
         watched = self._mappings[self._scene.watched]
         deadline = self._watcher.expect(watched)
         self._pause(1.0)
         self._watcher.missed.clear()
-        self._command(f'silent {self._scene.failing_station}')
+        self._simulator.command(f'silent {self._scene.failing_station}')
         self._wait('the loss to be noticed', lambda: self._watcher.missed[watched.tag] > 0)
         self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of '
                   f'{deadline:.1f} s is told: no more values')
@@ -296,8 +348,8 @@ class Demo:
         self._print_statuses('link', station, 'mappings')
         if self._scene.surviving:
             self._show_survivor(self._scene.surviving)
-        self._title('   ... and gets it back')
-        self._command(f'normal {self._scene.failing_station}')
+        print('\n   ... and gets it back', flush=True)
+        self._simulator.command(f'normal {self._scene.failing_station}')
         self._wait('the station to answer', lambda: self._level('mappings') == _OK)
         self._print_statuses('link', station, 'mappings')
 
@@ -307,28 +359,29 @@ class Demo:
         self._say(f'the other goes on: /abdf1/read/{tag} {before} -> '
                   f'{_shown(self._watcher.values[tag])}')
 
-    def _take_control(self, speed: Speed) -> None:
+    def _take_control(self) -> Speed:
         """Let a person press reset, and the publisher command a speed."""
+        assert self._speed is not None
         for _ in range(_RESETS):
             self._wait('a steady heartbeat', lambda: time.monotonic() > 4.5 + self._lamps.get(
                 _ALIVE, math.inf))
-            self._command('reset 2')
+            self._simulator.command('reset 2')
             if self._spin_until(lambda: _IN_CONTROL in self._lamps, 1.0):
                 break
         else:
-            raise Interrupted('a reset of the PLC has not given ROS control')
-        speed.value = 800
+            raise Missed('a reset of the PLC has not given ROS control')
+        self._speed.value = 800
         self._wait('the speed in the PLC', lambda: self._used() == 800)
         self._say('800 is published to /abdf1/write/speed, and the program uses it: '
                   'used_speed is [800]')
+        return self._speed
 
     def _used(self) -> int:
         return int(self._watcher.values['used_speed'][0])
 
-    def _show_death_of_publisher(self, speed: Speed) -> None:
-        self._title('4. The publisher of a command dies; first a person presses reset at the PLC')
-        self._take_control(speed)
-        self._watcher.results.clear()
+    def _show_death_of_publisher(self) -> None:
+        self._title('The publisher of a command dies; first a person presses reset at the PLC')
+        speed = self._take_control()
         died = time.monotonic()
         speed.die()
         self._say('it publishes nothing any more')
@@ -337,62 +390,65 @@ class Demo:
         self._say(f'{time.monotonic() - died:.1f} s later the bridge has written the Fallback, '
                   'and the program uses [0]')
 
-    def _show_death_of_program(self, speed: Speed, tag: str) -> None:
-        self._title('5. The program of the PLC stands still, while its port goes on answering')
+    def _show_death_of_program(self) -> None:
+        self._title('The program of the PLC stands still, while its port goes on answering')
+        tag = self._scene.guarded or ''
         deadline = self._watcher.expect(self._mappings[tag])
         self._pause(1.0)
         self._watcher.missed.clear()
-        self._command('program 2')
+        self._simulator.command('program 2')
         self._wait('the silence to be noticed', lambda: self._watcher.missed[tag] > 0)
         self._say(f'/abdf1/read/{tag} is withheld; a subscriber with a deadline of '
                   f'{deadline:.1f} s is told: no more values')
         self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
         self._print_statuses('mappings')
-        self._command('run 2')
+        self._simulator.command('run 2')
         self._wait('values', lambda: self._level('mappings') == _OK)
         self._print_statuses('mappings')
-        speed.live()
+        if self._speed:
+            self._speed.live()
 
-    def _show_death_of_bridge(self, speed: Speed) -> None:
-        self._title('6. The bridge dies (kill -9); first another reset, as control is gone')
-        self._take_control(speed)
+    def _show_death_of_bridge(self) -> None:
+        self._title('The bridge dies (kill -9); first another reset, as control is gone')
+        self._take_control()
         self._children.remove(self._bridge)
-        self._bridge.kill()
-        self._bridge.wait()
+        self._bridge.process.kill()
+        self._bridge.process.wait()
         died = time.monotonic()
         self._wait('the watchdog', lambda: _IN_CONTROL not in self._lamps)
         self._say(f'{time.monotonic() - died:.1f} s later the watchdog of the PLC has taken the '
                   'speed away')
-        self._title('   ... and comes back, but without a reset it gets no control')
+        print('\n   ... and comes back, but without a reset it gets no control', flush=True)
         self._watcher.values.clear()
+        self._watcher.statuses.clear()
         self._bridge = self._start('node', *self._bridge_args)
         self._wait('a heartbeat', lambda: _ALIVE in self._lamps)
         self._wait('values', lambda: {'used_speed', 'doors'} <= self._watcher.values.keys())
         self._wait('the diagnostics', lambda: self._level('mappings') == _OK)
         self._say(f'800 is still published, and the program uses [{self._used()}]')
+        if self._used() or _IN_CONTROL in self._lamps:
+            raise Missed('without a reset ROS should have no control')
 
     def _show_diagnostics(self) -> None:
-        number = 7 if self._speed else 4
-        self._title(f'{number}. Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
-        self._print_statuses(*(name.partition(': ')[2] for name in self._watcher.statuses))
+        self._title('Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
+        # After a write that was not confirmed, as on a busy machine, they say so for ten seconds.
+        self._wait('all statuses to be OK', lambda: all(
+            status.level == _OK for status in self._watcher.statuses.values()))
+        self._print_statuses(*self._watcher.statuses)
         self._say('the counters of the line that are not 0:')
-        for pair in self._watcher.statuses['abdf1: counters'].values:
+        for pair in self._watcher.statuses['counters'].values:
             if pair.value != '0':
                 print(f'    {pair.key:<24} {pair.value:>7}', flush=True)
 
-    def _level(self, section: str) -> bytes:
-        level: bytes = self._watcher.statuses[f'abdf1: {section}'].level
-        return level
+    def _level(self, section: str) -> bytes | None:
+        """Return the level of a status, None before it has come."""
+        status = self._watcher.statuses.get(section)
+        return status.level if status else None
 
     def _print_statuses(self, *sections: str) -> None:
         for section in sections:
-            status = self._watcher.statuses[f'abdf1: {section}']
+            status = self._watcher.statuses[section]
             print(f'    {status.name:<18} {status.message}', flush=True)
-
-    def _command(self, line: str) -> None:
-        assert self._simulator.stdin is not None
-        self._simulator.stdin.write(f'{line}\n'.encode())
-        self._simulator.stdin.flush()
 
     def _pause(self, seconds: float) -> None:
         end = time.monotonic() + seconds
@@ -400,15 +456,15 @@ class Demo:
 
     def _wait(self, what: str, condition: Callable[[], bool]) -> None:
         if not self._spin_until(condition, _PATIENCE):
-            raise Interrupted(f'waited {_PATIENCE:g} s in vain for {what}')
+            raise Missed(f'waited {_PATIENCE:g} s in vain for {what}')
 
     def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
         end = time.monotonic() + limit
         while time.monotonic() < end:
             if condition():
                 return True
-            if any(process.poll() is not None for process in self._children):
-                raise Interrupted('a process has ended; see above')
+            if any(child.process.poll() is not None for child in self._children):
+                raise Missed('the node or the simulator has ended; see above')
             self._relay()
             if self._speed:
                 self._speed.run()
@@ -416,7 +472,8 @@ class Demo:
         return condition()
 
     def _title(self, text: str) -> None:
-        print(f'\n{text}', flush=True)
+        self._relay()
+        print(f'\n{self.step}. {text}', flush=True)
 
     def _say(self, text: str) -> None:
         print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
@@ -436,7 +493,7 @@ def _seconds(text: str) -> float:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the demo; return 0, or 1 when something did not happen."""
+    """Run the demo; return 0, or 1 when a step was not seen as it should be."""
     parser = command_parser('demo', __doc__)
     parser.add_argument('--seconds', type=_seconds, default=30.0,
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
@@ -445,22 +502,26 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
     with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
-        try:
-            scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
-            return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
-        except KeyboardInterrupt:
-            print()
-    return 0
+        return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
 
 
 def _tell(demo: Demo, seconds: float) -> int:
+    """Run the demo and end it; say whether all was seen."""
+    status, verdict = 0, ''
     try:
         demo.run(seconds)
-    except Interrupted as reason:
-        print(f'demo: {reason}', file=sys.stderr)
-        return 1
+    except KeyboardInterrupt:
+        print()
+        if not demo.is_told:
+            verdict = f'demo: interrupted in step {demo.step} of {demo.last_step}'
+    except Missed as reason:
+        status = 1
+        verdict = (f'demo: step {demo.step} of {demo.last_step} was not seen as it should be: '
+                   f'{reason}')
     finally:
         ignore_further()  # or a process of ours might stay
         demo.close()
-    return 0
+    print(verdict or f'demo: all {demo.last_step} steps were seen as they should be', flush=True)
+    return status

@@ -39,11 +39,6 @@ def test_every_line_is_drawn_in_its_place() -> None:
     assert [later - earlier for earlier, later in zip(heights, heights[1:])] == [16, 32]
 
 
-def test_times_of_the_log_are_left_out() -> None:
-    svg = picture.picture('x', '[WARN] [1795254696.274155403] [abdf1]: late')
-    assert lines(svg)[1] == '[WARN] [abdf1]: late'
-
-
 def test_long_lines_are_cut() -> None:
     assert lines(picture.picture('x', 'long ' * 40))[1] == ('long ' * 40)[:129] + '...'
 

@@ -1,0 +1,78 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The demo beside others on the network, and what it says at its end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from abdf1_ros.cli import demo
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import pytest
+from support.cases import for_all
+from support.ros import Observer, Process
+
+
+def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
+    with Observer() as observer, Process('demo', '--peer', '--seconds', '1') as story:
+        diagnostics = observer.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        results = observer.node.create_publisher(DiagnosticStatus, '/abdf1/write_results', 10)
+
+        def is_over() -> bool:
+            diagnostics.publish(DiagnosticArray(status=[
+                DiagnosticStatus(name=name, level=DiagnosticStatus.ERROR, hardware_id=name)
+                for name in ('arm', 'nav: planner', 'abdf1: link', 'abdf1: pump')]))
+            results.publish(DiagnosticStatus(name='speed', message='written'))
+            return not story.is_running
+
+        observer.until(is_over, lambda: story.text)
+    assert story.result() == 0, story.text
+    assert story.lines[-1] == 'demo: all 5 steps were seen as they should be'
+    refused = story.lines.index(next(line for line in story.lines if '5000] to' in line)) + 1
+    assert 'result: not written: refused' in story.lines[refused]
+    assert 'pump' not in story.text
+
+
+class Told:
+    """Stands in for a demo that stops in step 3 of 7."""
+
+    step, last_step, is_told = 3, 7, False
+
+    def __init__(self, end: BaseException | None) -> None:
+        self._end = end
+
+    def run(self, seconds: float) -> None:
+        """End as told."""
+        self.is_told = self._end is None
+        if self._end:
+            raise self._end
+
+    def close(self) -> None:
+        """Say something, as the processes do when they end."""
+        print('node: INFO end')
+
+
+@for_all(('end', 'status', 'text'), [
+    (None, 0, 'demo: all 7 steps were seen as they should be'),
+    (KeyboardInterrupt(), 0, 'demo: interrupted in step 3 of 7'),
+    (demo.Missed('waited 30 s in vain for values'), 1,
+     'demo: step 3 of 7 was not seen as it should be: waited 30 s in vain for values')])
+def test_the_last_line_says_what_was_not_seen(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+        end: BaseException | None, status: int, text: str) -> None:
+    monkeypatch.setattr(demo, 'ignore_further', lambda: None)
+    told: Any = Told(end)
+    assert demo._tell(told, 0.0) == status
+    assert capsys.readouterr().out.splitlines()[-1] == text
