@@ -30,7 +30,6 @@ import random
 import re
 import sys
 import time
-from typing import Any
 
 from abdf1_ros.cli.plc.line import network_of
 from abdf1_ros.cli.plc.options import add_line_options, LineDefaults
@@ -44,10 +43,10 @@ from abdf1_ros.cli.terminal import (
     seconds_option,
     whole_option,
 )
-from abdf1_ros.conform import asking, client, data, master, peer, slave
+from abdf1_ros.conform import asking, client, data, duplicates, master, peer, slave
 from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck
-from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.ends import MasterEnd, PeerEnd, ServerEnd, SlaveEnd, Words
 from abdf1_ros.conform.report import as_issue, as_json, as_junit, line_of, summary_of
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
@@ -66,7 +65,8 @@ _EXIT_FAILED = 1
 _EXIT_USAGE = 2
 _INTERRUPTED = 130
 
-_MODULES = (slave, master, peer, client, data, asking)  # importing them enters their cases
+# Importing them enters their cases.
+_MODULES = (slave, master, peer, client, data, duplicates, asking)
 
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 
@@ -142,7 +142,8 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
         return _EXIT_USAGE
     try:
         wire = Wire(line, BlockCheck(network.error_code), time.monotonic,
-                    is_half_duplex=target.is_half_duplex, answer_time=options.answer_time)
+                    is_half_duplex=target.is_half_duplex, answer_time=options.answer_time,
+                    char_time=0.0 if made else network.timing.char_time)
         return _judge(options, target, cases, wire, network)
     except OSError as error:
         print(f'conform: the line was lost: {reason_of("", error)}', file=sys.stderr)
@@ -154,8 +155,7 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
 def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], wire: Wire,
            network: Network) -> int:
     results: list[CaseResult] = []
-    for result in run_cases(cases, wire, _end_maker(options, target, wire, network),
-                            _allowed(options)):
+    for result in run_cases(cases, wire, _end(options, target, wire, network), _allowed(options)):
         results.append(result)
         if not (options.json or options.report):
             print(line_of(result), flush=True)
@@ -200,19 +200,19 @@ def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
     return frozenset(allowed)
 
 
-def _end_maker(options: argparse.Namespace, target: Target, wire: Wire,
-               network: Network) -> Callable[[], Any]:
-    """Return a function that makes the end that we play, for each case a new one."""
-    numbering = Numbering(random.randrange(0x10000))
+def _end(options: argparse.Namespace, target: Target, wire: Wire,
+         network: Network) -> MasterEnd | PeerEnd | SlaveEnd | ServerEnd:
+    """Return the end that we play."""
+    first_tns = random.randrange(0x10000)
     words = _words(options)
     if target is Target.SLAVE:
-        return lambda: MasterEnd(wire, options.station, network.station, numbering, words)
+        return MasterEnd(wire, options.station, network.station, first_tns, words)
     if target is Target.PEER:
-        return lambda: PeerEnd(wire, options.station, network.station, numbering, words)
+        return PeerEnd(wire, options.station, network.station, first_tns, words)
     serve = _server(options, network)
     if target is Target.MASTER:
-        return lambda: SlaveEnd(wire, options.station, serve)
-    return lambda: ServerEnd(wire, serve)
+        return SlaveEnd(wire, options.station, serve)
+    return ServerEnd(wire, serve)
 
 
 def _words(options: argparse.Namespace) -> Words:

@@ -99,19 +99,18 @@ def case(name: str, rule: str, source: str, *targets: Target,
     return enter
 
 
-def run_cases(cases: Iterable[Case], wire: Wire, make_end: Callable[[], Any],
+def run_cases(cases: Iterable[Case], wire: Wire, end: Any,
               allowed: frozenset[Permission]) -> Iterator[CaseResult]:
     """
     Yield the result of each case, one after the other.
 
-    Every case gets an end of its own from ``make_end``, and a quiet line. The caller handles
-    OSError of the line.
+    ``end`` is the one that we play; before each case it waits until the other end has done what
+    the last case has left. The caller handles OSError of the line.
     """
     for entry in cases:
         if entry.permission not in allowed:
             yield CaseResult(entry, Verdict.SKIP, got=f'needs {entry.permission.value}')
             continue
-        end = make_end()
         end.settle()
         wire.transcript.clear()
         begun = wire.now

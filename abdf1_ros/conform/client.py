@@ -57,6 +57,17 @@ def silence_enquired(end: ServerEnd) -> None:
     end.finish(command)
 
 
+@case('no-needless-enquiry', 'DLE ENQ is for a message without a response, not for one that was '
+      'acknowledged.', 'M 4-5', _CLIENT)
+def no_needless_enquiry(end: ServerEnd) -> None:
+    command = end.next_command()
+    end.wire.send(codec.ACK)
+    symbol = end.wire.hear(end.wire.answer_time / 2, answers=False)
+    end.reply_to(command)
+    if symbol is not None and symbol.kind is SymbolKind.ENQ:
+        raise Failed('no DLE ENQ after DLE ACK', str(symbol))
+
+
 @case('enquiry-nak-repeated', 'DLE NAK as answer to DLE ENQ has the message sent again.',
       'M 4-5, 4-13', _CLIENT)
 def enquiry_nak_repeated(end: ServerEnd) -> None:
@@ -77,10 +88,17 @@ def reply_acknowledged(end: ServerEnd) -> None:
 @case('bad-reply-refused', 'A reply with a wrong check is answered with DLE NAK.',
       'M 4-7 to 4-9', _CLIENT)
 def bad_reply_refused(end: ServerEnd) -> None:
+    _refuse(end)
+
+
+def _refuse(end: ServerEnd, *then: bytes) -> None:
+    """Send a damaged reply, which is refused, then what is answered DLE NAK again, then it."""
     command = end.next_command()
     end.wire.send(codec.ACK)
-    end.wire.send(codec.damaged(codec.message(end.serve(command.data), end.wire.check)))
-    end.wire.expect(SymbolKind.NAK)
+    damaged = codec.damaged(codec.message(end.serve(command.data), end.wire.check))
+    for raw in (damaged, *then):
+        end.wire.send(raw)
+        end.wire.expect(SymbolKind.NAK)
     end.reply_to(command)
     end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
 
@@ -96,6 +114,11 @@ def enquiry_repeats_response(end: ServerEnd) -> None:
     symbol = end.wire.until(is_response, 'the last response', end.wire.answer_time)
     if symbol.kind is not SymbolKind.ACK:
         raise Failed('DLE ACK again', str(symbol))
+
+
+@case('enquiry-repeats-refusal', 'DLE ENQ after DLE NAK has DLE NAK repeated.', 'M 4-13', _CLIENT)
+def enquiry_repeats_refusal(end: ServerEnd) -> None:
+    _refuse(end, codec.ENQ)
 
 
 @case('duplicate-acknowledged', 'A reply that comes again is acknowledged again.',

@@ -22,8 +22,8 @@ and MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
 from __future__ import annotations
 
 from abdf1_ros.conform.case import case, Permission, Target
-from abdf1_ros.conform.codec import HEADER_SIZE
-from abdf1_ros.conform.ends import Asking, Words
+from abdf1_ros.conform.codec import HEADER_SIZE, SymbolKind
+from abdf1_ros.conform.ends import AskingEnd, check_reply, Words
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER)
@@ -35,6 +35,7 @@ _EXTENDED = 0xF0  # STS: an EXT STS follows (M 8-3)
 
 # Bytes of an echo that every product takes: SLC 5/01 and 5/02 end at 95, a PLC-5 at 243.
 _ECHO_SIZES = (0, 1, 2, 64, 95)
+_LARGE_ECHO_SIZES = (243, 236, 200, 128, 112)
 
 # All byte values with a meaning on the line, and their neighbours.
 _NASTY = bytes.fromhex('10 10 03 10 02 10 05 10 06 10 15 03 02 01 00 FF 10')
@@ -52,7 +53,7 @@ def _refused(reply: bytes, allowed: tuple[int, ...]) -> None:
         raise Failed(' or '.join(f'STS {sts:02X}' for sts in allowed), f'STS {reply[3]:02X}')
 
 
-def _echoed(end: Asking, data: bytes, tns: int | None = None) -> None:
+def _echoed(end: AskingEnd, data: bytes, tns: int | None = None) -> None:
     got = _data(end.ask(_ECHO, b'\x00' + data, tns))
     if got != data:
         raise Failed(f'the data of the echo: {data.hex(" ")}', got.hex(' '))
@@ -60,48 +61,66 @@ def _echoed(end: Asking, data: bytes, tns: int | None = None) -> None:
 
 @case('stuffing', 'A data byte 10 is doubled on the line and single in the message.',
       'M 2-7, 5-4', *_ANSWERING)
-def stuffing(end: Asking) -> None:
+def stuffing(end: AskingEnd) -> None:
     _echoed(end, _NASTY)
 
 
 @case('check-of-all-bytes', 'The check of a reply is right for every value of a byte.',
       'M 5-2 to 5-7', *_ANSWERING)
-def check_of_all_bytes(end: Asking) -> None:
+def check_of_all_bytes(end: AskingEnd) -> None:
     for start in range(0, 256, 64):
         _echoed(end, bytes(range(start, start + 64)))
 
 
 @case('echo-sizes', 'An echo sends back what it was given, of any length up to the packet.',
       'M 7-3', *_ANSWERING)
-def echo_sizes(end: Asking) -> None:
+def echo_sizes(end: AskingEnd) -> None:
     for size in _ECHO_SIZES:
         _echoed(end, bytes(range(size)))
 
 
+@case('largest-packet', 'An echo of up to 243 bytes is sent back whole or refused, never cut.',
+      'M 7-3', *_ANSWERING)
+def largest_packet(end: AskingEnd) -> None:
+    for size in _LARGE_ECHO_SIZES:
+        data = bytes(range(size))
+        command = end.command(_ECHO, b'\x00' + data)
+        response = end.offer(command)
+        if response is None or response.kind is not SymbolKind.ACK:
+            continue  # too long for this product
+        reply = check_reply(command, end.collect())
+        if reply[3]:
+            continue
+        if reply[HEADER_SIZE:] != data:
+            raise Failed(f'{size} bytes, or an STS', f'{len(reply) - HEADER_SIZE} bytes')
+        return
+    raise Skipped(f'an echo of {size} bytes is refused: packets of this product are smaller')
+
+
 @case('tns-returned', 'A reply has the TNS of its command, whatever its bytes are.',
       'M 6-7', *_ANSWERING)
-def tns_returned(end: Asking) -> None:
+def tns_returned(end: AskingEnd) -> None:
     for tns in (0x0010, 0x1010, 0xFFFF, 0x0310, 0x0000):
         _echoed(end, b'', tns)
 
 
 @case('unknown-command', 'A command code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
-def unknown_command(end: Asking) -> None:
+def unknown_command(end: AskingEnd) -> None:
     _refused(end.ask(0x0C, b''), (_ILLEGAL,))
 
 
 @case('unknown-function', 'A function code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
-def unknown_function(end: Asking) -> None:
+def unknown_function(end: AskingEnd) -> None:
     _refused(end.ask(_TYPED, b'\xE7'), (_ILLEGAL, _EXTENDED))
 
 
 @case('identity', 'Diagnostic status tells what the processor is.', 'M 7-3', *_ANSWERING)
-def identity(end: Asking) -> None:
+def identity(end: AskingEnd) -> None:
     if not _data(end.ask(_ECHO, b'\x03')):
         raise Failed('some bytes of diagnostic status', 'none')
 
 
-def _words_of(end: Asking) -> Words:
+def _words_of(end: AskingEnd) -> Words:
     if not end.words.family:
         raise Skipped('needs --family PLC5 or SLC')
     return end.words
@@ -141,7 +160,7 @@ def _masked_body(words: Words, mask: int, bits: int) -> bytes:
     return b'\x26\x06' + place[0] + place[1] + keep + (bits & mask).to_bytes(2, 'little')
 
 
-def _read(end: Asking, count: int) -> bytes:
+def _read(end: AskingEnd, count: int) -> bytes:
     """Return ``count`` integers as bytes, without the type that a PLC-5 puts before them."""
     data = _data(end.ask(_TYPED, _read_body(end.words, count)))
     if len(data) < 2 * count:
@@ -151,14 +170,14 @@ def _read(end: Asking, count: int) -> bytes:
 
 @case('read-words', 'A typed read returns the words that were asked for.',
       'M 7-17, 7-28', *_ANSWERING)
-def read_words(end: Asking) -> None:
+def read_words(end: AskingEnd) -> None:
     _words_of(end)
     _read(end, 1)
 
 
 @case('address-forms', 'A PLC-5 takes an address with and without its data table area, in long '
       'form, and as text.', 'M 13-10 to 13-15', *_ANSWERING)
-def address_forms(end: Asking) -> None:
+def address_forms(end: AskingEnd) -> None:
     words = _words_of(end)
     if words.family != 'PLC5':
         raise Skipped('only a PLC-5 has these forms')
@@ -177,7 +196,7 @@ def address_forms(end: Asking) -> None:
 
 @case('element-too-high', 'An element that does not exist is refused, not answered with data.',
       'M 8-2 to 8-4', *_ANSWERING)
-def element_too_high(end: Asking) -> None:
+def element_too_high(end: AskingEnd) -> None:
     words = _words_of(end)
     beyond = Words(words.file, 9999, family=words.family)
     _refused(end.ask(_TYPED, _read_body(beyond, 1)), (_ILLEGAL, 0x50, _EXTENDED))
@@ -185,7 +204,7 @@ def element_too_high(end: Asking) -> None:
 
 @case('write-and-read', 'What was written is what is read, bit by bit.',
       'M 7-18, 7-30', *_ANSWERING, permission=Permission.WRITE)
-def write_and_read(end: Asking) -> None:
+def write_and_read(end: AskingEnd) -> None:
     words = _words_of(end)
     before = _read(end, words.count)
     try:
@@ -200,7 +219,7 @@ def write_and_read(end: Asking) -> None:
 
 @case('masked-write', 'A masked write changes the bits of its mask and no others.',
       'M 7-20', *_ANSWERING, permission=Permission.WRITE)
-def masked_write(end: Asking) -> None:
+def masked_write(end: AskingEnd) -> None:
     words = _words_of(end)
     before = _read(end, 1)
     try:

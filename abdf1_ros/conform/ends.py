@@ -35,6 +35,9 @@ PATIENCE = 30.0
 
 _MOST_TRIES = 3
 
+# A reply may take so many answer times.
+_REPLY_TIMES = 5
+
 
 @dataclass(frozen=True, slots=True)
 class Words:
@@ -56,28 +59,6 @@ class Words:
         return f'N{self.file}:{self.element}'
 
 
-class Numbering:
-    """The TNS of one command after the other, none twice in a run of 65,536."""
-
-    def __init__(self, first: int) -> None:
-        self._next = first
-
-    def take(self) -> int:
-        """Return a TNS that has not been used lately."""
-        tns, self._next = self._next & 0xFFFF, self._next + 1
-        return tns
-
-
-class Asking(Protocol):
-    """An end that sends commands: what the cases of ``data`` need."""
-
-    wire: Wire
-    words: Words
-
-    def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
-        """Send a command, FNC included in ``body``, and return the link data of its reply."""
-
-
 def header(dst: int, src: int, cmd: int, tns: int, sts: int = 0) -> bytes:
     """Return the six bytes before FNC or data (M 6-3)."""
     return bytes((dst, src, cmd, sts)) + tns.to_bytes(2, 'little')
@@ -96,64 +77,89 @@ def check_reply(command: bytes, reply: bytes) -> bytes:
     return reply
 
 
-class _AskingEnd(ABC):
+class AskingEnd(ABC):
     """What both ends that ask have: whom they ask (``station``), as whom, and with which TNS."""
 
-    def __init__(self, wire: Wire, station: int, own: int, numbering: Numbering,
+    def __init__(self, wire: Wire, station: int, own: int, first_tns: int,
                  words: Words = Words()) -> None:
         self.wire = wire
         self.station = station
         self.own = own
         self.words = words
-        self.numbering = numbering
+        self.owed: set[bytes] = set()  # TNS of what was acknowledged and not answered yet
+        self._next_tns = first_tns
 
     def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
-        """Return the link data of a command: an echo of nothing, if not told otherwise."""
-        return header(self.station, self.own, cmd,
-                      self.numbering.take() if tns is None else tns) + body
+        """
+        Return the link data of a command: an echo of nothing, if not told otherwise.
+
+        None has the TNS of another in a run of 65,536.
+        """
+        if tns is None:
+            tns, self._next_tns = self._next_tns & 0xFFFF, self._next_tns + 1
+        return header(self.station, self.own, cmd, tns) + body
 
     @abstractmethod
+    def send(self, command: bytes) -> None:
+        """Send a message."""
+
+    def offer(self, command: bytes) -> HeardSymbol | None:
+        """Send a message and return the response to it."""
+        self.send(command)
+        symbol = self.wire.hear()
+        if symbol is not None and symbol.kind is SymbolKind.ACK:
+            self.owed.add(command[4:6])
+        return symbol
+
     def deliver(self, command: bytes) -> None:
-        """Send a message that has to be acknowledged."""
+        """Send a message that has to be acknowledged; on a half-duplex line twice, if needed."""
+        symbol = self.offer(command)
+        if symbol is None and self.wire.is_half_duplex:
+            symbol = self.offer(command)
+        if symbol is None or symbol.kind is not SymbolKind.ACK:
+            raise Failed('DLE ACK for a good message', str(symbol or 'silence'))
 
     @abstractmethod
     def collect(self, acknowledge: bool = True) -> bytes:
-        """Return the link data of the reply."""
+        """Wait for a message and acknowledge it; return its link data."""
+
+    @abstractmethod
+    def further(self, seconds: float) -> HeardSymbol | None:
+        """Return the first answer within so many seconds that is not DLE EOT."""
+
+    def taken(self, symbol: HeardSymbol, acknowledge: bool = True) -> bytes:
+        """Acknowledge a message, and return its link data."""
+        self.owed.discard(symbol.data[4:6])
+        if acknowledge:
+            self.wire.send(codec.ACK)
+        return symbol.data
 
     def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
-        """Carry out a command."""
+        """Carry out a command, FNC included in ``body``; return the link data of its reply."""
         command = self.command(cmd, body, tns)
         self.deliver(command)
         return check_reply(command, self.collect())
 
 
-class MasterEnd(_AskingEnd):
+class MasterEnd(AskingEnd):
     """A half-duplex master that talks to one slave, ``station``; ``own`` is its own address."""
 
     def settle(self) -> None:
-        """Fetch all messages that the slave still holds, so that a case begins without any."""
+        """Fetch all messages that the slave holds or still owes, so that a case begins clean."""
         self.wire.drain()
-        for _ in range(16):
-            self.wire.send(codec.poll(self.station))
-            symbol = self.wire.hear()
-            if symbol is None or symbol.kind is SymbolKind.EOT:
-                return
-            if symbol.kind is SymbolKind.MESSAGE and symbol.is_good:
-                self.wire.send(codec.ACK)
+        end = self.wire.now + _REPLY_TIMES * self.wire.answer_time
+        while self.wire.now < end:
+            symbol = self.poll()
+            if symbol is not None and symbol.kind is SymbolKind.MESSAGE and symbol.is_good:
+                self.taken(symbol)
+            elif self.owed:  # DLE EOT of a slave that is still busy
+                self.wire.rest(POLL_PAUSE)
+            else:
+                break
+        self.owed.clear()
 
     def send(self, command: bytes) -> None:
-        """Send a message to the slave."""
         self.wire.send(codec.master_message(self.station, command, self.wire.check))
-
-    def deliver(self, command: bytes) -> None:
-        """Send a message that has to be acknowledged; once more after silence."""
-        self.send(command)
-        symbol = self.wire.hear()
-        if symbol is None:
-            self.send(command)
-            symbol = self.wire.hear()
-        if symbol is None or symbol.kind is not SymbolKind.ACK:
-            raise Failed('DLE ACK for a good message', str(symbol or 'silence'))
 
     def poll(self) -> HeardSymbol | None:
         """Poll once and return what comes."""
@@ -161,44 +167,47 @@ class MasterEnd(_AskingEnd):
         return self.wire.hear()
 
     def collect(self, acknowledge: bool = True) -> bytes:
-        """Poll until a message comes, and acknowledge it; return its link data."""
-        end = self.wire.now + 5 * self.wire.answer_time
+        symbol = self.further(_REPLY_TIMES * self.wire.answer_time)
+        if symbol is None:
+            raise Failed('the reply, asked for by polls', 'no message')
+        if symbol.kind is not SymbolKind.MESSAGE or not symbol.is_good:
+            raise Failed('a message or DLE EOT as answer to a poll', str(symbol))
+        return self.taken(symbol, acknowledge)
+
+    def further(self, seconds: float) -> HeardSymbol | None:
+        end = self.wire.now + seconds
         while self.wire.now < end:
             symbol = self.poll()
-            if symbol is not None and symbol.kind is SymbolKind.MESSAGE and symbol.is_good:
-                if acknowledge:
-                    self.wire.send(codec.ACK)
-                return symbol.data
             if symbol is not None and symbol.kind is not SymbolKind.EOT:
-                raise Failed('a message or DLE EOT as answer to a poll', str(symbol))
+                return symbol
             self.wire.rest(POLL_PAUSE)
-        raise Failed('the reply, asked for by polls', 'no message')
+        return None
 
 
-class PeerEnd(_AskingEnd):
+class PeerEnd(AskingEnd):
     """A full-duplex node that sends commands to another, ``station``."""
 
     def settle(self) -> None:
-        """Acknowledge messages that the other end still sends."""
-        end = self.wire.now + 10 * self.wire.answer_time
-        while self.wire.now < end and (symbol := self.wire.hear()) is not None:
-            if symbol.kind in (SymbolKind.MESSAGE, SymbolKind.ENQ):
-                self.wire.send(codec.ACK)
+        """Take the messages that the other end still sends or owes."""
+        end = self.wire.now + 2 * _REPLY_TIMES * self.wire.answer_time
+        while self.wire.now < end:
+            symbol = self.wire.hear((_REPLY_TIMES if self.owed else 1) * self.wire.answer_time)
+            if symbol is None:
+                break
+            if symbol.kind is SymbolKind.MESSAGE:
+                self.taken(symbol)
+        self.owed.clear()
 
     def send(self, command: bytes) -> None:
-        """Send a message."""
         self.wire.send(codec.message(command, self.wire.check))
 
-    def deliver(self, command: bytes) -> None:
-        self.send(command)
-        self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good message')
-
     def collect(self, acknowledge: bool = True) -> bytes:
-        """Wait for a message and acknowledge it; return its link data."""
-        symbol = self.wire.expect(SymbolKind.MESSAGE, 'the reply', 5 * self.wire.answer_time)
-        if acknowledge:
-            self.wire.send(codec.ACK)
-        return symbol.data
+        symbol = self.wire.expect(SymbolKind.MESSAGE, 'the reply',
+                                  _REPLY_TIMES * self.wire.answer_time)
+        return self.taken(symbol, acknowledge)
+
+    def further(self, seconds: float) -> HeardSymbol | None:
+        return self.wire.hear(seconds)
 
 
 Serve = Callable[[bytes], bytes]
@@ -252,12 +261,12 @@ class SlaveEnd:
 
     def next_poll(self, what: str = 'a poll of our station',
                   within: float = PATIENCE) -> HeardSymbol:
-        """Wait for a poll of us; a message before it is a failure."""
+        """Wait for a poll of us; a message before it, or a reset of the line, is a failure."""
         def is_ours(symbol: HeardSymbol) -> bool:
-            return symbol.station == self.station
+            return symbol.station == self.station or symbol.kind is SymbolKind.NAK
 
         symbol = self.wire.until(is_ours, what, within)
-        if symbol.kind is not SymbolKind.POLL:
+        if symbol.kind is not SymbolKind.POLL or not symbol.is_good:
             raise Failed(what, str(symbol))
         return symbol
 
@@ -285,13 +294,8 @@ class ServerEnd:
         _settle(self)
 
     def next_command(self, what: str = 'a command') -> HeardSymbol:
-        """Wait for a good message; an enquiry before it is answered DLE NAK."""
-        def is_command(symbol: HeardSymbol) -> bool:
-            if symbol.kind is SymbolKind.ENQ:
-                self.wire.send(codec.NAK)
-            return symbol.kind is SymbolKind.MESSAGE
-
-        symbol = self.wire.until(is_command, what, PATIENCE)
+        """Wait for a good message."""
+        symbol = self.wire.until(lambda heard: heard.kind is SymbolKind.MESSAGE, what, PATIENCE)
         if not symbol.is_good:
             raise Failed('a message with the right check', symbol.raw.hex(' '))
         return symbol

@@ -30,10 +30,7 @@ _MOST_REPETITIONS = 12
 @case('poll-form', 'A poll is DLE ENQ, the station, and a BCC, on a line with CRC too.',
       'M 5-3', _MASTER)
 def poll_form(end: SlaveEnd) -> None:
-    symbol = end.wire.until(
-        lambda heard: heard.kind is SymbolKind.POLL, 'a poll', PATIENCE)
-    if not symbol.is_good:
-        raise Failed('a poll with the right BCC', symbol.raw.hex(' '))
+    end.finish(end.next_command())
 
 
 @case('no-ack-repeated', 'A message without DLE ACK is sent again, with the same TNS.',
@@ -87,9 +84,7 @@ def bad_reply_polled_again(end: SlaveEnd) -> None:
     end.next_poll()
     frame = codec.message(end.serve(command.data), end.wire.check)
     end.wire.send(codec.damaged(frame))
-    symbol = end.wire.hear(PATIENCE)
-    if symbol is None or symbol.kind is not SymbolKind.POLL or symbol.station != end.station:
-        raise Failed('another poll of this station', str(symbol or 'silence'))
+    end.next_poll('another poll of this station')
     end.reply_to(command)
     end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
 

@@ -47,8 +47,9 @@ def poll_idle(end: MasterEnd) -> None:
 
 @case('message-acknowledged', 'A good message is acknowledged with DLE ACK.', 'KF2 4-31', _SLAVE)
 def message_acknowledged(end: MasterEnd) -> None:
-    end.send(end.command())
-    end.wire.expect(SymbolKind.ACK)
+    symbol = end.offer(end.command())
+    if symbol is None or symbol.kind is not SymbolKind.ACK:
+        raise Failed('DLE ACK', str(symbol or 'silence'))
 
 
 @case('reply-waits-for-poll', 'A slave sends its reply as answer to a poll, not by itself.',
@@ -122,10 +123,8 @@ def broken_message(end: MasterEnd) -> None:
 
 @case('noise-before-message', 'Bytes outside of a symbol are ignored.', 'M 3-4', _SLAVE)
 def noise_before_message(end: MasterEnd) -> None:
-    command = end.command()
     end.wire.send(b'\x55\x00\xFF\x03')
-    end.send(command)
-    end.wire.expect(SymbolKind.ACK)
+    message_acknowledged(end)
 
 
 @case('unacknowledged-again', 'A reply that was not acknowledged is sent again at the next poll.',
@@ -161,41 +160,21 @@ def repetitions_limited(end: MasterEnd) -> None:
     raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
 
 
-@case('duplicate-discarded', 'A message with the header of the last one is acknowledged and '
-      'discarded.', 'KF2 4-31', _SLAVE)
-def duplicate_discarded(end: MasterEnd) -> None:
-    command = end.command(body=b'\x00twice')
-    end.deliver(command)
-    end.deliver(command)
-    check_reply(command, end.collect())
-    symbol = end.poll()
-    if symbol is not None and symbol.kind is SymbolKind.MESSAGE:
-        raise Failed('one reply to a message sent twice', 'two (is duplicate detection off?)')
-
-
-@case('new-tns-executed', 'A message with another TNS is not a duplicate.', 'M 3-4, 6-7', _SLAVE)
-def new_tns_executed(end: MasterEnd) -> None:
-    for _ in range(2):
-        command = end.command(body=b'\x00twice')
-        end.deliver(command)
-        check_reply(command, end.collect())
-
-
 @case('full-is-silent', 'A slave that can take no more messages does not acknowledge; what it has '
       'acknowledged is answered.', 'KF2 4-31', _SLAVE)
 def full_is_silent(end: MasterEnd) -> None:
-    accepted = []
+    accepted = {}
     for _ in range(_BURST):
         command = end.command()
-        end.send(command)
-        symbol = end.wire.hear()
+        symbol = end.offer(command)
         if symbol is None:
             break
         if symbol.kind is not SymbolKind.ACK:
             raise Failed('DLE ACK or silence', str(symbol))
-        accepted.append(command)
-    for command in accepted:
-        check_reply(command, end.collect())
+        accepted[command[4:6]] = command
+    while accepted:
+        reply = end.collect()
+        check_reply(accepted.pop(reply[4:6], command), reply)
 
 
 @case('broadcast-unanswered', 'A message to station 255 is neither acknowledged nor answered.',
@@ -204,9 +183,9 @@ def broadcast_unanswered(end: MasterEnd) -> None:
     command = bytes((0xFF,)) + end.command()[1:]
     end.wire.send(codec.master_message(0xFF, command, end.wire.check))
     end.wire.expect_silence('the message was a broadcast')
-    symbol = end.poll()
+    symbol = end.further(end.wire.answer_time)
     if symbol is not None and symbol.kind is SymbolKind.MESSAGE:
-        raise Failed('no reply to a broadcast', symbol.data.hex(' '))
+        raise Failed('no reply to a broadcast', end.taken(symbol).hex(' '))
 
 
 @case('nak-resets', 'DLE NAK makes every slave drop what it holds.', 'M 2-7, 3-11', _SLAVE,

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import math
@@ -26,6 +27,7 @@ from abdf1_ros.conform.codec import BlockCheck, HeardSymbol, SymbolKind
 
 # A symbol that has begun may take as long as the longest frame on a slow line, but not for ever.
 _FRAME_TIME = 3.0
+_LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is doubled
 
 _MOST_UNREAD = 65536
 
@@ -66,11 +68,14 @@ class Wire:
     One end of a line.
 
     ``answer_time`` is how long (s) an answer may take; after so long without bytes there is
-    silence. ``transcript`` keeps all bytes in order; ``has_heard`` tells whether any byte came.
+    silence. It counts from the end of what was sent, at ``char_time`` s a byte. ``transcript``
+    keeps all bytes in order; ``has_heard`` tells whether any byte came. A response inside a
+    message is heard before that message.
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
-                 is_half_duplex: bool, answer_time: float = 1.0) -> None:
+                 is_half_duplex: bool, answer_time: float = 1.0,
+                 char_time: float = 0.0) -> None:
         self.check = check
         self.is_half_duplex = is_half_duplex
         self.answer_time = answer_time
@@ -78,7 +83,11 @@ class Wire:
         self.has_heard = False
         self._line = line
         self._clock = clock
+        self._char_time = char_time
         self._buffer = b''
+        self._embedded: deque[HeardSymbol] = deque()
+        self._sent_until = 0.0
+        self._response = codec.NAK
 
     @property
     def now(self) -> float:
@@ -88,18 +97,35 @@ class Wire:
     def send(self, raw: bytes) -> None:
         """Send bytes as they are."""
         self.transcript.append(Sent(self._clock(), raw))
+        self._sent_until = max(self._clock(), self._sent_until) + len(raw) * self._char_time
+        if raw in (codec.ACK, codec.NAK):
+            self._response = raw
         self._line.write(raw)
 
-    def hear(self, within: float | None = None) -> HeardSymbol | None:
-        """Return the next symbol; None where none has begun after ``within`` s."""
-        begun = self._clock()
+    def hear(self, within: float | None = None, *, answers: bool = True) -> HeardSymbol | None:
+        """
+        Return the next symbol; None where none has begun after ``within`` s.
+
+        With ``answers`` a DLE ENQ gets the last response, and is not returned (M 4-5, 4-13).
+        """
+        begun = max(self._clock(), self._sent_until)
         end = begun + (self.answer_time if within is None else within)
+        symbol = self._next(begun, end)
+        while answers and symbol is not None and symbol.kind is SymbolKind.ENQ:
+            self.send(self._response)
+            symbol = self._next(begun, end) if self._clock() < end else None
+        return symbol
+
+    def _next(self, begun: float, end: float) -> HeardSymbol | None:
+        if self._embedded:
+            return self._embedded.popleft()
         while True:
             symbol = codec.next_symbol(self._buffer, self.check, self.is_half_duplex)
             if symbol is not None:
                 return self._take(symbol)
             # A symbol that has begun may end; it must not go on for ever.
-            limit = max(end, begun + _FRAME_TIME) if self._buffer else end
+            longest = max(_FRAME_TIME, _LONGEST_FRAME * self._char_time)
+            limit = max(end, begun + longest) if self._buffer else end
             left = limit - self._clock()
             if left <= 0:
                 noise = HeardSymbol(SymbolKind.NOISE, self._buffer)
@@ -115,12 +141,18 @@ class Wire:
         symbol = replace(symbol, at=self._clock())
         self._buffer = self._buffer[len(symbol.raw):]
         self.transcript.append(symbol)
-        return symbol
+        if symbol.kind is SymbolKind.MESSAGE:
+            self._response = codec.NAK  # until it has one
+        self._embedded.extend(HeardSymbol(kind, b'', at=symbol.at) for kind in symbol.embedded)
+        if not self._embedded:
+            return symbol
+        self._embedded.append(symbol)
+        return self._embedded.popleft()
 
     def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> HeardSymbol:
         """Return the next symbol if it is of ``kind`` and good; raises Failed."""
         expected = what or kind.value
-        symbol = self.hear(within)
+        symbol = self.hear(within, answers=kind is not SymbolKind.ENQ)
         if symbol is None:
             raise Failed(expected, 'silence')
         if symbol.kind is not kind or not symbol.is_good:

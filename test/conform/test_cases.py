@@ -17,17 +17,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from abdf1_ros.conform import asking, client, codec, data, master, peer, slave
-from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform import codec
+from abdf1_ros.conform.case import CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck
-from abdf1_ros.conform.ends import MasterEnd, Numbering, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.ends import MasterEnd
 from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
@@ -35,13 +33,12 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.settings.network import Network
 import pytest
+from support.conformance import failures, MODULES, results_of
 from support.driver_bench import Recorder, simulated_plc
 from support.mappings import make_mapping
 from support.scripted_line import ScriptedLine
 
-ALL = frozenset(Permission)
 CHECKS = ['BCC', 'CRC']
-MODULES = (asking, client, data, master, peer, slave)
 
 
 class SpoiledLine(ScriptedLine):
@@ -76,33 +73,6 @@ def asking(check: str, mode: str) -> SpoiledLine:
     driver = Driver(network, [make_mapping('N7:0', length=2, period=0)],
                     DriverSettings(processor_period=0), listener)
     return SpoiledLine(driver.machine)
-
-
-def results_of(line: ScriptedLine, target: Target, check: str, family: str = 'SLC',
-               only: str = '') -> list[CaseResult]:
-    """Return how the cases of ``target`` end."""
-    wire = Wire(line, BlockCheck(check), line.clock, is_half_duplex=target.is_half_duplex,
-                answer_time=1.0)
-    words = Words(7, 2, 3, family)
-    plc = simulated_plc(1, 'PLC5', line.clock, ('N7:0', 20), checksum=check)
-
-    def serve(command: bytes) -> bytes:
-        return plc.serve(Packet.decode(command)).encode()
-
-    ends: dict[Target, Callable[[], Any]] = {
-        Target.SLAVE: lambda: MasterEnd(wire, 1, 5, numbering, words),
-        Target.PEER: lambda: PeerEnd(wire, 1, 5, numbering, words),
-        Target.MASTER: lambda: SlaveEnd(wire, 1, serve),
-        Target.CLIENT: lambda: ServerEnd(wire, serve)}
-    numbering = Numbering(0x0FF0)
-    cases = [case for case in CASES if target in case.targets and only in ('', case.name)]
-    return list(run_cases(cases, wire, ends[target], ALL))
-
-
-def failures(results: list[CaseResult]) -> list[str]:
-    """Return the cases that failed, with the reason."""
-    return [f'{result.case.name}: expected {result.expected}, got {result.got}'
-            for result in results if result.verdict is Verdict.FAIL]
 
 
 @pytest.mark.parametrize('check', CHECKS)
@@ -168,7 +138,7 @@ def test_case_that_needs_leave_is_skipped() -> None:
     line = answering('SLC', 'CRC', is_half_duplex=True)
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
     case = next(case for case in CASES if case.name == 'nak-resets')
-    result, = run_cases([case], wire, lambda: MasterEnd(wire, 1, 5, Numbering(1)),
+    result, = run_cases([case], wire, MasterEnd(wire, 1, 5, first_tns=1),
                         frozenset((Permission.NOTHING,)))
     assert (result.verdict, result.got[:11]) == (Verdict.SKIP, 'needs --yes')
 
@@ -176,5 +146,5 @@ def test_case_that_needs_leave_is_skipped() -> None:
 def test_every_case_cites_its_source() -> None:
     assert MODULES
     assert {target: sum(target in case.targets for case in CASES) for target in Target} == {
-        Target.SLAVE: 31, Target.MASTER: 10, Target.PEER: 25, Target.CLIENT: 11}
+        Target.SLAVE: 35, Target.MASTER: 10, Target.PEER: 31, Target.CLIENT: 13}
     assert all(case.source.startswith(('M ', 'KF2 ')) for case in CASES)

@@ -1,0 +1,83 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Cases of duplicate detection, which is the same for a half-duplex slave and a full-duplex node.
+
+A message is a duplicate when SRC, CMD and TNS are those of the message before it. Products have
+a setting that turns detection off.
+"""
+
+from __future__ import annotations
+
+from abdf1_ros.conform.case import case, Target
+from abdf1_ros.conform.codec import SymbolKind
+from abdf1_ros.conform.ends import AskingEnd, check_reply
+from abdf1_ros.conform.wire import Skipped
+
+_ANSWERING = (Target.SLAVE, Target.PEER)
+_SOURCE = 'M 3-4, 4-4, KF2 4-31'
+
+_ECHO = b'\x00twice'
+_OTHER_CMD = 0x0C  # one that nobody knows: the answer is STS 10 (M 8-2)
+
+
+def _carried_out(end: AskingEnd, command: bytes) -> None:
+    end.deliver(command)
+    check_reply(command, end.collect())
+
+
+@case('duplicate-discarded', 'A message with the header of the last one is acknowledged and '
+      'discarded.', _SOURCE, *_ANSWERING)
+def duplicate_discarded(end: AskingEnd) -> None:
+    begun = end.wire.now
+    command = end.command(body=_ECHO)
+    _carried_out(end, command)
+    taken = end.wire.now - begun
+    end.deliver(command)
+    end.owed.clear()
+    symbol = end.further(2 * taken + end.wire.answer_time)
+    if symbol is not None and symbol.kind is SymbolKind.MESSAGE:
+        end.taken(symbol)
+        raise Skipped('two replies to a message sent twice: duplicate detection is off')
+
+
+@case('new-tns-executed', 'A message with another TNS is not a duplicate.', _SOURCE, *_ANSWERING)
+def new_tns_executed(end: AskingEnd) -> None:
+    for _ in range(2):
+        _carried_out(end, end.command(body=_ECHO))
+
+
+@case('other-command-executed', 'A message with the TNS of the last one and another CMD is not a '
+      'duplicate.', _SOURCE, *_ANSWERING)
+def other_command_executed(end: AskingEnd) -> None:
+    first = end.command(body=_ECHO)
+    _carried_out(end, first)
+    _carried_out(end, first[:2] + bytes((_OTHER_CMD,)) + first[3:6])
+
+
+@case('other-source-executed', 'A message with the TNS of the last one and another SRC is not a '
+      'duplicate.', _SOURCE, *_ANSWERING)
+def other_source_executed(end: AskingEnd) -> None:
+    first = end.command(body=_ECHO)
+    _carried_out(end, first)
+    _carried_out(end, first[:1] + bytes((end.own ^ 0x02,)) + first[2:])
+
+
+@case('older-header-executed', 'A message with the header of the last but one is not a '
+      'duplicate.', _SOURCE, *_ANSWERING)
+def older_header_executed(end: AskingEnd) -> None:
+    first = end.command(body=_ECHO)
+    for command in (first, end.command(body=_ECHO), first):
+        _carried_out(end, command)

@@ -1,0 +1,202 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Each fault of an end is found by the case that names its rule; what is allowed passes."""
+
+from __future__ import annotations
+
+from abdf1_ros.conform.case import CaseResult, CASES, Target, Verdict
+from abdf1_ros.conform.codec import BlockCheck
+from abdf1_ros.conform.wire import Failed, Wire
+import pytest
+from support.cases import for_all
+from support.conformance import failures, results_of
+from support.mutated_ends import Habit, MutatedClient, MutatedMaster, MutatedPeer, MutatedSlave
+
+ENDS = {Target.SLAVE: MutatedSlave, Target.PEER: MutatedPeer, Target.MASTER: MutatedMaster,
+        Target.CLIENT: MutatedClient}
+BOTH = (Target.SLAVE, Target.PEER)
+
+# Whom a fault is given, the fault, and the case that has to find it.
+FAULTS = [(target, habit, name) for targets, habit, name in [
+    (BOTH, Habit.NO_ACK, 'message-acknowledged'),
+    (BOTH, Habit.UNSTUFFED, 'stuffing'),
+    (BOTH, Habit.BAD_CHECK_OF_HIGH_BYTES, 'check-of-all-bytes'),
+    (BOTH, Habit.CUTS_ECHO_AT_80, 'echo-sizes'),
+    (BOTH, Habit.CUTS_ECHO, 'largest-packet'),
+    (BOTH, Habit.EXCHANGES_TNS, 'tns-returned'),
+    (BOTH, Habit.DOES_ALL_COMMANDS, 'unknown-command'),
+    (BOTH, Habit.DOES_ALL_FUNCTIONS, 'unknown-function'),
+    (BOTH, Habit.NO_IDENTITY, 'identity'),
+    (BOTH, Habit.READS_SHORT, 'read-words'),
+    (BOTH, Habit.READS_ZEROS_BEYOND, 'element-too-high'),
+    (BOTH, Habit.WRITES_NOTHING, 'write-and-read'),
+    (BOTH, Habit.MASKS_NOTHING, 'masked-write'),
+    (BOTH, Habit.DUPLICATE_WITHOUT_ACK, 'duplicate-discarded'),
+    (BOTH, Habit.DUPLICATE_BY_COMMAND_AND_SOURCE, 'new-tns-executed'),
+    (BOTH, Habit.DUPLICATE_BY_TNS, 'other-command-executed'),
+    (BOTH, Habit.DUPLICATE_WITHOUT_SOURCE, 'other-source-executed'),
+    (BOTH, Habit.REMEMBERS_99, 'older-header-executed'),
+    (BOTH, Habit.LOST_AFTER_NOISE, 'noise-before-message'),
+    ((Target.SLAVE,), Habit.TAKES_BAD_CHECK, 'bad-check-ignored'),
+    ((Target.SLAVE,), Habit.NAKS_BAD_CHECK, 'bad-check-ignored'),
+    ((Target.SLAVE,), Habit.CRC_WITHOUT_STATION, 'crc-covers-station'),
+    ((Target.SLAVE,), Habit.TAKES_SHORT, 'short-message-ignored'),
+    ((Target.SLAVE,), Habit.LOST_AFTER_BROKEN_MESSAGE, 'broken-message'),
+    ((Target.SLAVE,), Habit.ACK_TO_POLL, 'poll-idle'),
+    ((Target.SLAVE,), Habit.REPLIES_UNASKED, 'reply-waits-for-poll'),
+    ((Target.SLAVE,), Habit.ANSWERS_BAD_POLL, 'bad-poll-ignored'),
+    ((Target.SLAVE,), Habit.ANSWERS_ALL_STATIONS, 'other-station-ignored'),
+    ((Target.SLAVE,), Habit.DROPS_WHAT_IT_SENT, 'unacknowledged-again'),
+    ((Target.SLAVE,), Habit.KEEPS_WHAT_WAS_ACKNOWLEDGED, 'acknowledged-dropped'),
+    ((Target.SLAVE,), Habit.LOSES_WHEN_FULL, 'full-is-silent'),
+    ((Target.SLAVE,), Habit.NAKS_WHEN_FULL, 'full-is-silent'),
+    ((Target.SLAVE,), Habit.ACKS_BROADCAST, 'broadcast-unanswered'),
+    ((Target.SLAVE,), Habit.REPLIES_TO_BROADCAST, 'broadcast-unanswered'),
+    ((Target.SLAVE,), Habit.IGNORES_NAK, 'nak-resets'),
+    ((Target.PEER,), Habit.TAKES_BAD_CHECK, 'bad-check-refused'),
+    ((Target.PEER,), Habit.IGNORES_BAD_CHECK, 'bad-check-refused'),
+    ((Target.PEER,), Habit.NAK_AS_0F, 'bad-check-refused'),
+    ((Target.PEER,), Habit.TAKES_SHORT, 'short-message-refused'),
+    ((Target.PEER,), Habit.LOST_AFTER_BROKEN_MESSAGE, 'broken-message-refused'),
+    ((Target.PEER,), Habit.ENQ_IN_MESSAGE_IGNORED, 'broken-message-refused'),
+    ((Target.PEER,), Habit.ENQ_IN_MESSAGE_ANSWERED, 'broken-message-refused'),
+    ((Target.PEER,), Habit.ENQ_ALWAYS_NAK, 'enquiry-after-ack'),
+    ((Target.PEER,), Habit.ENQ_ALWAYS_ACK, 'enquiry-after-nak'),
+    ((Target.PEER,), Habit.ENQ_NOT_ANSWERED, 'enquiry-after-ack'),
+    ((Target.PEER,), Habit.NO_REPETITION, 'reply-repeated-after-nak'),
+    ((Target.PEER,), Habit.SILENCE_REPEATED, 'silence-is-enquired'),
+    ((Target.PEER,), Habit.RESPONSE_IS_DATA, 'embedded-response'),
+    ((Target.PEER,), Habit.RESPONSE_INSIDE_IGNORED, 'embedded-response'),
+    ((Target.PEER,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
+    ((Target.MASTER,), Habit.NO_ACK, 'polled-after-ack'),
+    ((Target.MASTER,), Habit.CRC_WITHOUT_STATION, 'command-form'),
+    ((Target.MASTER, Target.CLIENT), Habit.STS_IN_COMMAND, 'command-form'),
+    ((Target.MASTER, Target.CLIENT), Habit.SAME_TNS, 'tns-differs'),
+    ((Target.MASTER, Target.CLIENT), Habit.DUPLICATE_WITHOUT_ACK, 'duplicate-acknowledged'),
+    ((Target.MASTER,), Habit.POLL_WITH_CRC, 'poll-form'),
+    ((Target.MASTER,), Habit.DOES_NOT_POLL, 'polled-after-ack'),
+    ((Target.MASTER,), Habit.NO_REPETITION, 'no-ack-repeated'),
+    ((Target.MASTER,), Habit.NEW_TNS_FOR_REPETITION, 'no-ack-repeated'),
+    ((Target.MASTER,), Habit.EOT_ENDS_COMMAND, 'eot-polled-again'),
+    ((Target.MASTER,), Habit.TAKES_BAD_CHECK, 'bad-reply-polled-again'),
+    ((Target.MASTER,), Habit.NAKS_BAD_REPLY, 'bad-reply-polled-again'),
+    ((Target.MASTER,), Habit.IMPATIENT, 'waits-for-slow-answer'),
+    ((Target.CLIENT,), Habit.NO_ACK, 'reply-acknowledged'),
+    ((Target.CLIENT,), Habit.NO_REPETITION, 'nak-repeated'),
+    ((Target.CLIENT,), Habit.NO_REPETITION, 'enquiry-nak-repeated'),
+    ((Target.CLIENT,), Habit.SILENCE_REPEATED, 'silence-enquired'),
+    ((Target.CLIENT,), Habit.TAKES_BAD_CHECK, 'bad-reply-refused'),
+    ((Target.CLIENT,), Habit.IGNORES_BAD_CHECK, 'bad-reply-refused'),
+    ((Target.CLIENT,), Habit.NAK_AS_0F, 'bad-reply-refused'),
+    ((Target.CLIENT,), Habit.ENQ_ALWAYS_NAK, 'enquiry-repeats-response'),
+    ((Target.CLIENT,), Habit.ENQ_ALWAYS_ACK, 'enquiry-repeats-refusal'),
+    ((Target.CLIENT,), Habit.ENQ_NOT_ANSWERED, 'enquiry-repeats-response'),
+    ((Target.CLIENT,), Habit.RESPONSE_IS_DATA, 'embedded-response'),
+    ((Target.CLIENT,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
+] for target in targets]
+
+# What the manual allows, or leaves to a setting, and the cases that cannot be judged then.
+ALLOWED = [(target, habit, names) for targets, habit, names in [
+    (BOTH, Habit.SLOW, set()),
+    (BOTH, Habit.LATE_REPLY, set()),
+    (BOTH, Habit.VERY_LATE_REPLY, set()),
+    (BOTH, Habit.EXECUTES_DUPLICATES, {'duplicate-discarded'}),
+    (BOTH, Habit.SMALL_PACKETS, {'largest-packet'}),
+    ((Target.SLAVE,), Habit.NEVER_GIVES_UP, {'repetitions-limited'}),
+    ((Target.SLAVE,), Habit.NO_EOT, {'poll-idle'}),
+    ((Target.SLAVE,), Habit.LAST_REPLY_FIRST, set()),
+    ((Target.SLAVE,), Habit.ONE_MESSAGE_ONLY, set()),
+    ((Target.PEER,), Habit.NEVER_GIVES_UP, {'nak-limit', 'enquiry-limit'}),
+    ((Target.PEER,), Habit.EMBEDS_RESPONSES, set()),
+    ((Target.MASTER,), Habit.POLLS_BETWEEN_REPETITIONS, set()),
+    ((Target.MASTER,), Habit.POLLS_OTHERS, set()),
+    ((Target.MASTER,), Habit.POLLS_LATE, set()),
+    ((Target.CLIENT,), Habit.NEVER_GIVES_UP, {'nak-limit'}),
+] for target in targets]
+
+NOT_HERE = {'address-forms', 'poll-stuffing'}  # for a PLC-5, and for station 16
+
+
+def skipped(results: list[CaseResult]) -> set[str]:
+    """Return the cases that could not be judged."""
+    return {result.case.name for result in results if result.verdict is Verdict.SKIP}
+
+
+@for_all('fault', FAULTS)
+def test_fault_is_found_by_the_case_that_names_it(fault: tuple[Target, Habit, str]) -> None:
+    target, habit, name = fault
+    results = results_of(ENDS[target]('CRC', habit), target, 'CRC')
+    assert name in {result.case.name for result in results if result.verdict is Verdict.FAIL}
+
+
+@for_all('allowed', ALLOWED)
+def test_what_is_allowed_is_no_fault(allowed: tuple[Target, Habit, set[str]]) -> None:
+    target, habit, names = allowed
+    for check in ('CRC', 'BCC'):
+        results = results_of(ENDS[target](check, habit), target, check)
+        assert failures(results) == []
+        assert skipped(results) - NOT_HERE - {'crc-covers-station'} == names
+
+
+@pytest.mark.parametrize('target', ENDS)
+def test_end_without_a_fault_passes_and_every_case_finds_one(target: Target) -> None:
+    """A case that no fault can fail would be worth nothing."""
+    assert failures(results_of(ENDS[target]('CRC'), target, 'CRC')) == []
+    cases = {case.name for case in CASES if target in case.targets}
+    found = {name for whose, _, name in FAULTS if whose is target}
+    # A limit is a setting of up to 255, so more is only told; two cases are tested below.
+    limits = {'repetitions-limited', 'nak-limit', 'enquiry-limit'}
+    assert cases - found == cases & (limits | NOT_HERE)
+
+
+@pytest.mark.parametrize('target', [Target.PEER, Target.CLIENT])
+def test_needless_enquiry_fails_its_own_case_only(target: Target) -> None:
+    results = results_of(ENDS[target]('CRC', Habit.ENQUIRES_ALWAYS), target, 'CRC')
+    assert [failure.partition(':')[0] for failure in failures(results)] == ['no-needless-enquiry']
+
+
+def test_poll_of_station_16_is_to_be_read_doubled() -> None:
+    def result(*habits: Habit) -> Verdict:
+        line = MutatedSlave('CRC', *habits, station=16)
+        return results_of(line, Target.SLAVE, 'CRC', only='poll-stuffing', station=16)[0].verdict
+
+    assert (result(), result(Habit.POLL_NOT_DOUBLED)) == (Verdict.PASS, Verdict.FAIL)
+
+
+def test_plc5_that_refuses_an_area_fails_address_forms() -> None:
+    line = MutatedPeer('CRC', Habit.REFUSES_AREA, family='PLC5')
+    assert failures(results_of(line, Target.PEER, 'CRC', 'PLC5')) == [
+        'address-forms: expected STS 00 for the address 07 00 07 02, got STS 10']
+
+
+def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
+    class Babble:
+        now = 0.0
+
+        def clock(self) -> float:
+            return self.now
+
+        def read(self, timeout: float) -> bytes:
+            self.now += min(timeout, 0.3)
+            return b'\x10\x06'
+
+        def write(self, data: bytes) -> None:
+            raise AssertionError(data)
+
+    line = Babble()
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False)
+    with pytest.raises(Failed, match='nothing of the kind in 2 s'):
+        wire.until(lambda symbol: False, 'a poll', 2.0)
+    assert line.now == pytest.approx(2.0)

@@ -1,0 +1,64 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Runs of the conformance cases on a line in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from abdf1_ros.conform import asking, client, data, duplicates, master, peer, slave
+from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.codec import BlockCheck
+from abdf1_ros.conform.ends import MasterEnd, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.wire import RawLine, Wire
+from abdf1_ros.df1.packet import Packet
+from support.driver_bench import simulated_plc
+
+# Importing them enters their cases.
+MODULES = (asking, client, data, duplicates, master, peer, slave)
+
+
+class TimedLine(RawLine, Protocol):
+    """A line with a clock of its own."""
+
+    def clock(self) -> float:
+        """Return the time (s)."""
+
+
+def results_of(line: TimedLine, target: Target, check: str, family: str = 'SLC',
+               only: str = '', station: int = 1) -> list[CaseResult]:
+    """Return how the cases of ``target`` end."""
+    wire = Wire(line, BlockCheck(check), line.clock, is_half_duplex=target.is_half_duplex,
+                answer_time=1.0)
+    words = Words(7, 2, 3, family)
+    plc = simulated_plc(1, 'PLC5', line.clock, ('N7:0', 20), checksum=check)
+
+    def serve(command: bytes) -> bytes:
+        return plc.serve(Packet.decode(command)).encode()
+
+    ends: dict[Target, Callable[[], Any]] = {
+        Target.SLAVE: lambda: MasterEnd(wire, station, 5, 0x2000, words),
+        Target.PEER: lambda: PeerEnd(wire, station, 5, 0x2000, words),
+        Target.MASTER: lambda: SlaveEnd(wire, station, serve),
+        Target.CLIENT: lambda: ServerEnd(wire, serve)}
+    cases = [case for case in CASES if target in case.targets and only in ('', case.name)]
+    return list(run_cases(cases, wire, ends[target](), frozenset(Permission)))
+
+
+def failures(results: list[CaseResult]) -> list[str]:
+    """Return the cases that failed, with the reason."""
+    return [f'{result.case.name}: expected {result.expected}, got {result.got}'
+            for result in results if result.verdict is Verdict.FAIL]

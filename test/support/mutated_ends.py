@@ -1,0 +1,710 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Ends of a line with habits that can be switched on: a slave, a peer, a master and a client.
+
+Without a habit each keeps the rules of the manual. A habit is a fault, or something that the
+manual allows. Bytes are made and read by a codec that is neither that of the package nor that of
+``conform``: a receiver takes them one at a time. Time is virtual.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator
+from enum import auto, Enum
+import heapq
+from itertools import count
+
+from abdf1_ros.df1.packet import Packet
+from support.driver_bench import simulated_plc
+
+_DLE, _SOH, _STX, _ETX, _EOT, _ENQ, _ACK, _NAK = 0x10, 1, 2, 3, 4, 5, 6, 0x15
+_LIMIT = 3  # of repetitions, and of enquiries
+_ACK_TIMEOUT = 1.0
+_COMMAND_TIMEOUT = 5.0
+
+
+class Habit(Enum):
+    """What an end does otherwise."""
+
+    # Of everybody who answers.
+    NO_ACK = auto()
+    TAKES_BAD_CHECK = auto()
+    TAKES_SHORT = auto()
+    LOST_AFTER_BROKEN_MESSAGE = auto()
+    LOST_AFTER_NOISE = auto()
+    EXECUTES_DUPLICATES = auto()
+    DUPLICATE_WITHOUT_ACK = auto()
+    DUPLICATE_BY_TNS = auto()
+    DUPLICATE_WITHOUT_SOURCE = auto()
+    DUPLICATE_BY_COMMAND_AND_SOURCE = auto()
+    REMEMBERS_99 = auto()
+    UNSTUFFED = auto()
+    BAD_CHECK_OF_HIGH_BYTES = auto()
+    CUTS_ECHO = auto()
+    CUTS_ECHO_AT_80 = auto()
+    SMALL_PACKETS = auto()
+    EXCHANGES_TNS = auto()
+    DOES_ALL_COMMANDS = auto()
+    DOES_ALL_FUNCTIONS = auto()
+    NO_IDENTITY = auto()
+    READS_SHORT = auto()
+    READS_ZEROS_BEYOND = auto()
+    WRITES_NOTHING = auto()
+    MASKS_NOTHING = auto()
+    REFUSES_AREA = auto()
+    SLOW = auto()  # each response and reply 300 ms late
+    LATE_REPLY = auto()  # 300 ms after the command
+    VERY_LATE_REPLY = auto()  # 1.5 s
+    # Of a slave.
+    NAKS_BAD_CHECK = auto()
+    ACK_TO_POLL = auto()
+    REPLIES_UNASKED = auto()
+    POLL_NOT_DOUBLED = auto()
+    CRC_WITHOUT_STATION = auto()
+    ANSWERS_BAD_POLL = auto()
+    ANSWERS_ALL_STATIONS = auto()
+    DROPS_WHAT_IT_SENT = auto()
+    KEEPS_WHAT_WAS_ACKNOWLEDGED = auto()
+    NEVER_GIVES_UP = auto()
+    LOSES_WHEN_FULL = auto()
+    NAKS_WHEN_FULL = auto()
+    ACKS_BROADCAST = auto()
+    REPLIES_TO_BROADCAST = auto()
+    IGNORES_NAK = auto()
+    NO_EOT = auto()
+    LAST_REPLY_FIRST = auto()
+    ONE_MESSAGE_ONLY = auto()  # is full as long as it owes a reply
+    # Of a peer or client.
+    IGNORES_BAD_CHECK = auto()
+    NAK_AS_0F = auto()
+    ENQ_IN_MESSAGE_IGNORED = auto()
+    ENQ_IN_MESSAGE_ANSWERED = auto()  # with the last response, and the message goes on
+    ENQ_ALWAYS_NAK = auto()
+    ENQ_ALWAYS_ACK = auto()
+    ENQ_NOT_ANSWERED = auto()
+    RESPONSE_IS_DATA = auto()  # one inside a message
+    RESPONSE_INSIDE_IGNORED = auto()
+    EMBEDS_RESPONSES = auto()
+    NO_REPETITION = auto()
+    SILENCE_REPEATED = auto()  # the message instead of DLE ENQ
+    ENQUIRES_ALWAYS = auto()  # 100 ms after each message
+    # Of a master or client.
+    SAME_TNS = auto()
+    NEW_TNS_FOR_REPETITION = auto()
+    STS_IN_COMMAND = auto()
+    POLL_WITH_CRC = auto()
+    DOES_NOT_POLL = auto()
+    EOT_ENDS_COMMAND = auto()
+    NAKS_BAD_REPLY = auto()
+    IMPATIENT = auto()
+    POLLS_BETWEEN_REPETITIONS = auto()
+    POLLS_OTHERS = auto()
+    POLLS_LATE = auto()
+
+
+Symbol = tuple[object, ...]
+"""(kind, ...): a code; 'poll', station, is_good; 'message', station, data, is_good; 'broken'."""
+
+
+def _checked(covered: bytes, kind: str) -> bytes:
+    """Return the check: a sum, or a CRC that is shifted the other way round than usual."""
+    if kind == 'BCC':
+        return bytes(((0x100 - sum(covered)) % 0x100,))
+    value = 0
+    for byte in covered:
+        for bit in range(8):
+            top = (value >> 15 ^ byte >> bit) & 1
+            value = value << 1 & 0xFFFF ^ (0x8005 if top else 0)
+    backwards = int(f'{value:016b}'[::-1], 2)
+    return bytes((backwards & 0xFF, backwards >> 8))
+
+
+def _message_check(data: bytes, kind: str, station: int | None) -> bytes:
+    if kind == 'BCC':
+        return _checked((b'' if station is None else bytes((station,))) + data, kind)
+    head = b'' if station is None else bytes((station, _STX))
+    return _checked(head + data + bytes((_ETX,)), kind)
+
+
+class Wire:
+    """
+    One end of a line in virtual time, as ``conform`` uses it.
+
+    What ``say`` is given leaves ``delay`` s later; ``after`` calls something then.
+    """
+
+    def __init__(self, check: str, habits: frozenset[Habit], is_half_duplex: bool) -> None:
+        self.check, self.habits, self.is_half_duplex = check, habits, is_half_duplex
+        self.now = 0.0
+        self._due: list[tuple[float, int, Callable[[], None]]] = []
+        self._count = count()
+        self._said = self._embedded = b''
+        self._receiver = self._receive()
+        next(self._receiver)
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def write(self, data: bytes) -> None:
+        """Take what the script sends."""
+        self._run(self.now)
+        for byte in data:
+            self._receiver.send(byte)
+        self._run(self.now)
+
+    def read(self, timeout: float) -> bytes:
+        """Let time pass until something was said, at most ``timeout`` s."""
+        end = self.now + timeout
+        while not self._said and self._due and self._due[0][0] <= end:
+            self._run(self._due[0][0])
+        if not self._said:
+            self.now = end
+        said, self._said = self._said, b''
+        return said
+
+    def _run(self, until: float) -> None:
+        while self._due and self._due[0][0] <= until:
+            when, _, action = heapq.heappop(self._due)
+            self.now = max(self.now, when)
+            action()
+
+    def after(self, delay: float, action: Callable[[], None]) -> None:
+        """Do something later."""
+        heapq.heappush(self._due, (self.now + delay, next(self._count), action))
+
+    def say(self, data: bytes, delay: float = 0.0) -> None:
+        """Send bytes; those of a slow end are late."""
+        def leave() -> None:
+            self._said += data
+        self.after(delay + (0.3 if Habit.SLOW in self.habits else 0.0), leave)
+
+    def has(self, habit: Habit) -> bool:
+        """Tell whether this end has a habit."""
+        return habit in self.habits
+
+    def take(self, symbol: Symbol) -> None:
+        """Take what was received."""
+        raise NotImplementedError
+
+    def frame(self, data: bytes, station: int | None = None) -> bytes:
+        """Return a message as it stands on the line."""
+        check = _message_check(data, self.check, station)
+        if self.has(Habit.BAD_CHECK_OF_HIGH_BYTES) and max(data) >= 0xC0:
+            check = bytes(byte ^ 0xFF for byte in check)
+        if self.has(Habit.CRC_WITHOUT_STATION):
+            check = _message_check(data, self.check, None)
+        body = data if self.has(Habit.UNSTUFFED) else data.replace(b'\x10', b'\x10\x10')
+        body, self._embedded = self._embedded + body, b''
+        head = b'' if station is None else bytes((_DLE, _SOH)) + self.number(station)
+        return head + bytes((_DLE, _STX)) + body + bytes((_DLE, _ETX)) + check
+
+    def number(self, station: int) -> bytes:
+        """Return a station as data symbol."""
+        return bytes((station,)) * (2 if station == _DLE else 1)
+
+    def _receive(self) -> Generator[None, int, None]:
+        while True:
+            byte = yield
+            if byte == _DLE:
+                yield from self._control((yield))
+            elif self.has(Habit.LOST_AFTER_NOISE):
+                yield from self._deaf()
+
+    def _deaf(self) -> Generator[None, int, None]:
+        """Hear nothing up to the next DLE ETX."""
+        last = 0
+        while (byte := (yield)) != _ETX or last != _DLE:
+            last = byte
+
+    def _control(self, code: int) -> Generator[None, int, None]:
+        if code == _ENQ and self.is_half_duplex:
+            station = yield
+            if station == _DLE and not self.has(Habit.POLL_NOT_DOUBLED):
+                yield
+            self.take(('poll', station, (yield) == _checked(bytes((station,)), 'BCC')[0]))
+        elif code == _SOH and self.is_half_duplex:
+            station = yield
+            if station == _DLE:
+                yield
+            if (yield) == _DLE and (yield) == _STX:
+                yield from self._message(station)
+        elif code == _STX:
+            yield from self._message(None)
+        else:
+            self.take((code,))
+
+    def _message(self, station: int | None) -> Generator[None, int, None]:
+        data = bytearray()
+        while True:
+            byte = yield
+            if byte != _DLE:
+                data.append(byte)
+                continue
+            code = yield
+            if code == _DLE:
+                data.append(_DLE)
+            elif code == _ETX:
+                break
+            elif code in (_ACK, _NAK) and self.has(Habit.RESPONSE_IS_DATA):
+                data += bytes((_DLE, code))
+            elif code in (_ACK, _NAK) or code == _ENQ and self.has(Habit.ENQ_IN_MESSAGE_ANSWERED):
+                if not self.has(Habit.RESPONSE_INSIDE_IGNORED):
+                    self.take((code,))
+            elif code != _ENQ or not self.has(Habit.ENQ_IN_MESSAGE_IGNORED):
+                if self.has(Habit.LOST_AFTER_BROKEN_MESSAGE):
+                    for _ in range(3):
+                        yield from self._deaf()
+                    return
+                self.take(('broken',))
+                if code in (_SOH, _STX) or code == _ENQ and self.is_half_duplex:
+                    yield from self._control(code)
+                return
+        check = bytes([(yield)]) if self.check == 'BCC' else bytes([(yield), (yield)])
+        of_station = None if self.has(Habit.CRC_WITHOUT_STATION) else station
+        is_good = check == _message_check(bytes(data), self.check, of_station)
+        self.take(('message', station, bytes(data), is_good))
+
+
+class _Executor:
+    """A PLC behind an end: link data in, link data of the reply out; and what is a duplicate."""
+
+    def __init__(self, wire: Wire, station: int, family: str) -> None:
+        self._wire = wire
+        self._plc = simulated_plc(station, family, wire.clock, ('N7:0', 20), checksum=wire.check)
+        self._seen: deque[bytes] = deque(maxlen=99 if wire.has(Habit.REMEMBERS_99) else 1)
+
+    def _key(self, data: bytes) -> bytes:
+        has = self._wire.has
+        if has(Habit.DUPLICATE_BY_TNS):
+            return data[4:6]
+        if has(Habit.DUPLICATE_WITHOUT_SOURCE):
+            return data[2:3] + data[4:6]
+        if has(Habit.DUPLICATE_BY_COMMAND_AND_SOURCE):
+            return data[1:3]
+        return data[1:3] + data[4:6]
+
+    def is_duplicate(self, data: bytes) -> bool:
+        """Tell whether a message is one that came before."""
+        return self._key(data) in self._seen and not self._wire.has(Habit.EXECUTES_DUPLICATES)
+
+    def remember(self, data: bytes) -> None:
+        """Remember a message that was accepted."""
+        self._seen.append(self._key(data))
+
+    def serve(self, data: bytes) -> bytes:
+        """Execute a command."""
+        has = self._wire.has
+        cmd, fnc = data[2], data[6:7]
+        is_write = data[6:7] in (b'\xAA', b'\x67')
+        if is_write and has(Habit.WRITES_NOTHING):
+            return self._done(data)
+        if cmd == 0x0F and fnc == b'\xAB' and has(Habit.MASKS_NOTHING):
+            data = data[:-4] + b'\xFF\xFF' + data[-2:]
+        if cmd == 0x0F and data[6:7] == b'\x68' and data[11:12] == b'\x07' and \
+                has(Habit.REFUSES_AREA):
+            return self._done(data, sts=0x10)
+        reply = self._plc.serve(Packet.decode(data)).encode()
+        if cmd == 0x06 and fnc == b'\x00':
+            reply = reply[:106] if has(Habit.CUTS_ECHO) else reply
+            reply = reply[:86] if has(Habit.CUTS_ECHO_AT_80) else reply
+        if cmd == 0x06 and fnc == b'\x03' and has(Habit.NO_IDENTITY):
+            reply = reply[:6]
+        is_lenient = (cmd == 0x0C and has(Habit.DOES_ALL_COMMANDS)
+                      or fnc == b'\xE7' and has(Habit.DOES_ALL_FUNCTIONS)
+                      or fnc == b'\xA2' and has(Habit.READS_ZEROS_BEYOND))
+        if reply[3] and is_lenient:
+            reply = self._done(data) + bytes(2)
+        if fnc in (b'\xA2', b'\x68') and has(Habit.READS_SHORT):
+            reply = reply[:-1]
+        if has(Habit.EXCHANGES_TNS):
+            reply = reply[:4] + reply[5:3:-1] + reply[6:]
+        return reply
+
+    @staticmethod
+    def _done(data: bytes, sts: int = 0) -> bytes:
+        return bytes((data[1], data[0], data[2] | 0x40, sts)) + data[4:6]
+
+
+class MutatedSlave(Wire):
+    """A half-duplex slave (KF2 4-31)."""
+
+    def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
+        super().__init__(check, frozenset(habits), is_half_duplex=True)
+        self._station = station
+        self._plc = _Executor(self, station, family)
+        self._queue: deque[tuple[float, bytes]] = deque()
+        self._held: bytes | None = None
+        self._sent = 0
+
+    def take(self, symbol: Symbol) -> None:
+        """React to a symbol."""
+        kind = symbol[0]
+        if kind == 'poll':
+            is_ours = symbol[1] == self._station or self.has(Habit.ANSWERS_ALL_STATIONS)
+            if is_ours and (symbol[2] or self.has(Habit.ANSWERS_BAD_POLL)):
+                self._polled()
+        elif kind == 'message':
+            _, station, data, is_good = symbol
+            assert isinstance(data, bytes)
+            if station in (self._station, 0xFF) or self.has(Habit.ANSWERS_ALL_STATIONS):
+                self._received(data, bool(is_good), station == 0xFF)
+        elif kind == _ACK and not self.has(Habit.KEEPS_WHAT_WAS_ACKNOWLEDGED):
+            self._held = None
+        elif kind == _NAK and not self.has(Habit.IGNORES_NAK):
+            self._held = None
+            self._queue.clear()
+
+    def _respond(self, code: int = _ACK) -> None:
+        if not self.has(Habit.NO_ACK):
+            self.say(bytes((_DLE, code)))
+
+    def _received(self, data: bytes, is_good: bool, is_broadcast: bool) -> None:
+        if not is_good and not self.has(Habit.TAKES_BAD_CHECK):
+            if self.has(Habit.NAKS_BAD_CHECK):
+                self._respond(_NAK)
+            return
+        if len(data) < 6 and self.has(Habit.TAKES_SHORT):
+            self._respond()
+        if len(data) < 6 or self.has(Habit.SMALL_PACKETS) and len(data) > 110:
+            return
+        if self._plc.is_duplicate(data):
+            if not self.has(Habit.DUPLICATE_WITHOUT_ACK):
+                self._respond()
+            return
+        waiting = len(self._queue) + (self._held is not None)
+        if waiting >= (1 if self.has(Habit.ONE_MESSAGE_ONLY) else 3) and not is_broadcast:
+            if self.has(Habit.NAKS_WHEN_FULL):
+                self._respond(_NAK)
+            if self.has(Habit.LOSES_WHEN_FULL):
+                self._respond()
+            return
+        self._plc.remember(data)
+        if not is_broadcast or self.has(Habit.ACKS_BROADCAST):
+            self._respond()
+        self._execute(data, not is_broadcast or self.has(Habit.REPLIES_TO_BROADCAST))
+
+    def _execute(self, data: bytes, wants_reply: bool) -> None:
+        reply = self._plc.serve(data)
+        if wants_reply:
+            late = 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
+            if self.has(Habit.REPLIES_UNASKED):
+                self.say(self.frame(reply), 0.1)
+                return
+            ready = self.now + late, reply
+            self._queue.insert(0 if self.has(Habit.LAST_REPLY_FIRST) else len(self._queue), ready)
+
+    def _polled(self) -> None:
+        is_given_up = self._sent > _LIMIT and not self.has(Habit.NEVER_GIVES_UP)
+        if self._held is not None and (is_given_up or self.has(Habit.DROPS_WHAT_IT_SENT)):
+            self._held = None
+        if self._held is None and self._queue and self._queue[0][0] <= self.now:
+            self._held, self._sent = self._queue.popleft()[1], 0
+        if self._held is not None:
+            self._sent += 1
+            self.say(self.frame(self._held))
+        elif not self.has(Habit.NO_EOT):
+            self.say(bytes((_DLE, _ACK if self.has(Habit.ACK_TO_POLL) else _EOT)))
+
+
+class _FullDuplex(Wire):
+    """What peer and client have in common: responses, and messages that are sent until taken."""
+
+    def __init__(self, check: str, habits: frozenset[Habit]) -> None:
+        super().__init__(check, habits, is_half_duplex=False)
+        self._last_response = _NAK
+        self._outgoing: deque[bytes] = deque()
+        self._naks = self._enquiries = 0
+        self._sending = 0  # counts messages and repetitions, so that an old timer is known
+
+    def execute(self, data: bytes) -> None:
+        """Take a good message."""
+        raise NotImplementedError
+
+    def is_duplicate(self, data: bytes) -> bool:
+        """Tell whether a message has come before."""
+        raise NotImplementedError
+
+    def failed(self) -> None:
+        """Take note that a message was given up."""
+
+    def take(self, symbol: Symbol) -> None:
+        """React to a symbol."""
+        kind = symbol[0]
+        if kind == 'broken':
+            self._respond(_NAK)
+        elif kind == 'message':
+            assert isinstance(symbol[2], bytes)
+            self._received(symbol[2], bool(symbol[3]))
+        elif kind == _ENQ:
+            code = (_NAK if self.has(Habit.ENQ_ALWAYS_NAK) else
+                    _ACK if self.has(Habit.ENQ_ALWAYS_ACK) else self._last_response)
+            if not self.has(Habit.ENQ_NOT_ANSWERED):
+                self.say(bytes((_DLE, code)))
+        elif kind == _ACK and self._outgoing:
+            self._end()
+        elif kind == _NAK and self._outgoing:
+            self._naks += 1
+            if self._naks > _LIMIT and not self.has(Habit.NEVER_GIVES_UP) or \
+                    self.has(Habit.NO_REPETITION):
+                self._end(is_taken=False)
+            else:
+                self._transmit()
+
+    def _received(self, data: bytes, is_good: bool) -> None:
+        if not is_good and not self.has(Habit.TAKES_BAD_CHECK):
+            if not self.has(Habit.IGNORES_BAD_CHECK):
+                self._respond(_NAK)
+            return
+        if len(data) < 6 and not self.has(Habit.TAKES_SHORT):
+            self._respond(_NAK)
+            return
+        if self.has(Habit.SMALL_PACKETS) and len(data) > 110:
+            self._respond(_NAK)
+            return
+        is_duplicate = self.is_duplicate(data)
+        if not (is_duplicate and self.has(Habit.DUPLICATE_WITHOUT_ACK)):
+            self._respond(_ACK, is_followed=not is_duplicate)
+        if not is_duplicate and len(data) >= 6:
+            self.execute(data)
+
+    def _respond(self, code: int, is_followed: bool = False) -> None:
+        self._last_response = code
+        if code == _NAK and self.has(Habit.NAK_AS_0F):
+            code = 0x0F
+        if self.has(Habit.EMBEDS_RESPONSES) and is_followed and not self._outgoing:
+            self._embedded = bytes((_DLE, code))  # in the reply
+        elif code == _NAK or not self.has(Habit.NO_ACK):
+            self.say(bytes((_DLE, code)))
+
+    def send(self, data: bytes) -> None:
+        """Send a message after those that wait."""
+        self._outgoing.append(data)
+        if len(self._outgoing) == 1:
+            self._begin()
+
+    def _begin(self) -> None:
+        self._naks = self._enquiries = 0
+        self._transmit()
+
+    def _transmit(self) -> None:
+        self.say(self.frame(self._outgoing[0]))
+        self._wait()
+        if self.has(Habit.ENQUIRES_ALWAYS):
+            self.say(bytes((_DLE, _ENQ)), 0.1)
+
+    def _wait(self) -> None:
+        self._sending += 1
+        mine = self._sending
+
+        def expire() -> None:
+            if mine == self._sending and self._outgoing:
+                self._not_answered()
+        self.after(_ACK_TIMEOUT, expire)
+
+    def _not_answered(self) -> None:
+        self._enquiries += 1
+        if self._enquiries > _LIMIT and not self.has(Habit.NEVER_GIVES_UP):
+            self._end(is_taken=False)
+        elif self.has(Habit.SILENCE_REPEATED):
+            self.say(self.frame(self._outgoing[0]))
+            self._wait()
+        else:
+            self.say(bytes((_DLE, _ENQ)))
+            self._wait()
+
+    def _end(self, is_taken: bool = True) -> None:
+        self._sending += 1
+        self._outgoing.popleft()
+        if not is_taken:
+            self.failed()
+        if self._outgoing:
+            self._begin()
+
+
+class MutatedPeer(_FullDuplex):
+    """A full-duplex node that answers commands (M 4-5 to 4-9)."""
+
+    def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
+        super().__init__(check, frozenset(habits))
+        self._plc = _Executor(self, station, family)
+
+    def is_duplicate(self, data: bytes) -> bool:
+        """Ask the PLC, which remembers it."""
+        is_duplicate = self._plc.is_duplicate(data)
+        self._plc.remember(data)
+        return is_duplicate
+
+    def execute(self, data: bytes) -> None:
+        """Send the reply."""
+        reply = self._plc.serve(data)
+        late = 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
+        self.after(late, lambda: self.send(reply))
+
+
+class _Asker:
+    """The commands of a master or client: reads of N7:0, the next when one has ended."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
+        self._tns = 0x1234
+
+    def next_command(self) -> bytes:
+        """Return the link data of the next command."""
+        if not self._wire.has(Habit.SAME_TNS):
+            self._tns += 1
+        sts = 2 if self._wire.has(Habit.STS_IN_COMMAND) else 0
+        return self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + bytes.fromhex('A2 04 07 89 00 00'))
+
+    def with_tns(self, command: bytes) -> bytes:
+        """Return a command with the newest TNS."""
+        return command[:4] + self._tns.to_bytes(2, 'little') + command[6:]
+
+    def renewed(self, command: bytes) -> bytes:
+        """Return a command as it is repeated."""
+        if not self._wire.has(Habit.NEW_TNS_FOR_REPETITION):
+            return command
+        self._tns += 1
+        return self.with_tns(command)
+
+
+class MutatedClient(_FullDuplex):
+    """A full-duplex node that sends commands, one after the other."""
+
+    def __init__(self, check: str, *habits: Habit) -> None:
+        super().__init__(check, frozenset(habits))
+        self._asker = _Asker(self)
+        self._last = b''
+        self._round = 0
+        self.after(0.1, self._ask)
+
+    def _ask(self) -> None:
+        self._round += 1
+        mine = self._round
+
+        def expire() -> None:
+            if mine == self._round:
+                self._ask()
+        self.after(_COMMAND_TIMEOUT, expire)
+        self._outgoing.clear()
+        self.send(self._asker.next_command())
+
+    def is_duplicate(self, data: bytes) -> bool:
+        """Tell whether this is the last reply again."""
+        is_last, self._last = data == self._last, data
+        return is_last
+
+    def execute(self, data: bytes) -> None:
+        """Go on after a reply."""
+        self._go_on()
+
+    def failed(self) -> None:
+        self._go_on()
+
+    def _go_on(self) -> None:
+        self._round += 1
+        mine = self._round
+
+        def go_on() -> None:
+            if mine == self._round:
+                self._ask()
+        self.after(0.15, go_on)
+
+
+class MutatedMaster(Wire):
+    """A half-duplex master (M 3-13 to 3-15) that reads station 1, one command after the other."""
+
+    def __init__(self, check: str, *habits: Habit) -> None:
+        super().__init__(check, frozenset(habits), is_half_duplex=True)
+        self._asker = _Asker(self)
+        self._steps = self._transactions()
+        self._waiting = 0
+        self.after(0.1, lambda: self._go_on(None))
+
+    def take(self, symbol: Symbol) -> None:
+        """Hand a symbol to the transaction."""
+        self._go_on(symbol)
+
+    def _go_on(self, symbol: Symbol | None) -> None:
+        """Let the transaction take a symbol (None: silence), and wait for the next."""
+        self._waiting += 1
+        mine = self._waiting
+        seconds = next(self._steps) if symbol is None and mine == 1 else self._steps.send(symbol)
+
+        def expire() -> None:
+            if mine == self._waiting:
+                self._go_on(None)
+        self.after(seconds, expire)
+
+    def _poll(self, station: int = 1) -> None:
+        check = 'CRC' if self.has(Habit.POLL_WITH_CRC) else 'BCC'
+        self.say(bytes((_DLE, _ENQ)) + self.number(station)
+                 + _checked(bytes((station,)), check))
+
+    def _transactions(self) -> Generator[float, Symbol | None, None]:
+        while True:
+            command = self._asker.next_command()
+            if (yield from self._delivered(command)):
+                yield from self._fetched(command)
+            yield 0.05
+
+    def _delivered(self, command: bytes) -> Generator[float, Symbol | None, bool]:
+        for attempt in range(1 if self.has(Habit.NO_REPETITION) else 1 + _LIMIT):
+            if attempt:
+                command = self._asker.renewed(command)
+            self.say(self.frame(command, 1))
+            symbol = yield _ACK_TIMEOUT
+            if symbol == (_ACK,):
+                return True
+            if self.has(Habit.POLLS_BETWEEN_REPETITIONS):
+                self._poll()
+                yield _ACK_TIMEOUT
+        return False
+
+    def _fetched(self, command: bytes) -> Generator[float, Symbol | None, None]:
+        silent = 0
+        end = self.now + _COMMAND_TIMEOUT
+        if self.has(Habit.DOES_NOT_POLL):
+            return
+        if self.has(Habit.POLLS_LATE):
+            yield 0.2
+        while self.now < end and silent <= _LIMIT:
+            self._poll()
+            symbol = yield 0.02 if self.has(Habit.IMPATIENT) else _ACK_TIMEOUT
+            if symbol == (_EOT,):
+                if self.has(Habit.EOT_ENDS_COMMAND):
+                    return
+                yield 0.02
+                continue
+            if symbol is not None and symbol[0] == 'message':
+                data = symbol[2]
+                assert isinstance(data, bytes)
+                if symbol[3] or self.has(Habit.TAKES_BAD_CHECK):
+                    is_ours = data[4:6] == command[4:6]
+                    if not self.has(Habit.NO_ACK) and (
+                            is_ours or not self.has(Habit.DUPLICATE_WITHOUT_ACK)):
+                        self.say(bytes((_DLE, _ACK)))
+                    if is_ours:
+                        return
+                    continue
+                if self.has(Habit.NAKS_BAD_REPLY):
+                    self.say(bytes((_DLE, _NAK)))
+                    return
+            silent += 1
+            if self.has(Habit.POLLS_OTHERS):
+                self._poll(7)
+                yield 0.05
