@@ -116,9 +116,8 @@ docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code
 	$(PY) -m tools.reference
 
 .PHONY: bench
-bench: $(INSTALLED) ## Measure plan, line, scheduling, processor time, latency, scale (12 minutes)
-	@for name in planning cpu_time wire_efficiency poll_cycle scheduling node_cpu node_latency \
-	        publishing node_scale polling_modes dead_stations peer_outstanding; do \
+bench: $(INSTALLED) ## Measure plan, line, processor time, latency, scale (6 minutes)
+	@for name in planning cpu_time wire_efficiency node_cpu node_latency node_scale; do \
 	    echo "$$name:"; timeout 300 $(PY) test/benchmarks/$$name.py || exit; echo; \
 	done
 
