@@ -20,11 +20,12 @@ from collections.abc import Iterator, Mapping
 import re
 
 from abdf1_ros.df1.frames import Code
-from abdf1_ros.pccc.describe import command_codes
-from abdf1_ros.pccc.notation import extended_address, logical_address, system_address
+from abdf1_ros.pccc.describe import command_codes, extended_address
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from abdf1_ros.pccc.plc5.commands import SystemAddress
+from abdf1_ros.pccc.plc5.describe import system_address
 from abdf1_ros.pccc.slc.commands import LogicalAddress
+from abdf1_ros.pccc.slc.describe import logical_address
 from abdf1_ros.pccc.status import status_text
 from abdf1_ros.pccc.typed_data import TypedData
 

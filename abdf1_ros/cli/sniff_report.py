@@ -36,7 +36,7 @@ from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import Abdf1Error
 from abdf1_ros.paths import package_version
-from abdf1_ros.pccc.diagnostic_status import decode_identity
+from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.sniffer.entries import Entry, Kind
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary

@@ -37,7 +37,7 @@ from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.pccc.link_counters import counter_request, decode_counters, layout_of
+from abdf1_ros.pccc.link_counters import decode_counters
 from abdf1_ros.pccc.status import check_status
 
 # A station gets an echo after so many seconds of silence, and the next one after as many.
@@ -209,9 +209,9 @@ class Checks:
             self._known[station] = replace(
                 known, processor=str(identity), identity=identity, told=self._clock())
         else:
-            request = counter_request(known.identity).encode()
-            reply = check_status((yield diagnostics.CMD, request))
-            self._take_counters(station, decode_counters(reply, layout_of(known.identity)))
+            asked = known.identity or Identity(None, '')
+            reply = check_status((yield diagnostics.CMD, asked.counters.encode()))
+            self._take_counters(station, decode_counters(reply, asked.counter_layout))
 
     def _take_refusal(self, check: Check, reason: str) -> None:
         if check.kind is CheckKind.STATUS:

@@ -47,8 +47,8 @@ from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.driver.writes import MAX_WAITING_WRITES, patience_of, waited_too_long
 from abdf1_ros.errors import CommandExpired, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.plan.forecast import (
     block_time,

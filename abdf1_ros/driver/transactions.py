@@ -24,11 +24,9 @@ from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.diagnostic_status import decode_identity
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import decode_identity, family_of
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.pccc.plc5 import identity as plc5
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -134,17 +132,17 @@ def read_values(mapping: Mapping, block: Block) -> Steps[Values]:
 
 def identify() -> Steps[Identity]:
     """
-    Ask a station for its identity, and a PLC-5 with a fault for the fault code.
+    Ask a station for its identity, and what its fault is where that takes a request more.
 
     Raises LinkError, RemoteError, or FormatError for a reply too short to tell.
     """
     reply = yield diagnostics.CMD, diagnostics.STATUS_REQUEST
     identity = decode_identity(check_status(reply))
-    request = plc5.fault_request(identity)
-    if request is None:
+    inquiry = identity.inquiry
+    if inquiry is None:
         return identity
     try:
-        return plc5.with_fault(identity, check_status((yield request)))
+        return inquiry.answered(check_status((yield inquiry.request)))
     except (RemoteError, FormatError):
         return identity  # an old PLC-5 without typed commands
 

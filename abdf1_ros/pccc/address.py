@@ -26,10 +26,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 
 BITS = 16
+
+
+class AddressSyntaxError(FormatError):
+    """The text is not an address of this family."""
+
+
+class AddressRangeError(FormatError):
+    """The address is well formed, but outside what the family can have."""
+
+
+class AddressRefusal(FormatError):
+    """The address in a command does not exist; a PLC answers with ``ext_sts`` (M 8-4)."""
+
+    def __init__(self, ext_sts: int, text: str) -> None:
+        super().__init__(text)
+        self.ext_sts = ext_sts
 
 
 class Addressing(ABC):

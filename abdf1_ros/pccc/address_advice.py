@@ -15,15 +15,13 @@
 """
 Advice for a text that is not an address of a PLC-5, SLC or MicroLogix.
 
-Usual mistakes get an answer of their own: an address of the other family, a range, a letter for a
-digit, files that these commands do not reach.
+Usual mistakes get an answer of their own: a range, a letter for a digit, a bit after a dot. Those
+that only one family can tell are in its ``address``.
 """
 
 from __future__ import annotations
 
 import re
-
-from abdf1_ros.pccc.file_types import PlcType
 
 _RANGE = re.compile(
     r'(?P<first>[#$]?[A-Z]{1,2}\d*[:;](?P<element>\d+)(?:[./][A-Z0-9]+)?)\s*'
@@ -31,33 +29,17 @@ _RANGE = re.compile(
     r'|-(?:[A-Z]{1,2}\d*[:;])?(?P<last>\d+))', re.ASCII)
 _BIT_AFTER_DOT = re.compile(
     r'(?P<word>[#$]?(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})', re.ASCII)
-_SLC_IO = re.compile(r'[#$]?[IO]\d?[:;]\d+\.\d+(?:/\d+)?', re.ASCII)
-_PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0[0-7]{2}(?:/[0-7]{1,2})?', re.ASCII)
 # Letters O among digits.
 _LETTERS_O = re.compile(r'(?<=[:;./0-9])O+(?![A-Z])', re.ASCII)
-# The function files of the MicroLogix; they are read by other commands than data files.
-_FUNCTION_FILES = re.compile(
-    r'(?P<name>BHI|CS|DAT|DLS|EII|ES|HSC|IOS|LCD|MMI|PTO|PWM|RTC|STI|TPI)\d*(?:[:;/.].*)?',
-    re.ASCII)
 
 
-def advice(text: str, plc_type: PlcType) -> str | None:
+def advice(text: str) -> str | None:
     """Return the advice for an address in capital letters, None for no usual mistake."""
     if match := _RANGE.fullmatch(text):
         return _of_range(match)
-    if plc_type is PlcType.SLC and (match := _FUNCTION_FILES.fullmatch(text)):
-        return (f'{match["name"]} is a function file, which is not supported; let the program '
-                'copy what is needed into an N file')
     if _LETTERS_O.search(text):
         return ('that is the letter O where a digit should be; write '
                 + _LETTERS_O.sub(lambda match: '0' * len(match[0]), text))
-    if plc_type is PlcType.PLC5 and _SLC_IO.fullmatch(text):
-        return ('this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as in '
-                'I:017/12')
-    if plc_type is PlcType.SLC and (match := _PLC5_IO.fullmatch(text)):
-        kind = match['type']
-        return (f'this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
-                f'{kind}:1.0/3')
     if (match := _BIT_AFTER_DOT.fullmatch(text)) and int(match['bit']) < 16:
         return f'a bit stands after "/"; write {match["word"]}/{int(match["bit"])}'
     return None

@@ -19,24 +19,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc import diagnostics, notation
-from abdf1_ros.pccc.address_errors import AddressRefusal
-from abdf1_ros.pccc.diagnostic_status import decode_identity
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.address import Address, AddressRefusal
+from abdf1_ros.pccc.families import decode_identity, known_commands
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.notation import count_of, hexadecimal, part_of, words_text
-from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.notation import (
+    CommandCode,
+    count_of,
+    hexadecimal,
+    KnownCommand,
+    part_of,
+    words_text,
+)
+from abdf1_ros.pccc.plc3 import commands as plc3
+from abdf1_ros.pccc.plc3.address import ADDRESSING as PLC3
+from abdf1_ros.pccc.plc3.address import BY_SECTION
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
-from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.plc5.commands import SystemAddress
-from abdf1_ros.pccc.slc import commands as slc
-from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
+from abdf1_ros.pccc.plc5.describe import system_address
 from abdf1_ros.pccc.status import check_status, EXT_BAD_SYMBOL, EXT_NO_SUCH_SYMBOL
-from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.text import printable
 
@@ -59,7 +64,7 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
         return str(error)
     if not data:
         return 'done'
-    entry = _COMMANDS.get(_code(command)) if command else None
+    entry = _known().get(_code(command)) if command else None
     if command is not None and entry is not None:
         try:
             return entry.values(entry.read(_parameters(command)), data)
@@ -70,7 +75,7 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
 
 def command_codes() -> dict[tuple[int, int | None], str]:
     """Return the name of every command that we know, by CMD and FNC (None: it has none)."""
-    named = {code: entry.name for code, entry in _COMMANDS.items()}
+    named = {code: entry.name for code, entry in _known().items()}
     return dict(sorted((named | _NAMES).items(), key=lambda item: (item[0][0], item[0][1] or 0)))
 
 
@@ -82,23 +87,14 @@ def command_name(packet: Packet) -> str:
     return f'{cmd:02X}/{function:02X}'
 
 
-_CommandCode = tuple[int, int | None]  # CMD and FNC
-
-
-@dataclass(frozen=True, slots=True)
-class _KnownCommand:
-    """A command: how it is read, what it says, and what its reply's data are."""
-
-    name: str
-    read: Callable[[Reader], Any]
-    words: Callable[[Any], str]
-    values: Callable[[Any, bytes], str] = lambda request, data: hexadecimal(data)
+def _known() -> dict[CommandCode, KnownCommand]:
+    return known_commands() | _SHARED
 
 
 def _describe_command(packet: Packet) -> str:
     code = _code(packet)
     parameters = packet.data[code[1] is not None:]
-    entry = _COMMANDS.get(code)
+    entry = _known().get(code)
     if entry is None:
         name = _NAMES.get(code) or f'command {command_name(packet)}'
         return f'{name} {hexadecimal(parameters)}'.rstrip()
@@ -108,54 +104,13 @@ def _describe_command(packet: Packet) -> str:
         return f'{entry.name}, malformed ({error}): {hexadecimal(packet.data)}'
 
 
-def _code(packet: Packet) -> _CommandCode:
+def _code(packet: Packet) -> CommandCode:
     cmd = packet.cmd & ~REPLY_BIT & ~PRIORITY_BIT
     return cmd, packet.data[0] if cmd in _WITH_FUNCTION and packet.data else None
 
 
 def _parameters(packet: Packet) -> Reader:
     return Reader(packet.data[_code(packet)[1] is not None:])
-
-
-def _typed_read(request: plc5.TypedRead) -> str:
-    return (f'{notation.system_address(request.address)}, {count_of(request.size, "element")}'
-            f'{part_of(request.offset, request.size, request.total)}')
-
-
-def _typed_write(request: plc5.TypedWrite) -> str:
-    values = request.values
-    return (f'{notation.system_address(request.address, values)} = '
-            f'{notation.typed_values(request.address, values) or "nothing"}'
-            f'{part_of(request.offset, values.count, request.total)}')
-
-
-def _typed_reply(request: plc5.TypedRead, data: bytes) -> str:
-    return notation.typed_values(request.address, TypedData.decode(data))
-
-
-def _read_modify_write(request: plc5.ReadModifyWrite) -> str:
-    return ', '.join(
-        f'{notation.system_address(entry.address)} AND {entry.and_mask:04X} '
-        f'OR {entry.or_mask:04X}' for entry in request.sets)
-
-
-def _logical_read(request: LogicalRead) -> str:
-    return (f'{notation.logical_address(request.address)}, '
-            f'{notation.logical_size(request.address, request.size)}')
-
-
-def _logical_write(request: LogicalWrite) -> str:
-    values = notation.logical_values(request.address, request.data) or 'nothing'
-    return f'{notation.logical_address(request.address)} = {values}'
-
-
-def _logical_reply(request: LogicalRead, data: bytes) -> str:
-    return notation.logical_values(request.address, data)
-
-
-def _masked_write(request: slc.MaskedWrite) -> str:
-    return (f'{notation.logical_address(request.address)} mask {request.mask:04X} = '
-            f'{words_text(request.data) or "nothing"}')
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +162,19 @@ def _range_text(address: _Range) -> str:
     if isinstance(address, _SymbolicName):
         return f'symbol {address.name}'
     if isinstance(address, SystemAddress):
-        return notation.system_address(address)
-    return notation.extended_address(address)
+        return system_address(address)
+    return extended_address(address)
+
+
+def extended_address(address: ExtendedAddress) -> str:
+    """Return a PLC-3 address, by its levels where its section has no letter (M 13-5)."""
+    kind = BY_SECTION.get(address.section)
+    if kind is not None and not kind.is_structure and not address.structure:
+        return str(Address(PLC3, kind, address.file, address.word))
+    if kind is not None and kind.is_structure and address.word < 3:
+        return str(Address(PLC3, kind, address.file, address.structure, address.word))
+    return (f'E{plc3.DATA_TABLE}.{plc3.CONTEXT}.{address.section}.{address.file}.'
+            f'{address.structure}.{address.word}')
 
 
 def _range_read(request: word_range.WordRangeRead[_Range]) -> str:
@@ -226,23 +192,9 @@ def _bit_write(request: word_range.WordBitWrite[_Range]) -> str:
     return f'{_range_text(request.address)} set {request.set:04X} reset {request.reset:04X}'
 
 
-def _basic_read(request: plc2.BasicRead) -> str:
-    return f'{notation.byte_address(request.address)}, {count_of(request.size, "byte")}'
-
-
-def _basic_write(request: plc2.BasicWrite) -> str:
-    return f'{notation.byte_address(request.address)} = {words_text(request.data) or "nothing"}'
-
-
-def _basic_bit_write(request: plc2.BasicBitWrite) -> str:
-    return ', '.join(
-        f'{notation.byte_address(change.address)} {"high" if change.address % 2 else "low"} byte '
-        f'set {change.set:02X} reset {change.reset:02X}' for change in request.changes)
-
-
 def _identity_reply(request: object, data: bytes) -> str:
     identity = decode_identity(data)
-    if identity.interface is None and not identity.family:
+    if identity.interface is None and identity.plc_type is None:
         raise FormatError('nothing is known of this processor')
     text = str(identity)
     notes = [] if identity.name in text else [f'name {identity.name}']
@@ -261,51 +213,25 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callab
     return lambda reader: read(reader, _range_address)
 
 
-_COMMANDS: dict[_CommandCode, _KnownCommand] = {
-    (plc2.READ, None): _KnownCommand(
-        'unprotected read', plc2.BasicRead.read, _basic_read, _words_reply),
-    (plc2.UNPROTECTED_WRITE, None): _KnownCommand(
-        'unprotected write', plc2.BasicWrite.read, _basic_write),
-    (plc2.PROTECTED_WRITE, None): _KnownCommand(
-        'protected write', plc2.BasicWrite.read, _basic_write),
-    (plc2.UNPROTECTED_BIT_WRITE, None): _KnownCommand(
-        'unprotected bit write', plc2.BasicBitWrite.read, _basic_bit_write),
-    (plc2.PROTECTED_BIT_WRITE, None): _KnownCommand(
-        'protected bit write', plc2.BasicBitWrite.read, _basic_bit_write),
-    (diagnostics.CMD, diagnostics.STATUS): _KnownCommand(
+# What every family has, or more than one.
+_SHARED: dict[CommandCode, KnownCommand] = {
+    (diagnostics.CMD, diagnostics.STATUS): KnownCommand(
         'diagnostic status', _no_parameters, lambda request: '', _identity_reply),
-    (diagnostics.CMD, diagnostics.READ_COUNTERS): _KnownCommand(
+    (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
         'read diagnostic counters', diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {count_of(request.size, "byte")}', _words_reply),
-    (word_range.CMD, word_range.WRITE): _KnownCommand(
+    (word_range.CMD, word_range.WRITE): KnownCommand(
         'word range write', _ranged(word_range.WordRangeWrite.read), _range_write),
-    (word_range.CMD, word_range.READ): _KnownCommand(
+    (word_range.CMD, word_range.READ): KnownCommand(
         'word range read', _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
-    (word_range.CMD, word_range.BIT_WRITE): _KnownCommand(
+    (word_range.CMD, word_range.BIT_WRITE): KnownCommand(
         'bit write', _ranged(word_range.WordBitWrite.read), _bit_write),
-    (word_range.CMD, word_range.FILE_READ): _KnownCommand(
+    (word_range.CMD, word_range.FILE_READ): KnownCommand(
         'file read', _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
-    (plc5.CMD, plc5.READ_MODIFY_WRITE): _KnownCommand(
-        'read-modify-write', plc5.ReadModifyWrite.read, _read_modify_write),
-    (plc5.CMD, plc5.TYPED_WRITE): _KnownCommand('typed write', plc5.TypedWrite.read, _typed_write),
-    (plc5.CMD, plc5.TYPED_READ): _KnownCommand(
-        'typed read', plc5.TypedRead.read, _typed_read, _typed_reply),
-    (slc.CMD, slc.SHORT_READ): _KnownCommand(
-        'protected typed logical read', partial(LogicalRead.read, is_short=True), _logical_read,
-        _logical_reply),
-    (slc.CMD, slc.LOGICAL_READ): _KnownCommand(
-        'protected typed logical read', LogicalRead.read, _logical_read, _logical_reply),
-    (slc.CMD, slc.SHORT_WRITE): _KnownCommand(
-        'protected typed logical write', partial(LogicalWrite.read, is_short=True),
-        _logical_write),
-    (slc.CMD, slc.LOGICAL_WRITE): _KnownCommand(
-        'protected typed logical write', LogicalWrite.read, _logical_write),
-    (slc.CMD, slc.MASKED_WRITE): _KnownCommand(
-        'masked write', slc.MaskedWrite.read, _masked_write),
 }
 
 # All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
-_NAMES: dict[_CommandCode, str] = {
+_NAMES: dict[CommandCode, str] = {
     (0x03, None): 'physical write', (0x04, None): 'physical read',
     (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables',
     (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs', (0x06, 0x06): 'set ENQs',

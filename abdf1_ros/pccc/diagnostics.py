@@ -25,7 +25,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.pccc.fields import Reader, word
-from abdf1_ros.pccc.file_types import PlcType
 
 CMD = 0x06
 ECHO = 0x00
@@ -34,20 +33,14 @@ STATUS = 0x03
 RESET_COUNTERS = 0x07
 
 MAX_ECHO = 243  # bytes (M 7-8)
-MAX_ECHO_SLC = 236  # of an SLC 5/03 and later (M 7-8)
 MAX_COUNTERS = 244  # bytes in a reply to 06/01
 
 STATUS_REQUEST = bytes((STATUS,))
 
 
-def max_echo(plc_type: PlcType) -> int:
-    """Return how many bytes a processor of the family echoes (M 7-8)."""
-    return MAX_ECHO_SLC if plc_type is PlcType.SLC else MAX_ECHO
-
-
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """Echo, 06/00 (M 7-8): the reply has the same data, at most ``max_echo`` bytes."""
+    """Echo, 06/00 (M 7-8): the reply has the same data; a family has a limit."""
 
     data: bytes = b''
 

@@ -16,19 +16,58 @@
 
 from __future__ import annotations
 
+from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import gateways
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
-from abdf1_ros.pccc.plc2.family import FAMILY as PLC2
-from abdf1_ros.pccc.plc3.family import FAMILY as PLC3
-from abdf1_ros.pccc.plc5.family import FAMILY as PLC5
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.link_counters import ServedCounters
+from abdf1_ros.pccc.notation import CommandCode, KnownCommand
+from abdf1_ros.pccc.plc2 import FAMILY as PLC2
+from abdf1_ros.pccc.plc3 import FAMILY as PLC3
+from abdf1_ros.pccc.plc5 import FAMILY as PLC5
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.slc.family import FAMILY as SLC
+from abdf1_ros.pccc.slc import FAMILY as SLC
 
-FAMILIES = {family.plc_type: family for family in (SLC, PLC5, PLC3, PLC2)}
+FAMILIES: dict[PlcType, Family] = {family.plc_type: family for family in (PLC2, PLC3, PLC5, SLC)}
+
+
+def decode_identity(data: bytes) -> Identity:
+    """
+    Read the data of a reply to 06/03.
+
+    Data of an unknown layout are shown in hexadecimal. Raises FormatError for a reply that is too
+    short to tell.
+    """
+    if len(data) < 2:
+        raise FormatError(f'a diagnostic status of {len(data)} bytes')
+    for decode in (*(family.decode_identity for family in FAMILIES.values()), gateways.decode):
+        identity = decode(data)
+        if identity is not None:
+            return identity
+    return Identity(None, f'unknown processor ({data[:8].hex(" ").upper()})')
+
+
+def known_commands() -> dict[CommandCode, KnownCommand]:
+    """Return how the commands of all families are told to people."""
+    return {code: command for family in FAMILIES.values()
+            for code, command in family.described.items()}
+
+
+def served_counters(counters: Counters, plc_type: PlcType, *, is_full_duplex: bool,
+                    is_master: bool = False) -> ServedCounters | None:
+    """
+    Return our counters as a processor of the family in the same role shows its own.
+
+    The modules in front of a PLC-2 or PLC-3 have blocks of their own (M 9-10), which are not
+    emulated: None.
+    """
+    layout_in = FAMILIES[plc_type].served_counters
+    return layout_in and ServedCounters(counters, layout_in(is_full_duplex, is_master))
 
 
 def family_of(plc_type: PlcType) -> Family:
@@ -77,5 +116,5 @@ def dialect_of(plc_type: PlcType, access: Access | None = None,
     if processor is None:
         return family.dialects[access or ways[0]]
     if not family.by_processor:
-        raise FormatError(f'Processor is for PLC_Type SLC, not for {plc_type.value}')
+        raise FormatError(f'a {plc_type.value} has no Processor')
     return family.by_processor[processor]

@@ -22,9 +22,12 @@ from dataclasses import dataclass, field
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Addressing
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.diagnostics import MAX_ECHO
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.pccc.link_counters import CounterLayout
+from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.serving import ServedFamily
 from abdf1_ros.pccc.status import Meanings, USUAL_MEANINGS
@@ -37,8 +40,11 @@ class Family:
 
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
     another family to 06/03; ``encode_identity`` makes one for a mode, a fault and full duplex.
-    ``meanings`` are those of its own error codes. ``by_processor`` is for a family whose
-    processors take packets of different lengths.
+    ``described`` has its commands for people. ``meanings`` are those of its own error codes.
+    ``by_processor`` is for a family whose processors take packets of different lengths.
+    ``served_counters`` returns the layout of a port for full duplex and for a master, None where
+    its counters are not emulated; they are at every address where ``counters_anywhere``.
+    ``is_spoken_by_all`` tells that PLCs of other families know its commands too.
     """
 
     addressing: Addressing
@@ -46,8 +52,13 @@ class Family:
     commands: Callable[[DataTable], ServedFamily]
     decode_identity: Callable[[bytes], Identity | None]
     encode_identity: Callable[[Mode, bool, bool], bytes]
+    described: Mapping[CommandCode, KnownCommand]
     meanings: Meanings = USUAL_MEANINGS
     by_processor: Mapping[Processor, Dialect] = field(default_factory=dict)
+    served_counters: Callable[[bool, bool], CounterLayout] | None = None
+    counters_anywhere: bool = False
+    max_echo: int = MAX_ECHO
+    is_spoken_by_all: bool = False
 
     @property
     def plc_type(self) -> PlcType:

@@ -25,14 +25,14 @@ Grammar (S0, "Mapping Address Formatting Rules"; P5A), letters in any case::
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import replace
 import re
 from typing import ClassVar
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address, Addressing, BITS
+from abdf1_ros.pccc.address import Address, Addressing, AddressRangeError, AddressSyntaxError, BITS
 from abdf1_ros.pccc.address_advice import advice
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_types import FileType
 
 _FORM = re.compile(
@@ -53,12 +53,13 @@ _OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch'}
 class FileAddressing(Addressing):
     """What the addresses of both families have in common."""
 
+    title: ClassVar[str]
     last_file: ClassVar[int]
 
     def parse(self, text: str, access: Access | None = None) -> Address:
         """Read an address; an error says what would be right."""
         text = text.strip().upper()
-        if found := advice(text, self.plc_type):
+        if found := self.mistaken(text) or advice(text):
             raise AddressSyntaxError(found)
         match = _FORM.fullmatch(text)
         if match is None:
@@ -85,6 +86,10 @@ class FileAddressing(Addressing):
         file = '' if kind.is_io else str(address.file)
         return f'{kind.value}{file}:{self._element_text(address)}{self._rest_text(address)}'
 
+    @abstractmethod
+    def mistaken(self, text: str) -> str | None:
+        """Return what is wrong with a text in capitals that is an address elsewhere."""
+
     def is_octal(self, kind: FileType) -> bool:
         """Tell whether elements and bits of such a file are octal."""
         return False
@@ -97,12 +102,11 @@ class FileAddressing(Addressing):
         for kind in self.files:
             if kind.value == letters:
                 return kind
-        name = self.plc_type.value
         known = ', '.join(kind.value for kind in FileType if kind in self.files)
         if letters in _OTHER_FILES:
             raise AddressSyntaxError(f'{letters} files ({_OTHER_FILES[letters]}) cannot be read '
-                                     f'or written here; file types of {name}: {known}')
-        raise AddressSyntaxError(f'{name} has no {letters} files; file types: {known}')
+                                     f'or written here; file types of {self.title}: {known}')
+        raise AddressSyntaxError(f'{self.title} has no {letters} files; file types: {known}')
 
     def _file(self, text: str | None, kind: FileType) -> int:
         fixed = _FIXED_FILES.get(kind)

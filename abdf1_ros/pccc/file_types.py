@@ -12,23 +12,42 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The PLC families and the file types of their data tables."""
+"""The names of PLC families, and the file types of their data tables."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import ClassVar
 
 from abdf1_ros.pccc.members import Members
 
 
-class PlcType(Enum):
-    """The PLC families; the value is what the CSV files call them (S0, PLC_Type)."""
+@dataclass(frozen=True, slots=True)
+class PlcType:
+    """
+    The name of a PLC family; ``value`` is what the CSV files call it (S0, PLC_Type).
 
-    PLC2 = 'PLC2'
-    PLC3 = 'PLC3'
-    PLC5 = 'PLC5'
-    SLC = 'SLC'
+    The four of the specification have names here, for code and tests about one of them; which
+    families there are is in ``families``.
+    """
+
+    value: str
+
+    PLC2: ClassVar[PlcType]
+    PLC3: ClassVar[PlcType]
+    PLC5: ClassVar[PlcType]
+    SLC: ClassVar[PlcType]
+
+    def __str__(self) -> str:
+        """Return the value."""
+        return self.value
+
+
+PlcType.PLC2 = PlcType('PLC2')
+PlcType.PLC3 = PlcType('PLC3')
+PlcType.PLC5 = PlcType('PLC5')
+PlcType.SLC = PlcType('SLC')
 
 
 class FileType(Enum):

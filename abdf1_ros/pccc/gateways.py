@@ -53,11 +53,11 @@ def decode(data: bytes) -> Identity | None:
     """Read the data of a reply to 06/03; None when they are not in one of these forms."""
     for start, module in _MODULES.items():
         if data[1:1 + len(start)] == start and len(data) > module.release:
-            return Identity('', module.name, *letters(data[module.release]), interface=data[2],
+            return Identity(None, module.name, *letters(data[module.release]), interface=data[2],
                             counter_address=word_at(data, module.counters))
     if len(data) < _NAMED_SIZE or data[1] != _NAMED:
         return None
     name = name_in(data[5:16])
-    known = Identity('', name or f'module 0x{data[2]:02X}', *release(data[4]), name=name,
+    known = Identity(None, name or f'module 0x{data[2]:02X}', *release(data[4]), name=name,
                      interface=data[2])
     return replace(known, counter_size=_KF3_COUNTERS) if data[2] == _KF3 else known

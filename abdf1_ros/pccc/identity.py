@@ -16,15 +16,19 @@
 What a processor or module tells about itself in the reply to a diagnostic status command (06/03).
 
 Each family has layouts of its own: ``identity`` in the folders of the families, and
-``gateways``; ``diagnostic_status`` finds out which one a reply has.
+``gateways``; ``families`` finds out which one a reply has.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from enum import Enum
 
+from abdf1_ros.pccc.diagnostics import ReadCounters
+from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.text import printable
 
@@ -63,8 +67,12 @@ _MODE_WORDS = {'RUN': 'run', 'PROG': 'program', 'TEST': 'test', 'SUSPEND': 'susp
 _MODULE_COUNTERS = 55
 
 
-_PLC_TYPES = {'SLC': PlcType.SLC, 'PLC-5': PlcType.PLC5, 'PLC-3': PlcType.PLC3,
-              'PLC-2': PlcType.PLC2}
+@dataclass(frozen=True, slots=True)
+class Inquiry:
+    """A request that a station is asked for more with, and what its reply's data make of it."""
+
+    request: Request
+    answered: Callable[[bytes], Identity]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,16 +80,16 @@ class Identity:
     """
     The type of a station, its mode, and its faults.
 
-    ``family`` is SLC, PLC-5, PLC-3, PLC-2 or empty where it is unknown; ``mode`` None where the
-    reply has none or one without a name, which is then in ``mode_text``. ``faults`` keep a
-    processor from doing its work, ``remarks`` do not. ``name`` is in the processor's own words
-    with control characters made visible, ``memory`` in its own unit. ``interface`` is the code
-    of the port that was asked; ``counter_address`` and ``counter_size`` (bytes) are for
-    ``ReadCounters``. ``processor`` is what the map file would call it, None where it has no word
-    for it.
+    ``plc_type`` is None where the family is unknown; ``mode`` None where the reply has none or
+    one without a name, which is then in ``mode_text``. ``faults`` keep a processor from doing its
+    work, ``remarks`` do not. ``name`` is in the processor's own words with control characters
+    made visible, ``memory`` in its own unit. ``interface`` is the code of the port that was
+    asked. Its counters have a ``counter_layout``, or are bytes of the module: at
+    ``counter_address``, ``counter_size`` of them. ``processor`` is what the map file would call
+    it, None where it has no word for it. ``inquiry`` tells more about a fault.
     """
 
-    family: str
+    plc_type: PlcType | None
     model: str
     series: str = ''
     revision: str = ''
@@ -96,11 +104,15 @@ class Identity:
     counter_address: int = 0
     counter_size: int = _MODULE_COUNTERS
     processor: Processor | None = None
+    counter_layout: CounterLayout | None = None
+    inquiry: Inquiry | None = field(default=None, compare=False)
 
     @property
-    def plc_type(self) -> PlcType | None:
-        """Return the PLC_Type of its family, None where that is unknown."""
-        return _PLC_TYPES.get(self.family)
+    def counters(self) -> ReadCounters:
+        """Return the command that reads the counters of the port that was asked."""
+        if self.counter_layout is not None:
+            return ReadCounters(0, self.counter_layout.size)
+        return ReadCounters(self.counter_address, self.counter_size)
 
     @property
     def is_running(self) -> bool | None:

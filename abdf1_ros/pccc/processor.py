@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from enum import Enum
 
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.slc import commands as slc
 
 
 class Processor(Enum):
@@ -78,7 +77,7 @@ class _Model:
 # (1747-RM001G).
 _OLD = _Model(82, 82, frozenset((
     FileType.FLOAT, FileType.STRING, FileType.ASCII, FileType.BCD, FileType.LONG)))
-_NEW = _Model(slc.MAX_READ, slc.MAX_WRITE, frozenset((FileType.LONG,)))
+_NEW = _Model(236, 234, frozenset((FileType.LONG,)))
 # AG-UM008C 3-38; it has one file each of types O, I, S, B, T, C, R and N.
 _ML1000 = _Model(82, 82, frozenset((FileType.FLOAT,)), has_fixed_files=True)
 # The MicroLogix 1100 takes 103 words (1763-RM001); the others take at least as many.

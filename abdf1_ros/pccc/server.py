@@ -24,13 +24,23 @@ from __future__ import annotations
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
-from abdf1_ros.pccc.address_errors import AddressRefusal
+from abdf1_ros.pccc.address import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
+from abdf1_ros.pccc.diagnostics import (
+    CMD,
+    ECHO,
+    Echo,
+    MAX_COUNTERS,
+    READ_COUNTERS,
+    ReadCounters,
+    RESET_COUNTERS,
+    STATUS,
+)
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.link_counters import ServedCounters
-from abdf1_ros.pccc.served_diagnostics import served_diagnostics
 from abdf1_ros.pccc.serving import Commands, extended, Refusal
 
 
@@ -39,10 +49,11 @@ class Server:
 
     def __init__(self, table: DataTable, processor: EmulatedProcessor | None = None,
                  counters: ServedCounters | None = None) -> None:
-        self._family = family_of(table.plc_type).commands(table)
+        family = family_of(table.plc_type)
+        self._family = family.commands(table)
         processor = processor or EmulatedProcessor(table.plc_type)
-        self._commands: Commands = self._family.commands | served_diagnostics(
-            processor, counters)
+        self._commands: Commands = self._family.commands | _diagnostics(
+            family, processor, counters)
 
     def serve(self, command: Packet) -> Packet:
         """Return the reply to ``command``; every command has one."""
@@ -75,3 +86,49 @@ class Server:
             raise extended(error.ext_sts) from None
         except FormatError:
             raise Refusal(status.STS_ILLEGAL_COMMAND) from None
+
+
+def _diagnostics(family: Family, processor: EmulatedProcessor,
+                 counters: ServedCounters | None) -> Commands:
+    """
+    Return what executes each diagnostic command, by CMD and FNC; FormatError for a bad request.
+
+    Without ``counters`` a read of them is refused. Commands that set up a link (06/02, 04 to 06,
+    08) are not served: our settings come from a file, and must not be changed from the line.
+    """
+    commands: Commands = {
+        (CMD, ECHO): lambda reader: _echo(reader, family.max_echo),
+        (CMD, STATUS): lambda reader: _without_parameters(reader, processor.encode()),
+    }
+    if counters is not None:
+        commands[CMD, READ_COUNTERS] = lambda reader: _counters(
+            reader, family, counters.encode())
+        commands[CMD, RESET_COUNTERS] = lambda reader: _reset(reader, counters)
+    return commands
+
+
+def _echo(reader: Reader, limit: int) -> bytes:
+    data = Echo.read(reader).data
+    if len(data) > limit:
+        raise FormatError(f'an echo of {len(data)} bytes, at most {limit}')
+    return data
+
+
+def _counters(reader: Reader, family: Family, block: bytes) -> bytes:
+    request = ReadCounters.read(reader)
+    if request.size > MAX_COUNTERS:
+        raise FormatError(f'{request.size} bytes of counters, at most {MAX_COUNTERS}')
+    if request.address and not family.counters_anywhere:
+        raise FormatError(f'counters at address {request.address}; they are at 0')
+    return block[:request.size]
+
+
+def _reset(reader: Reader, counters: ServedCounters) -> bytes:
+    reader.end()
+    counters.reset()
+    return b''
+
+
+def _without_parameters(reader: Reader, reply: bytes) -> bytes:
+    reader.end()
+    return reply

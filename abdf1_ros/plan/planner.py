@@ -32,8 +32,8 @@ import math
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.families import dialect_of
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.plan.line_model import LineModel, ReadRequest
 from abdf1_ros.plan.partition import Candidate, CostModel, partition, Span
@@ -189,9 +189,10 @@ class Planner:
     def dialect(self, mapping: Mapping) -> Dialect:
         """Return how the station of a mapping is spoken to, as far as one knows."""
         processor = self.processors.get(mapping.station)
-        if processor is None or mapping.plc_type is not PlcType.SLC:
+        others = family_of(mapping.plc_type).by_processor
+        if processor is None or processor not in others:
             return mapping.dialect
-        return min(mapping.dialect, dialect_of(PlcType.SLC, processor=processor),
+        return min(mapping.dialect, others[processor],
                    key=lambda dialect: dialect.max_read(FileType.INTEGER))
 
     def _max_words(self, mapping: Mapping) -> int:

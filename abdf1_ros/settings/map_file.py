@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import Problem
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.csv_table import read_good_rows, Row, shown
@@ -107,7 +107,8 @@ def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping])
 
 def _processor(mapping: Mapping) -> Processor | None:
     """Return which SLC a mapping goes to, None for anything else."""
-    if mapping.plc_type is not PlcType.SLC or mapping.serves or mapping.station == BROADCAST:
+    has_processors = bool(family_of(mapping.plc_type).by_processor)
+    if not has_processors or mapping.serves or mapping.station == BROADCAST:
         return None
     return mapping.processor or USUAL
 

@@ -27,9 +27,8 @@ from abdf1_ros.errors import FormatError, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.families import accesses_of, parse_address
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.families import accesses_of, FAMILIES, family_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -51,7 +50,7 @@ from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 _NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)
 MAX_PERIOD = 86_400_000  # ms
-_PLC_TYPE_NAMES = tuple(entry.value for entry in PlcType)
+_PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
 
 _Choice = TypeVar('_Choice', bound=Enum)
 
@@ -252,7 +251,7 @@ class RowReader:
 
     def _plc_type(self) -> PlcType | None:
         text = self._row.get('PLC_Type')
-        kind = next((entry for entry in PlcType if entry.value == text.upper()), None)
+        kind = next((entry for entry in FAMILIES if entry.value == text.upper()), None)
         if kind is None:
             self._fault('PLC_Type', 'a MicroLogix is SLC', Message.ERR_BAD_PLC_TYPE,
                         shown(text), *_PLC_TYPE_NAMES)
@@ -280,7 +279,7 @@ class RowReader:
                    address: Address | None) -> Processor | None:
         if not self._row.get('Processor'):
             return None
-        if plc_type is not PlcType.SLC or command is Command.SERVE:
+        if not family_of(plc_type).by_processor or command is Command.SERVE:
             self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write',
                         is_superfluous=True)
             return None

@@ -30,7 +30,7 @@ from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.settings.csv_table import read_rows, shown
 from abdf1_ros.settings.station_lists import octal_remarks
 
@@ -40,7 +40,7 @@ _MODE_WORDS = {
     'halfduplex': 'Master, or Slave where another is the master', 'df1halfduplexmaster': 'Master',
     'halfduplexmaster': 'Master', 'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave'}
 POLLING_MODES = ('Message', 'Standard')
-PLC_TYPES = tuple(entry.value for entry in PlcType)
+PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 _DEVICE_SERVERS = ('socket', 'rfc2217')
 

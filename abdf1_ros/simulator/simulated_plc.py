@@ -38,9 +38,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import dialect_of, parse_address
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.link_counters import served_counters
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.settings.csv_table import read_rows, Row
@@ -305,13 +303,13 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     via = _number(row, 'Via', 1, MAX_STATION) if row.get('Via') else None
     length = _number(row, 'Length', 1, 1000) if row.get('Length') else 1
     motion = _choice(row, 'Motion', {entry.value: entry for entry in Motion})
-    plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in PlcType})
+    plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in FAMILIES})
     if station not in plcs:
         plcs[station] = SimulatedPlc(station, DataTable(plc_type), checksum, clock)
         plcs[station].via = via
     plc = plcs[station]
     _check_route(row, plc, via, plcs)
-    if plc.table.plc_type is not plc_type:
+    if plc.table.plc_type != plc_type:
         raise Problem(row.where('PLC_Type'),
                       f'station {station} is a {plc.table.plc_type.value} already')
     try:

@@ -89,7 +89,7 @@ def realistic_map(tags: int) -> list[Mapping]:
 
 def _address(file: str, element: int, plc_type: PlcType, dice: random.Random) -> str:
     if file in 'IO':
-        point = f'{element // 4 % 32:03o}/{element % 16:o}' if plc_type is PlcType.PLC5 \
+        point = f'{element // 4 % 32:03o}/{element % 16:o}' if plc_type == PlcType.PLC5 \
             else f'{element // 16 % 4 + 1}.0/{element % 16}'
         return f'{file}:{point}'
     if file[0] == 'B':

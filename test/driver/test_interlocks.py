@@ -32,6 +32,7 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.plan.interlocks import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -543,7 +544,7 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     point, guard = ReadPoint(row, 1.0, 3.0), RunGuard()
     guard.add(point)
     why_not = partial(guard.why_not, point)
-    running = Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
+    running = Identity(PlcType.SLC, 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
     assert why_not(9.0, 9.0) == 'not in RUN: its mode is not known'
     guard.told(running, 10.0)
     begun = 'it has begun to run during this read'

@@ -16,16 +16,14 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.address import BITS
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.address import AddressRangeError, AddressSyntaxError, BITS
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 
 
 def one_input(data: bytes) -> None:
     """Check that text is an address, which reads back from its own text, or is refused."""
     text = data.decode(errors='replace')
-    for plc_type in PlcType:
+    for plc_type in FAMILIES:
         try:
             address = parse_address(text, plc_type)
         except (AddressSyntaxError, AddressRangeError) as error:

@@ -25,7 +25,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from abdf1_ros.df1.frames import ACK
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.settings.columns import COLUMNS
@@ -124,7 +124,7 @@ def _simulator_csv() -> Iterable[bytes]:
     rows = (_CONFIG / 'simulator.csv').read_bytes().splitlines(keepends=True)
     head, *rows = (row for row in rows if not row.startswith(b'#'))
     yield from (b'# data\n' + head + row for row in rows)
-    for plc in PlcType:
+    for plc in FAMILIES:
         for address in _ADDRESSES:
             yield (';'.join(simulated_plc.COLUMNS) + f'\n3;{plc.value};{address};2;1 -1.5;;\n'
                    f'3;{plc.value};{address};1;;Toggle;100\n').encode()

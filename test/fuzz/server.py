@@ -20,7 +20,7 @@ from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.driver.served import Served
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import EXTENDED
@@ -94,7 +94,7 @@ class _Own:
         return bytes(self.served._table._words[self.mapping.address.area])
 
 
-_PLCS = [_Plc(plc_type) for plc_type in PlcType]
+_PLCS = [_Plc(plc_type) for plc_type in FAMILIES]
 _OWN = [_Own(plc_type) for plc_type in (PlcType.PLC5, PlcType.SLC)]
 
 

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.families import accesses_of
+from abdf1_ros.pccc.families import accesses_of, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 
@@ -30,4 +30,4 @@ def test_ways_of_a_family_the_usual_one_first(family: str, names: list[str]) -> 
 
 
 def test_every_access_belongs_to_a_family() -> None:
-    assert {way for family in PlcType for way in accesses_of(family)} == set(Access)
+    assert {way for family in FAMILIES for way in accesses_of(family)} == set(Access)

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address, Area
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area
 from abdf1_ros.pccc.families import family_of, file_types_of, layout_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from hypothesis import given
@@ -192,7 +191,7 @@ def addresses(draw: st.DrawFn) -> Address:
     layout = layout_of(kind, family)
     fixed = kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS)
     file = kind.default_file if fixed else draw(st.integers(3, 255))
-    slot = kind.is_io and family is SLC
+    slot = kind.is_io and family == SLC
     words = 256 if slot else layout.words if kind.is_structure else 1
     word = draw(st.integers(0, words - 1).filter(layout.value_words))
     bits = st.one_of(st.none(), st.integers(0, 15))
@@ -256,8 +255,9 @@ def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
     ('L', PLC5), ('BT', SLC), ('SC', SLC), ('X', PLC5), ('X', SLC)])
 def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None:
     known = ', '.join(kind.value for kind in file_types_of(family))
+    title = 'PLC-5' if family == PLC5 else 'SLC'
     with pytest.raises(AddressSyntaxError, match=(
-            f'^{family.value} has no {letters} files; file types: {known}$')):
+            f'^{title} has no {letters} files; file types: {known}$')):
         parse_address(f'{letters}9:0', family)
 
 
@@ -352,7 +352,7 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     ('L10:0/5', SLC, 'bits of an L file have no address; read L10:0 as int32 and take bit 5 '
                      'from it'),
     ('CT20:0', PLC5, 'CT files (ControlNet transfer) cannot be read or written here; file types '
-                     'of PLC5: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
+                     'of PLC-5: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
     ('PLS9:0', SLC, 'PLS files (programmable limit switch) cannot be read or written here; file '
                     'types of SLC: O, I, S, B, T, C, R, N, F, ST, A, D, L, PD, MG')])
 def test_what_is_not_supported_is_refused_with_what_would_be_right(

@@ -22,8 +22,8 @@ from typing import Any
 from abdf1_ros.counters import Counters
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.emulated import EmulatedProcessor
+from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.slc import commands as slc

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import diagnostics
-from abdf1_ros.pccc.diagnostics import Echo, max_echo, ReadCounters
+from abdf1_ros.pccc.diagnostics import Echo, ReadCounters
+from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
@@ -67,4 +68,4 @@ def test_read_counters_of_another_length_is_refused(data: bytes) -> None:
 
 
 def test_slc_echoes_less() -> None:
-    assert [max_echo(kind) for kind in (PlcType.SLC, PlcType.PLC5)] == [236, 243]
+    assert [family_of(kind).max_echo for kind in (PlcType.SLC, PlcType.PLC5)] == [236, 243]

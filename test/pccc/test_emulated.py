@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 from support.vectors import pair

@@ -31,9 +31,14 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.families import accesses_of, dialect_of, parse_address
+from abdf1_ros.pccc.families import (
+    accesses_of,
+    dialect_of,
+    FAMILIES,
+    parse_address,
+    served_counters,
+)
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.link_counters import served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 import pytest
@@ -159,15 +164,15 @@ def test_our_end_takes_a_refusal_for_one(entry: Exchange) -> None:
     assert raised.value.ext_sts == (entry.reply.data[0] if entry.reply.data else None)
 
 
-@pytest.mark.parametrize('family', PlcType)
+@pytest.mark.parametrize('family', FAMILIES)
 def test_no_command_that_a_family_serves_is_left_out(family: PlcType) -> None:
     _, server = plc(family, {})
     served = {(cmd, None) for cmd in server._family.basic_commands} | set(server._commands)
-    assert {entry.code for entry in EXCHANGES if entry.family is family} == served
+    assert {entry.code for entry in EXCHANGES if entry.family == family} == served
 
 
 def test_no_request_that_a_dialect_makes_is_left_out() -> None:
-    ways = [(family, access) for family in PlcType for access in accesses_of(family)]
+    ways = [(family, access) for family in FAMILIES for access in accesses_of(family)]
     methods = {(*way, method) for way in ways for method in ('read', 'write', 'write_bits')
                if method != 'write_bits' or dialect_of(*way).writes_bits}
     assert {(entry.call.plc_type, entry.call.access, entry.call.method)
@@ -183,4 +188,4 @@ def test_other_bits_of_cmd_make_another_command(bit: int) -> None:
 
 
 def test_every_family_refuses_once() -> None:
-    assert {entry.family for entry in EXCHANGES if entry.reply.sts} == set(PlcType)
+    assert {entry.family for entry in EXCHANGES if entry.reply.sts} == set(FAMILIES)

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.families import file_types_of, layout_of
+from abdf1_ros.pccc.families import FAMILIES, file_types_of, layout_of
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
-from abdf1_ros.pccc.slc.files import BY_CODE
+from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
@@ -65,7 +65,7 @@ def test_kinds_of_files() -> None:
     assert {kind.value for kind in FileType if not kind.has_bits} == {'F', 'ST', 'L'}
 
 
-@pytest.mark.parametrize('family', PlcType)
+@pytest.mark.parametrize('family', FAMILIES)
 def test_members_are_those_of_structures_and_lie_inside(family: PlcType) -> None:
     for kind in file_types_of(family):
         layout = layout_of(kind, family)
@@ -74,7 +74,7 @@ def test_members_are_those_of_structures_and_lie_inside(family: PlcType) -> None
         assert max(ends, default=0) <= layout.words
 
 
-@pytest.mark.parametrize('family', PlcType)
+@pytest.mark.parametrize('family', FAMILIES)
 def test_members_do_not_share_bits_or_words(family: PlcType) -> None:
     for kind in file_types_of(family):
         members = layout_of(kind, family).members.values()
@@ -92,7 +92,7 @@ def test_value_words_tell_floats_and_their_halves_from_words() -> None:
     assert {layout_of(FileType.PID, SLC).value_words(word) for word in range(23)} == {1}
 
 
-@pytest.mark.parametrize('family', PlcType)
+@pytest.mark.parametrize('family', FAMILIES)
 def test_whole_control_words_are_never_written(family: PlcType) -> None:
     for kind in file_types_of(family):
         layout = layout_of(kind, family)

@@ -17,13 +17,15 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.diagnostics import ReadCounters
+from abdf1_ros.pccc.families import decode_identity
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
-from abdf1_ros.pccc.link_counters import counter_request
-from abdf1_ros.pccc.plc5 import identity as plc5
+from abdf1_ros.pccc.link_counters import CounterLayout
+from abdf1_ros.pccc.plc5.identity import COUNTERS
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc.faults import major_error
+from abdf1_ros.pccc.slc.identity import FULL_DUPLEX_COUNTERS, ML1000_COUNTERS, SLAVE_COUNTERS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -45,15 +47,17 @@ def test_slc_of_the_vectors() -> None:
     identity = decode_identity(pair('diag_status_slc504')[1].data)
     assert str(identity) == 'SLC 5/04 series B revision 3, RUN'
     assert identity == Identity(
-        'SLC', 'SLC 5/04', 'B', '3', Mode.RUN, 'RUN', name='5/04', program_id=0x1234,
-        memory='32 K', interface=0x34, processor=Processor.SLC_5_04)
+        PlcType.SLC, 'SLC 5/04', 'B', '3', Mode.RUN, 'RUN', name='5/04', program_id=0x1234,
+        memory='32 K', interface=0x34, processor=Processor.SLC_5_04,
+        counter_layout=FULL_DUPLEX_COUNTERS)
     assert identity.is_running
 
 
 def test_plc5_of_the_vectors() -> None:
     identity = decode_identity(PLC5)
     assert str(identity) == 'PLC-5/40 series C revision C, REM RUN'
-    assert (identity.family, identity.is_running, identity.memory) == ('PLC-5', True, '98304')
+    assert (identity.plc_type, identity.memory) == (PlcType.PLC5, '98304')
+    assert identity.is_running
     assert (identity.faults, identity.remarks) == ((), ())
 
 
@@ -140,7 +144,8 @@ def test_name_of_an_slc_counts_more_than_its_code(
         code: int, name: bytes, model: str, processor: Processor | None,
         remarks: tuple[str, ...]) -> None:
     identity = decode_identity(SLC[:3] + bytes((code,)) + SLC[4:5] + name + SLC[16:])
-    assert (identity.family, identity.model, identity.remarks) == ('SLC', model, remarks)
+    assert (identity.plc_type, identity.model, identity.remarks) == (
+        PlcType.SLC, model, remarks)
     assert identity.processor is processor
 
 
@@ -196,16 +201,16 @@ def test_old_plc5_ends_with_the_byte_about_its_ram(start: str, model: str) -> No
 
 
 def test_fault_of_a_plc5_is_asked_for_and_named() -> None:
-    assert plc5.fault_request(changed(PLC5, byte1=0x06)) is None
-    identity = changed(PLC5, byte1=0x0A, byte18=1)
-    assert plc5.fault_request(identity) == (
-        0x0F, bytes.fromhex('68 00 00 02 00 06 02 0B 02 00'))
-    known = plc5.with_fault(identity, bytes.fromhex('95 09 42 84 01 58 00'))
+    assert changed(PLC5, byte1=0x06).inquiry is None
+    inquiry = changed(PLC5, byte1=0x0A, byte18=1).inquiry
+    assert inquiry is not None
+    assert inquiry.request == (0x0F, bytes.fromhex('68 00 00 02 00 06 02 0B 02 00'))
+    known = inquiry.answered(bytes.fromhex('95 09 42 84 01 58 00'))
     assert known.faults == (
         'major processor fault: programming error, the program jumped to the fault routine, '
         'watchdog; fault code 88 (S:12)', 'bad RAM')
-    assert plc5.fault_request(known) is None
-    assert plc5.with_fault(identity, bytes.fromhex('95 09 42 00 00 00 00')).faults[0] == \
+    assert known.inquiry is None
+    assert inquiry.answered(bytes.fromhex('95 09 42 00 00 00 00')).faults[0] == \
         'major processor fault: S:11 is 0; fault code 0 (S:12)'
 
 
@@ -213,7 +218,7 @@ def test_plc3() -> None:
     data = bytes((0x02, 0x47, 0x10, 0, 0, 0, 0x34, 0x12, 0x41)) + bytes(9)
     identity = decode_identity(data)
     assert str(identity) == 'PLC-3 series C revision B, RUN'
-    assert (identity.family, identity.counter_address) == ('PLC-3', 0x1234)
+    assert (identity.plc_type, identity.counter_address) == (PlcType.PLC3, 0x1234)
     assert changed(data, byte1=0x38).faults == ('major processor fault', 'shutdown in effect')
     assert changed(data, byte1=0x38).remarks == ('shutdown requested',)
 
@@ -222,7 +227,7 @@ def test_module_of_a_plc2() -> None:
     data = bytes((0x05, 0x74, 0, 0, 0, 0, 0x44, 0x41, 0x20, 0))
     identity = decode_identity(data)
     assert str(identity) == 'PLC-2/30 at 1771-KG series B revision A, REM TEST'
-    assert (identity.family, identity.counter_address) == ('PLC-2', 0x4144)
+    assert (identity.plc_type, identity.counter_address) == (PlcType.PLC2, 0x4144)
     bad = changed(data, byte1=0x38)
     assert bad.faults == ('no communication between module and processor',
                           'communication zone of the program has a wrong format')
@@ -243,8 +248,8 @@ def test_gateway_has_no_mode() -> None:
      0x4144)])  # M 10-15
 def test_gateway_without_a_name(data: str, text: str, counters: int) -> None:
     identity = decode_identity(bytes.fromhex(data))
-    assert (identity.family, str(identity)) == ('', text)
-    assert counter_request(identity) == ReadCounters(counters, 55)
+    assert (identity.plc_type, str(identity)) == (None, text)
+    assert identity.counters == ReadCounters(counters, 55)
 
 
 @pytest.mark.parametrize(('data', 'model', 'counters'), [
@@ -255,7 +260,7 @@ def test_gateway_without_a_name(data: str, text: str, counters: int) -> None:
 def test_1785_ka3_may_have_an_expansion_byte(data: str, model: str, counters: int) -> None:
     identity = decode_identity(bytes.fromhex(data))
     assert str(identity) == f'{model} series B revision B, RUN'
-    assert (identity.family, identity.counter_address) == ('PLC-2', counters)
+    assert (identity.plc_type, identity.counter_address) == (PlcType.PLC2, counters)
 
 
 @pytest.mark.parametrize(('kind', 'name', 'counters'), [
@@ -264,7 +269,7 @@ def test_gateway_with_a_name(kind: int, name: str, counters: ReadCounters) -> No
     data = bytes((0, 0xFE, kind, 0, 0)) + name.encode().ljust(9, b'\0') + b'xx' + bytes(8)
     identity = decode_identity(data)
     assert (str(identity), identity.is_running) == (f'{name} series A revision 1', None)
-    assert counter_request(identity) == counters
+    assert identity.counters == counters
 
 
 def test_1785_ka5_that_is_asked_over_dh485_has_its_name() -> None:
@@ -316,3 +321,15 @@ def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
 def test_models_of_the_vectors(name: str, model: str) -> None:
     reply = vector(f'diag_status_{name}_rep_fd_crc').packet
     assert decode_identity(reply.data).model == model
+
+
+@pytest.mark.parametrize(('data', 'layout', 'asked'), [
+    (SLC, FULL_DUPLEX_COUNTERS, ReadCounters(0, 26)),
+    (SLC[:2] + b'\x36' + SLC[3:], SLAVE_COUNTERS, ReadCounters(0, 26)),
+    (SLC[:3] + b'\x58\0' + b'1761'.ljust(11) + SLC[16:], ML1000_COUNTERS, ReadCounters(0, 22)),
+    (PLC5, COUNTERS, ReadCounters(0, 26))])
+def test_what_tells_about_the_counters(data: bytes, layout: CounterLayout,
+                                       asked: ReadCounters) -> None:
+    identity = decode_identity(data)
+    assert (identity.counter_layout, identity.counters) == (layout, asked)
+    assert Identity(None, '').counters == ReadCounters(0, 55)

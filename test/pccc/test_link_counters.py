@@ -18,21 +18,25 @@ from __future__ import annotations
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.diagnostics import ReadCounters
+from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import (
-    counter_request,
     CounterLayout,
     decode_counters,
-    layout_of,
-    served_counters,
     ServedCounters,
 )
-from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.plc5.identity import COUNTERS
+from abdf1_ros.pccc.slc.identity import (
+    FULL_DUPLEX_COUNTERS,
+    MASTER_COUNTERS,
+    ML1000_COUNTERS,
+    SLAVE_COUNTERS,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+
+LAYOUTS = (COUNTERS, FULL_DUPLEX_COUNTERS, MASTER_COUNTERS, SLAVE_COUNTERS, ML1000_COUNTERS)
 
 
 def words(count: int) -> bytes:
@@ -41,30 +45,30 @@ def words(count: int) -> bytes:
 
 
 @pytest.mark.parametrize(('layout', 'expected'), [
-    (CounterLayout.SLC_FULL_DUPLEX, {
+    (FULL_DUPLEX_COUNTERS, {
         'modem lines': 'DSR', 'messages sent': '101', 'messages received': '102',
         'messages undelivered': '103', 'ENQ sent': '104', 'NAK received': '105',
         'ENQ received': '106', 'bad messages received': '107',
         'messages refused for lack of memory': '108', 'duplicate messages received': '109',
         'carrier recovered': '111', 'modem lost': '112'}),
-    (CounterLayout.SLC_MASTER, {
+    (MASTER_COUNTERS, {
         'modem lines': 'DSR', 'messages sent': '101', 'messages received': '102',
         'messages undelivered': '103', 'messages sent again': '104',
         'last normal scan (100 ms)': '105', 'longest normal scan (100 ms)': '106',
         'bad messages received': '107', 'duplicate messages received': '109',
         'last priority scan (100 ms)': '110', 'carrier recovered': '111', 'modem lost': '112',
         'longest priority scan (100 ms)': '113'}),
-    (CounterLayout.SLC_SLAVE, {
+    (SLAVE_COUNTERS, {
         'modem lines': 'DSR', 'messages sent': '101', 'messages received': '102',
         'messages undelivered': '103', 'messages sent again': '104', 'polls received': '106',
         'bad messages received': '107', 'messages refused for lack of memory': '108',
         'duplicate messages received': '109', 'carrier recovered': '111', 'modem lost': '112'}),
-    (CounterLayout.MICROLOGIX_1000, {
+    (ML1000_COUNTERS, {
         'messages sent': '101', 'messages received': '102', 'messages undelivered': '103',
         'ENQ sent': '104', 'NAK received': '105', 'ENQ received': '106',
         'bad messages received': '107', 'messages refused for lack of memory': '108',
         'duplicate messages received': '109', 'framing errors': '110'}),
-    (CounterLayout.PLC5, {
+    (COUNTERS, {
         'modem lines': 'DSR', 'messages sent': '101', 'messages received': '102',
         'messages undelivered': '103', 'ENQ sent, or messages sent again': '104',
         'NAK received': '105', 'ENQ received': '106', 'bad messages received': '107',
@@ -76,13 +80,13 @@ def test_names_of_the_words(layout: CounterLayout, expected: dict[str, str]) -> 
 
 
 def test_modem_lines() -> None:
-    assert decode_counters(b'\x1F\0', CounterLayout.PLC5) == {'modem lines': 'CTS RTS DSR DCD DTR'}
-    assert decode_counters(b'\0\0', CounterLayout.PLC5) == {'modem lines': 'none on'}
+    assert decode_counters(b'\x1F\0', COUNTERS) == {'modem lines': 'CTS RTS DSR DCD DTR'}
+    assert decode_counters(b'\0\0', COUNTERS) == {'modem lines': 'none on'}
 
 
 def test_reply_may_have_fewer_or_more_words() -> None:
-    assert decode_counters(words(2), CounterLayout.MICROLOGIX_1000) == {'messages sent': '101'}
-    more = decode_counters(words(15), CounterLayout.SLC_FULL_DUPLEX)
+    assert decode_counters(words(2), ML1000_COUNTERS) == {'messages sent': '101'}
+    more = decode_counters(words(15), FULL_DUPLEX_COUNTERS)
     assert (more['word 13'], more['word 14']) == ('113', '114')
 
 
@@ -93,10 +97,10 @@ def test_counters_of_an_unknown_processor_are_bytes() -> None:
 @pytest.mark.parametrize('data', [b'', b'\0', bytes(25)])
 def test_half_a_word_is_no_counter(data: bytes) -> None:
     with pytest.raises(FormatError):
-        decode_counters(data, CounterLayout.SLC_SLAVE)
+        decode_counters(data, SLAVE_COUNTERS)
 
 
-@given(data=st.binary(max_size=60), layout=st.sampled_from([None, *CounterLayout]))
+@given(data=st.binary(max_size=60), layout=st.sampled_from([None, *LAYOUTS]))
 def test_any_bytes_are_counters_or_a_format_error(data: bytes,
                                                   layout: CounterLayout | None) -> None:
     try:
@@ -107,22 +111,6 @@ def test_any_bytes_are_counters_or_a_format_error(data: bytes,
     assert all(name and value for name, value in counters.items())
 
 
-@pytest.mark.parametrize(('identity', 'layout', 'request_'), [
-    (Identity('SLC', 'SLC 5/03', interface=0x34), CounterLayout.SLC_FULL_DUPLEX,
-     ReadCounters(0, 26)),
-    (Identity('SLC', 'SLC 5/03', interface=0x36), CounterLayout.SLC_SLAVE, ReadCounters(0, 26)),
-    (Identity('SLC', 'MicroLogix 1000', interface=0x34, processor=Processor.ML1000),
-     CounterLayout.MICROLOGIX_1000,
-     ReadCounters(0, 22)),
-    (Identity('PLC-5', 'PLC-5/40'), CounterLayout.PLC5, ReadCounters(0, 26)),
-    (Identity('PLC-2', 'PLC-2', counter_address=0x4144), None, ReadCounters(0x4144, 55)),
-    (None, None, ReadCounters(0, 55))])
-def test_what_to_ask_whom(identity: Identity | None, layout: CounterLayout | None,
-                          request_: ReadCounters) -> None:
-    assert layout_of(identity) is layout
-    assert counter_request(identity) == request_
-
-
 def test_own_counters_under_the_names_of_the_layout() -> None:
     counters = Counters(
         messages_sent=1, messages_received=2, nak_limit_exceeded=3, enq_limit_exceeded=4,
@@ -130,32 +118,32 @@ def test_own_counters_under_the_names_of_the_layout() -> None:
         crc_errors=10, invalid_messages=11, naks_sent=12, duplicate_messages=13,
         enqs_received=14, refused_for_memory=15)
     shown = {layout: decode_counters(ServedCounters(counters, layout).encode(), layout)
-             for layout in CounterLayout}
-    assert shown[CounterLayout.SLC_SLAVE]['messages sent again'] == '6'
-    assert shown[CounterLayout.SLC_SLAVE]['polls received'] == '8'
-    assert shown[CounterLayout.SLC_FULL_DUPLEX]['ENQ sent'] == '5'
-    assert shown[CounterLayout.SLC_FULL_DUPLEX]['ENQ received'] == '14'
-    assert shown[CounterLayout.SLC_FULL_DUPLEX]['messages refused for lack of memory'] == '15'
-    assert shown[CounterLayout.SLC_SLAVE]['messages refused for lack of memory'] == '15'
-    assert shown[CounterLayout.PLC5]['ENQ received'] == '14'
-    assert shown[CounterLayout.PLC5]['ENQ sent, or messages sent again'] == '11'
-    assert shown[CounterLayout.PLC5]['NAK sent'] == '12'
+             for layout in LAYOUTS}
+    assert shown[SLAVE_COUNTERS]['messages sent again'] == '6'
+    assert shown[SLAVE_COUNTERS]['polls received'] == '8'
+    assert shown[FULL_DUPLEX_COUNTERS]['ENQ sent'] == '5'
+    assert shown[FULL_DUPLEX_COUNTERS]['ENQ received'] == '14'
+    assert shown[FULL_DUPLEX_COUNTERS]['messages refused for lack of memory'] == '15'
+    assert shown[SLAVE_COUNTERS]['messages refused for lack of memory'] == '15'
+    assert shown[COUNTERS]['ENQ received'] == '14'
+    assert shown[COUNTERS]['ENQ sent, or messages sent again'] == '11'
+    assert shown[COUNTERS]['NAK sent'] == '12'
     for counts in shown.values():
         assert (counts['messages sent'], counts['messages received']) == ('1', '2')
         assert (counts['messages undelivered'], counts['bad messages received']) == ('7', '30')
         assert counts['duplicate messages received'] == '13'
-    for layout in (CounterLayout.SLC_FULL_DUPLEX, CounterLayout.PLC5,
-                   CounterLayout.MICROLOGIX_1000):
+    for layout in (FULL_DUPLEX_COUNTERS, COUNTERS,
+                   ML1000_COUNTERS):
         assert shown[layout]['NAK received'] == '7'
 
 
 def test_own_counters_begin_again_behind_16_bits() -> None:
     counters = Counters(messages_sent=0x1_0003)
-    served = ServedCounters(counters, CounterLayout.PLC5)
-    assert decode_counters(served.encode(), CounterLayout.PLC5)['messages sent'] == '3'
+    served = ServedCounters(counters, COUNTERS)
+    assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '3'
     served.reset()
     counters.messages_sent += 0x1_0001
-    assert decode_counters(served.encode(), CounterLayout.PLC5)['messages sent'] == '1'
+    assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '1'
 
 
 @pytest.mark.parametrize(('plc_type', 'full_duplex', 'master', 'size'), [
@@ -169,7 +157,7 @@ def test_block_by_family_and_role(plc_type: PlcType, full_duplex: bool, master: 
     assert served is not None
     block = served.encode()
     assert len(block) == size
-    expected = 3 if plc_type is PlcType.PLC5 else 1 if full_duplex else 2
+    expected = 3 if plc_type == PlcType.PLC5 else 1 if full_duplex else 2
     assert block[8:10] == bytes((expected, 0))
 
 

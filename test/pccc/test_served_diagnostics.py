@@ -19,13 +19,15 @@ from __future__ import annotations
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.diagnostic_status import decode_identity
-from abdf1_ros.pccc.diagnostics import max_echo, ReadCounters, STATUS_REQUEST
+from abdf1_ros.pccc.diagnostics import ReadCounters, STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import decode_identity, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
-from abdf1_ros.pccc.link_counters import CounterLayout, ServedCounters
+from abdf1_ros.pccc.link_counters import ServedCounters
+from abdf1_ros.pccc.plc5.identity import COUNTERS
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.slc.identity import SLAVE_COUNTERS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -52,15 +54,15 @@ def counters() -> Counters:
     return Counters(messages_sent=300, messages_received=2, polls_received=70_000)
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
+@pytest.mark.parametrize('plc_type', FAMILIES)
 def test_echo_up_to_the_limit_of_the_family(plc_type: PlcType) -> None:
-    limit = max_echo(plc_type)
+    limit = FAMILIES[plc_type].max_echo
     for data in (b'', b'\0', b'\x10\x10\x02\x03', bytes(limit)):
         assert answer(plc_type, b'\0' + data) == reply(data)
     assert answer(plc_type, bytes(limit + 2)) == reply(sts=REFUSED)
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
+@pytest.mark.parametrize('plc_type', FAMILIES)
 def test_echo_of_the_vectors(plc_type: PlcType) -> None:
     command, expected = pair('diag_echo')
     assert Server(DataTable(plc_type)).serve(command) == expected
@@ -71,7 +73,7 @@ def test_echo_of_anything(data: bytes) -> None:
     assert answer(PlcType.SLC, b'\0' + data).data == data
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
+@pytest.mark.parametrize('plc_type', FAMILIES)
 def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> None:
     processor = EmulatedProcessor(plc_type)
     server = Server(DataTable(plc_type), processor)
@@ -82,7 +84,7 @@ def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> Non
 
 
 def test_slc_counters_are_at_address_0(counters: Counters) -> None:
-    served = ServedCounters(counters, CounterLayout.SLC_SLAVE)
+    served = ServedCounters(counters, SLAVE_COUNTERS)
     block = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
     assert block == reply(served.encode())
     assert block.data[2:6] == b'\x2C\x01\x02\x00'
@@ -91,14 +93,14 @@ def test_slc_counters_are_at_address_0(counters: Counters) -> None:
 
 
 def test_plc5_ignores_the_address_of_counters(counters: Counters) -> None:
-    served = ServedCounters(counters, CounterLayout.PLC5)
+    served = ServedCounters(counters, COUNTERS)
     assert answer(PlcType.PLC5, ReadCounters(0x1234, 244).encode(), served) == reply(
         served.encode())
     assert answer(PlcType.PLC5, ReadCounters(0, 245).encode(), served) == reply(sts=REFUSED)
 
 
 def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None:
-    served = ServedCounters(counters, CounterLayout.SLC_SLAVE)
+    served = ServedCounters(counters, SLAVE_COUNTERS)
     before = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
     assert answer(PlcType.SLC, b'\7' + b'\1', served) == reply(sts=REFUSED)
     assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == before != reply(bytes(26))
@@ -109,21 +111,21 @@ def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None
     assert answer(PlcType.SLC, ReadCounters(0, 4).encode(), served) == reply(b'\0\0\5\0')
 
 
-@for_all('plc_type', PlcType)
+@for_all('plc_type', FAMILIES)
 @for_all('data', [
     b'', b'\x01\0\0\x10', b'\x03\x01', b'\x07', b'\x08\x80\0', b'\x09\0\0\x01', b'\xFF'])
 def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
     assert answer(plc_type, data) == reply(sts=REFUSED)
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
+@pytest.mark.parametrize('plc_type', FAMILIES)
 @pytest.mark.parametrize('name', ['setvars', 'set_timeout', 'set_naks', 'set_enqs'])
 def test_nobody_sets_up_our_link_from_the_line(plc_type: PlcType, name: str) -> None:
     command = pair(f'diag_{name}')[0]
     assert Server(DataTable(plc_type)).serve(command) == command.reply(sts=REFUSED)
 
 
-@for_all('plc_type', PlcType)
+@for_all('plc_type', FAMILIES)
 @for_all(('cmd', 'data'), [
     (0x0F, b'\x3A\0'), (0x0F, b'\x3A\x02'), (0x0F, b'\x80\x01'), (0x0F, b'\x80\x06'),
     (0x0F, b'\x41'), (0x0F, b'\x11'), (0x0F, b'\x07'), (0x07, b'\0'), (0x07, b'\x03')])

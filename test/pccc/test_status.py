@@ -18,9 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
-from abdf1_ros.pccc.plc2 import status as plc2
-from abdf1_ros.pccc.plc3 import status as plc3
-from abdf1_ros.pccc.slc import status as slc
+from abdf1_ros.pccc import plc2, plc3, slc
 from abdf1_ros.pccc.status import (
     check_status,
     is_address_fault,

@@ -24,6 +24,7 @@ import time
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.link_thread import LinkThread
@@ -45,17 +46,17 @@ from support.ros import details, Inbox, Observer, OK, Process, until_status, WAR
 from support.simulator_process import Files, make_files
 
 NOW = 1000.0
-SLC = Identity('SLC', 'SLC 5/03', 'B', '3', Mode.REMOTE_RUN, 'REM RUN')
+SLC = Identity(PlcType.SLC, 'SLC 5/03', 'B', '3', Mode.REMOTE_RUN, 'REM RUN')
 
 
 def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
     """Return an SLC in that mode."""
-    return Identity('SLC', 'SLC 5/03', 'B', '3', mode, text, faults)
+    return Identity(PlcType.SLC, 'SLC 5/03', 'B', '3', mode, text, faults)
 
 
 @pytest.mark.parametrize(('identity', 'text'), [
     (None, None), (SLC, None), (with_mode(Mode.RUN, 'RUN'), None),
-    (with_mode(None, 'mode 0x05'), None), (Identity('', '1770-KF2'), None),
+    (with_mode(None, 'mode 0x05'), None), (Identity(None, '1770-KF2'), None),
     (with_mode(Mode.REMOTE_PROGRAM, 'REM PROG'), 'in program mode (REM PROG)'),
     (with_mode(Mode.REMOTE_TEST_SCAN, 'REM TEST, single scan'),
      'in test mode (REM TEST, single scan)'),
@@ -67,7 +68,7 @@ def test_what_keeps_a_processor_from_its_work(identity: Identity | None,
     assert processor_fault(identity) == text
 
 
-PLC5 = Identity('PLC-5', 'PLC-5/40')
+PLC5 = Identity(PlcType.PLC5, 'PLC-5/40')
 LEVEL = make_mapping('N7:0', plc='SLC', item=6)
 
 
@@ -75,7 +76,7 @@ LEVEL = make_mapping('N7:0', plc='SLC', item=6)
     (PLC5, [LEVEL], 'station 1 is a PLC-5/40, map.csv:7 says SLC'), (SLC, [LEVEL], None),
     (SLC, [LEVEL, make_mapping('N7:0', plc='PLC5', item=2)],
      'station 1 is an SLC 5/03, map.csv:3 says PLC5'),
-    (PLC5, [make_mapping('020', plc='PLC2')], None), (Identity('', '1770-KF2'), [LEVEL], None),
+    (PLC5, [make_mapping('020', plc='PLC2')], None), (Identity(None, '1770-KF2'), [LEVEL], None),
     (None, [LEVEL], None), (PLC5, [], None),
     (replace(SLC, processor=Processor.SLC_5_03), [LEVEL], None),
     (replace(SLC, processor=Processor.SLC_5_03),
@@ -93,7 +94,7 @@ def test_values_before_anything_is_known() -> None:
 
 
 def test_values_of_a_processor() -> None:
-    identity = Identity('SLC', 'SLC 5/03', 'B', '3', Mode.RUN, 'RUN', ('halted',),
+    identity = Identity(PlcType.SLC, 'SLC 5/03', 'B', '3', Mode.RUN, 'RUN', ('halted',),
                         ('forces active', 'testing edits'))
     health = StationHealth(str(identity), identity, NOW - 2.5, {'messages sent': '7'})
     assert health_values(health, NOW) == {
@@ -105,7 +106,7 @@ def test_values_without_faults_and_without_counters() -> None:
     health = StationHealth(str(SLC), SLC, NOW, no_counters='STS 10: illegal')
     values = health_values(health, NOW)
     assert (values['faults'], values['link counters']) == ('none', 'STS 10: illegal')
-    gateway = Identity('', '1770-KF2')
+    gateway = Identity(None, '1770-KF2')
     assert health_values(StationHealth('x', gateway, NOW), NOW)['mode'] == 'none (0.0 s ago)'
 
 

@@ -20,7 +20,7 @@ from enum import Enum
 import re
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.families import accesses_of
+from abdf1_ros.pccc.families import accesses_of, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
@@ -46,7 +46,7 @@ def test_every_column_is_there_once_and_described() -> None:
 
 @pytest.mark.parametrize(('name', 'choices'), [
     ('Command', Command), ('Publish', Publish), ('Type', ValueType), ('Word_Order', WordOrder),
-    ('PLC_Type', PlcType), ('Access', Access), ('Processor', Processor)])
+    ('PLC_Type', FAMILIES), ('Access', Access), ('Processor', Processor)])
 def test_every_choice_is_named(name: str, choices: type[Enum]) -> None:
     words = set(re.findall(r'[\w/]+', BY_NAME[name].description))
     named = {choice.value for choice in choices}

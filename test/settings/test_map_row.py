@@ -105,7 +105,7 @@ def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
      '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (N7); an element '
      'is missing, as in N7:0'),
     ('Address', 'L10:0',
-     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (L10:0); PLC5 '
+     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (L10:0); PLC-5 '
      'has no L files; file types: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
     ('Address', 'N7:1000',
      '2:3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:1000, len=1);'

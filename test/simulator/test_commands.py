@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
-from abdf1_ros.pccc.diagnostic_status import decode_identity
 from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.commands import CommandError, execute
 from abdf1_ros.simulator.ladder import Ladder

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.families import file_types_of, parse_address
+from abdf1_ros.pccc.families import FAMILIES, file_types_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.values import types_of
 import pytest
@@ -31,7 +31,7 @@ def rows(text: str) -> list[list[str]]:
             for line in text.splitlines()[2:]]
 
 
-@pytest.mark.parametrize('plc_type', PlcType)
+@pytest.mark.parametrize('plc_type', FAMILIES)
 def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
     shown = {parse_address(examples[plc_type], plc_type).file_type
              for _, examples in tables.PLACES if plc_type in examples}

@@ -88,7 +88,7 @@ def find_files(session: Session, station: int, plc_type: PlcType, numbers: Seque
 
 def _type_of(session: Session, station: int, plc_type: PlcType, number: int) -> FileType | None:
     """Return the type of a file, None where there is none of a type that we can read."""
-    if plc_type is PlcType.PLC5:
+    if plc_type == PlcType.PLC5:
         return _type_by_reply(session, station, number)
     addressing = family_of(plc_type).addressing
     usual = _USUAL.get(number)
@@ -156,7 +156,7 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
         kind = entry.type
         if kind.is_io:
             yield (f'# {entry}: inputs and outputs are addressed by '
-                   f'{"rack and group" if plc_type is PlcType.PLC5 else "slot"}')
+                   f'{"rack and group" if plc_type == PlcType.PLC5 else "slot"}')
             continue
         per_element = layout_of(kind, plc_type).words
         packet = dialect_of(plc_type).max_read(kind)

@@ -24,7 +24,7 @@ from abdf1_ros.cli.plc.line import DEFAULTS, MODES
 from abdf1_ros.cli.terminal import command_parser
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.network import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
@@ -145,7 +145,7 @@ def _complete_files(found: argparse.ArgumentParser) -> None:
     _add_station(found)
     found.add_argument('--files', metavar='LIST', type=_stations, default=tuple(range(32)),
                        help='numbers to look for, up to 254 (default: 0-31)')
-    found.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in PlcType],
+    found.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
                        help='default: the PLC is asked what it is')
     found.add_argument('--map', action='store_true', help='print rows for a map CSV')
 
@@ -203,7 +203,7 @@ def _add_data_options(parser: argparse.ArgumentParser,
     group.add_argument('--station', metavar='N', type=_station,
                        help=f'address of the PLC {note}')
     group.add_argument('--plc-type', type=str.upper,
-                       choices=[kind.value for kind in PlcType],
+                       choices=[kind.value for kind in FAMILIES],
                        help='default: the PLC is asked what it is')
     group.add_argument('--type', choices=[kind.value for kind in ValueType],
                        help='default: what is natural for the file')

@@ -13,3 +13,29 @@
 # limitations under the License.
 
 """The PLC-2: addresses, commands, what we say to it and what it answers."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.family import Family
+from abdf1_ros.pccc.plc2 import identity
+from abdf1_ros.pccc.plc2.address import ADDRESSING
+from abdf1_ros.pccc.plc2.describe import DESCRIBED
+from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
+from abdf1_ros.pccc.plc2.server import Plc2Commands
+from abdf1_ros.pccc.status import Meanings
+
+# What STS mean that a PLC-2's module sends (M 8-5).
+MEANINGS = Meanings(sts={
+    0x20: 'the PLC has found errors when it verified a command',
+    0x30: 'somebody has to look after the PLC: switch, cable or fault',
+    0x40: 'error between module and PLC',
+    0x50: 'address outside the data table or the window, or no compatibility file',
+    0x60: 'function disabled by a switch of the module',
+    0x80: 'protected commands are inhibited'})
+
+FAMILY = Family(
+    ADDRESSING,
+    {way: Plc2Dialect(way) for way in (Access.UNPROTECTED, Access.PROTECTED, Access.CIF)},
+    Plc2Commands, identity.decode, identity.encode, DESCRIBED, MEANINGS,
+    is_spoken_by_all=True)

@@ -27,10 +27,11 @@ from __future__ import annotations
 import re
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address, Addressing
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc2.files import FILES
+from abdf1_ros.pccc.address import Address, Addressing, AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+
+# The data table of a PLC-2: one stretch of words, which counts as a file of type B.
+FILES = {FileType.BINARY: Layout()}
 
 _LAST_WORD = 0o77777  # the byte address has 16 bits
 _LAST_BIT = 0o17

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
 
 KG = 0x14  # byte 2: a 1771-KG (4) of a PLC-2 (1)
@@ -50,12 +51,12 @@ def decode(data: bytes) -> Identity | None:
         return None
     address, series = word_at(rest, 4), letters(rest[6])
     if processor == 'computer':
-        return Identity('', module, *series, interface=data[1], counter_address=address)
+        return Identity(None, module, *series, interface=data[1], counter_address=address)
     mode, mode_text = mode_of(MODES, data[0] & 0x07)
     faults = named({'no communication between module and processor': data[0] & MODULE_ALONE,
                     'communication zone of the program has a wrong format': data[0] & 0x20})
     remarks = named({'download or upload in progress': data[0] & 0x10})
-    return Identity('PLC-2', f'{processor} at {module}', *series, mode, mode_text, faults,
+    return Identity(PlcType.PLC2, f'{processor} at {module}', *series, mode, mode_text, faults,
                     remarks, interface=data[1], counter_address=address)
 
 

@@ -27,7 +27,7 @@ from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2 import commands as plc2
 from abdf1_ros.pccc.plc2.address import ADDRESSING
 from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite
@@ -43,14 +43,20 @@ class Window:
 
 
 class BasicService:
-    """Execute commands without FNC; ``window`` gives the words for the SRC of a command."""
+    """
+    Execute commands without FNC; ``window`` gives the words for the SRC of a command.
+
+    Only an SLC ``takes_odd`` numbers of bytes (M 7-31..7-40).
+    """
 
     def __init__(self, table: DataTable, window: Callable[[int], Window],
-                 max_read: int = plc2.MAX_READ, max_write: int = plc2.MAX_SERVED_WRITE) -> None:
+                 max_read: int = plc2.MAX_READ, max_write: int = plc2.MAX_SERVED_WRITE,
+                 takes_odd: bool = False) -> None:
         self._table = table
         self._window = window
         self._max_read = max_read
         self._max_write = max_write
+        self._takes_odd = takes_odd
 
     def reads_and_writes(self) -> BasicCommands:
         """Return the commands that every PLC has."""
@@ -75,8 +81,7 @@ class BasicService:
 
     def _read(self, reader: Reader, window: Window) -> bytes:
         request = BasicRead.read(reader)
-        # Only an SLC takes an odd number of bytes (M 7-31..7-40).
-        is_odd = request.size % 2 and window.start.plc_type is not PlcType.SLC
+        is_odd = request.size % 2 and not self._takes_odd
         if not 0 < request.size <= self._max_read or is_odd:
             raise Refusal(status.STS_ILLEGAL_COMMAND)
         words = self._table.read(_word(window, request.address), (request.size + 1) // 2)

@@ -13,3 +13,30 @@
 # limitations under the License.
 
 """The PLC-3: addresses, commands, what we say to it and what it answers."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.family import Family
+from abdf1_ros.pccc.plc3 import identity
+from abdf1_ros.pccc.plc3.address import ADDRESSING
+from abdf1_ros.pccc.plc3.dialect import PLC3
+from abdf1_ros.pccc.plc3.server import Plc3Commands
+from abdf1_ros.pccc.status import Meanings
+
+# What STS and EXT STS mean that a PLC-3 sends (M 8-6..8-10).
+MEANINGS = Meanings(
+    sts={
+        0x30: 'a shutdown was requested',
+        0x40: 'backplane error',
+        0x50: 'file or word not there, or file above 65535 words',
+        0x60: 'keyswitch does not allow this'},
+    ext_sts={
+        0x06: 'file or word not there, or address does not lead to a word',
+        0x07: 'words of the transaction are not there',
+        0x09: 'past the end of the file',
+        0x0A: 'total and word address are above 65535 together'})
+
+FAMILY = Family(
+    ADDRESSING, {Access.WORD_RANGE: PLC3},
+    Plc3Commands, identity.decode, identity.encode, {}, MEANINGS)

@@ -30,13 +30,19 @@ from __future__ import annotations
 
 import re
 
+from abdf1_ros.pccc import members
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address, Addressing
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.address import Address, Addressing, AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.plc3.commands import CONTEXT, DATA_TABLE
-from abdf1_ros.pccc.plc3.files import FILES
+
+# The files of a PLC-3, whose words are all the same but in timers and counters.
+FILES = {kind: Layout() for kind in (
+    FileType.OUTPUT, FileType.INPUT, FileType.INTEGER, FileType.BCD, FileType.BINARY,
+    FileType.ASCII, FileType.STATUS)} | {
+    FileType.TIMER: Layout(3, members=members.PLC3_TIMER),
+    FileType.COUNTER: Layout(3, members=members.PLC3_COUNTER)}
 
 SECTIONS = {
     FileType.OUTPUT: 1, FileType.INPUT: 2, FileType.TIMER: 3, FileType.COUNTER: 4,

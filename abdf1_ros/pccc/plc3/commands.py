@@ -24,7 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.pccc import status
-from abdf1_ros.pccc.address_errors import AddressRefusal
+from abdf1_ros.pccc.address import AddressRefusal
 from abdf1_ros.pccc.fields import number, Reader
 
 DATA_TABLE = 3

@@ -17,9 +17,8 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.plc3.address import SECTIONS
+from abdf1_ros.pccc.plc3.address import FILES, SECTIONS
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
-from abdf1_ros.pccc.plc3.files import FILES
 from abdf1_ros.pccc.word_range.commands import WordBitWrite
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 

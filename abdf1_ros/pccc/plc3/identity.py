@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
 
 PORT = 0x47  # byte 2: a 1775-KA's RS-232 port (7) of a PLC-3 (4)
@@ -32,7 +33,7 @@ def decode(data: bytes) -> Identity | None:
     faults = named({'major processor fault': data[0] & MAJOR_FAULT,
                     'shutdown in effect': data[0] & 0x20})
     remarks = named({'shutdown requested': data[0] & 0x10})
-    return Identity('PLC-3', 'PLC-3', *letters(data[8]), mode, mode_text, faults, remarks,
+    return Identity(PlcType.PLC3, 'PLC-3', *letters(data[8]), mode, mode_text, faults, remarks,
                     interface=data[1], counter_address=word_at(data, 6))
 
 

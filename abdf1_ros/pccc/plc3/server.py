@@ -17,8 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc import status
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.address_errors import AddressRefusal
+from abdf1_ros.pccc.address import Address, AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType

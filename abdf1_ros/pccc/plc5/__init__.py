@@ -13,3 +13,18 @@
 # limitations under the License.
 
 """The PLC-5: addresses, commands, what we say to it and what it answers."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.family import Family
+from abdf1_ros.pccc.plc5 import identity
+from abdf1_ros.pccc.plc5.address import ADDRESSING
+from abdf1_ros.pccc.plc5.describe import DESCRIBED
+from abdf1_ros.pccc.plc5.dialect import PLC5_TYPED, PLC5_WORD_RANGE
+from abdf1_ros.pccc.plc5.server import Plc5Commands
+
+FAMILY = Family(
+    ADDRESSING, {Access.TYPED: PLC5_TYPED, Access.WORD_RANGE: PLC5_WORD_RANGE},
+    Plc5Commands, identity.decode, identity.encode, DESCRIBED,
+    served_counters=lambda is_full_duplex, is_master: identity.COUNTERS, counters_anywhere=True)

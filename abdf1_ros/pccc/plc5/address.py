@@ -22,9 +22,32 @@ Addresses of a PLC-5: those of ``file_address``; racks, groups and bits of its I
 
 from __future__ import annotations
 
+import re
+
+from abdf1_ros.pccc import members
 from abdf1_ros.pccc.file_address import FileAddressing
-from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc5.files import FILES
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+
+# The files of a PLC-5, by the data types of its commands (M 7-28; PD, MG, SC, BT: practice).
+# Data types (M 7-29). A file's own type has to be named when it is written.
+_CHARACTERS, _INTEGER, _BCD = 3, 4, 16
+
+FILES = {kind: Layout(code=_INTEGER) for kind in (
+    FileType.OUTPUT, FileType.INPUT, FileType.STATUS, FileType.BINARY, FileType.INTEGER)} | {
+    FileType.ASCII: Layout(code=_CHARACTERS),
+    FileType.BCD: Layout(code=_BCD),
+    # The two words after ACC are internal and have no address.
+    FileType.TIMER: Layout(3, 5, members.TIMER, typed_words=5),
+    FileType.COUNTER: Layout(3, 6, members.COUNTER),
+    FileType.CONTROL: Layout(3, 7, members.CONTROL),
+    FileType.FLOAT: Layout(2, 8),
+    FileType.STRING: Layout(42, _CHARACTERS),
+    FileType.PID: Layout(82, 0x15, members.PLC5_PID),
+    FileType.MESSAGE: Layout(56, 0x16, members.PLC5_MESSAGE),
+    FileType.SFC_STATUS: Layout(3, 0x1D, members.PLC5_SFC),
+    FileType.BLOCK_TRANSFER: Layout(6, 0x20, members.PLC5_BLOCK_TRANSFER)}
+
+_SLC_IO = re.compile(r'[#$]?[IO]\d?[:;]\d+\.\d+(?:/\d+)?', re.ASCII)
 
 # Last elements (M 13-13, P5A).
 _LAST = {
@@ -36,7 +59,13 @@ _LAST_ELEMENT = 999
 class _Plc5Addressing(FileAddressing):
     plc_type = PlcType.PLC5
     files = FILES
+    title = 'PLC-5'
     last_file = 999
+
+    def mistaken(self, text: str) -> str | None:
+        """Recognise the inputs and outputs of an SLC."""
+        return ('this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as in '
+                'I:017/12') if _SLC_IO.fullmatch(text) else None
 
     def is_octal(self, kind: FileType) -> bool:
         return kind.is_io

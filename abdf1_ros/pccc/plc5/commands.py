@@ -20,8 +20,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import status
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressRefusal, AddressSyntaxError
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressRefusal, AddressSyntaxError
 from abdf1_ros.pccc.fields import number, Reader, word
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc5.address import ADDRESSING

@@ -22,7 +22,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Request, Transfer
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc5 import commands as plc5
-from abdf1_ros.pccc.plc5.files import FILES
+from abdf1_ros.pccc.plc5.address import FILES
 from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 

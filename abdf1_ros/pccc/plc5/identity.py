@@ -22,12 +22,23 @@ reply of a 5/12, 5/15 or 5/25 ends with the byte about its RAM.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import link_counters as names
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.identity import (
+    code_of,
+    Identity,
+    Inquiry,
+    letters,
+    Mode,
+    mode_of,
+    named,
+    word_at,
+)
+from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 
@@ -49,6 +60,11 @@ _MODELS = {
 
 MODES = {0: Mode.PROGRAM, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM, 5: Mode.REMOTE_TEST,
          6: Mode.REMOTE_RUN}
+
+COUNTERS = CounterLayout((
+    names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_OR_SENT_AGAIN,
+    names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NAK_SENT, names.DUPLICATES,
+    'receive errors', names.DCD, names.LOST))
 
 _UNNAMED_FAULT = 'major processor fault (word S:11 says which)'
 _FAULT_WORDS = Address(ADDRESSING, FileType.STATUS, 2, 11)
@@ -89,18 +105,18 @@ def decode(data: bytes) -> Identity | None:
         'download in progress': data[0] & 0x10, 'testing edits': data[0] & 0x40,
         'edits in the processor': data[0] & 0x80, 'forces active': fields[12] & 0x01,
         'forces installed': fields[12] & 0x10, 'memory protected': fields[13]})
-    return Identity('PLC-5', model, *letters(fields[4]), mode, mode_text, faults, remarks,
-                    memory=str(int.from_bytes(fields[:4], 'little')))
+    identity = Identity(PlcType.PLC5, model, *letters(fields[4]), mode, mode_text, faults, remarks,
+                        memory=str(int.from_bytes(fields[:4], 'little')),
+                        counter_layout=COUNTERS)
+    if _UNNAMED_FAULT not in faults:
+        return identity
+    request = Plc5Dialect().read(_FAULT_WORDS, 2)
+    return replace(identity, inquiry=Inquiry(request, partial(_with_fault, identity)))
 
 
-def fault_request(identity: Identity) -> Request | None:
-    """Return a read of S:11 and S:12 for a PLC-5 with a fault, None for any other."""
-    return Plc5Dialect().read(_FAULT_WORDS, 2) if _UNNAMED_FAULT in identity.faults else None
-
-
-def with_fault(identity: Identity, reply: bytes) -> Identity:
+def _with_fault(identity: Identity, reply: bytes) -> Identity:
     """
-    Return an identity whose fault is named by the data of the reply to ``fault_request``.
+    Return an identity whose fault is named by S:11 and S:12.
 
     Raises FormatError for a reply that does not hold these words.
     """
@@ -108,7 +124,7 @@ def with_fault(identity: Identity, reply: bytes) -> Identity:
     bits, code = word_at(words, 0), word_at(words, 2)
     causes = [text for bit, text in enumerate(_FAULTS) if bits >> bit & 1] or ['S:11 is 0']
     fault = f'major processor fault: {", ".join(causes)}; fault code {code} (S:12)'
-    return replace(identity, faults=tuple(
+    return replace(identity, inquiry=None, faults=tuple(
         fault if text == _UNNAMED_FAULT else text for text in identity.faults))
 
 

@@ -13,3 +13,29 @@
 # limitations under the License.
 
 """The SLC 500 and MicroLogix: addresses, commands, what we say to it and what it answers."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.family import Family
+from abdf1_ros.pccc.processor import USUAL
+from abdf1_ros.pccc.slc import identity
+from abdf1_ros.pccc.slc.address import ADDRESSING
+from abdf1_ros.pccc.slc.describe import DESCRIBED
+from abdf1_ros.pccc.slc.dialect import BY_PROCESSOR
+from abdf1_ros.pccc.slc.server import SlcCommands
+from abdf1_ros.pccc.status import Meanings
+
+# What EXT STS mean that an SLC or MicroLogix sends: as on DH-485 (M 8-5).
+MEANINGS = Meanings(ext_sts={
+    0x07: 'memory module is too small',
+    0x0B: 'access denied',
+    0x0C: 'resource not available',
+    0x12: 'bad parameter',
+    0x14: 'failed while it was carried out'})
+
+FAMILY = Family(
+    ADDRESSING, dict.fromkeys((Access.SLOT, Access.FLAT), BY_PROCESSOR[USUAL]),
+    SlcCommands, identity.decode, identity.encode, DESCRIBED, MEANINGS,
+    by_processor=BY_PROCESSOR, served_counters=identity.served_counters,
+    max_echo=236)  # of an SLC 5/03 and later (M 7-8)

@@ -24,12 +24,38 @@ Addresses of an SLC 500 or MicroLogix: those of ``file_address``; its I/O is by 
 from __future__ import annotations
 
 from dataclasses import replace
+import re
 
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc import members
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.file_address import FileAddressing
-from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.slc.files import FILES
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+
+# The files of an SLC 500 or MicroLogix, and their codes (M 7-17; 8D and above from practice).
+FILES = {
+    FileType.OUTPUT: Layout(code=0x8B),
+    FileType.INPUT: Layout(code=0x8C),
+    FileType.STATUS: Layout(code=0x84),
+    FileType.BINARY: Layout(code=0x85),
+    FileType.TIMER: Layout(3, 0x86, members.TIMER),
+    FileType.COUNTER: Layout(3, 0x87, members.COUNTER),
+    FileType.CONTROL: Layout(3, 0x88, members.CONTROL),
+    FileType.INTEGER: Layout(code=0x89),
+    FileType.FLOAT: Layout(2, 0x8A),
+    FileType.STRING: Layout(42, 0x8D),
+    FileType.ASCII: Layout(code=0x8E),
+    FileType.BCD: Layout(code=0x8F),
+    FileType.LONG: Layout(2, 0x91),
+    FileType.MESSAGE: Layout(25, 0x92, members.SLC_MESSAGE),
+    FileType.PID: Layout(23, 0x93, members.SLC_PID)}
+
+BY_CODE = {layout.code: kind for kind, layout in FILES.items()}
+
+_PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0[0-7]{2}(?:/[0-7]{1,2})?', re.ASCII)
+# The function files of the MicroLogix; they are read by other commands than data files.
+_FUNCTION_FILES = re.compile(
+    r'(?P<name>BHI|CS|DAT|DLS|EII|ES|HSC|IOS|LCD|MMI|PTO|PWM|RTC|STI|TPI)\d*(?:[:;/.].*)?',
+    re.ASCII)
 
 # Last elements and slots, and last words of a slot (M 13-13).
 _LAST_ELEMENT = 255
@@ -41,7 +67,18 @@ _LAST_FLAT_WORD = (_LAST_SLOT + 1) * (_LAST_SLOT_WORD + 1) - 1
 class _SlcAddressing(FileAddressing):
     plc_type = PlcType.SLC
     files = FILES
+    title = 'SLC'
     last_file = 255
+
+    def mistaken(self, text: str) -> str | None:
+        """Recognise function files, and the octal inputs and outputs of a PLC-5."""
+        if match := _FUNCTION_FILES.fullmatch(text):
+            return (f'{match["name"]} is a function file, which is not supported; let the program '
+                    'copy what is needed into an N file')
+        if match := _PLC5_IO.fullmatch(text):
+            return ('this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
+                    f'{match["type"]}:1.0/3')
+        return None
 
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:
         if not kind.is_io:

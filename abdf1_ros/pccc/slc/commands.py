@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.pccc.fields import number, Reader, word
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.processor import USUAL
 
 CMD = 0x0F
 SHORT_READ = 0xA1
@@ -35,8 +36,8 @@ LOGICAL_WRITE = 0xAA
 MASKED_WRITE = 0xAB
 
 # Bytes of data in one packet of an SLC 5/03 or later (M 7-17, 7-18).
-MAX_READ = 236
-MAX_WRITE = 234
+MAX_READ = USUAL.max_read
+MAX_WRITE = USUAL.max_write
 
 # The words of the whole output and input image, without slots. The manual reserves these types; an
 # SLC 5/05 answers them.

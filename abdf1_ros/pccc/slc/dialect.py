@@ -22,7 +22,7 @@ from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.slc import commands as slc
-from abdf1_ros.pccc.slc.files import FILES
+from abdf1_ros.pccc.slc.address import FILES
 
 
 class SlcDialect:

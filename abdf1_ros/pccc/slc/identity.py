@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from abdf1_ros.pccc import link_counters as names
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import (
     code_of,
     Identity,
@@ -26,6 +28,7 @@ from abdf1_ros.pccc.identity import (
     release,
     word_at,
 )
+from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.slc.faults import major_error
 
@@ -65,6 +68,25 @@ MODES = {
     0x09: Mode.REMOTE_TEST_STEP, 0x10: Mode.DOWNLOAD, 0x11: Mode.PROGRAM, 0x1B: Mode.SUSPEND,
     0x1E: Mode.RUN}
 
+# The counters of a port by its role (M 9-6, 9-7, 9-31).
+FULL_DUPLEX_COUNTERS = CounterLayout((
+    names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_SENT,
+    names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NO_MEMORY, names.DUPLICATES,
+    names.UNUSED, names.DCD, names.LOST))
+MASTER_COUNTERS = CounterLayout((
+    names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.RETRIES,
+    'last normal scan (100 ms)', 'longest normal scan (100 ms)', names.BAD, names.UNUSED,
+    names.DUPLICATES, 'last priority scan (100 ms)', names.DCD, names.LOST,
+    'longest priority scan (100 ms)'))
+SLAVE_COUNTERS = CounterLayout((
+    names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.RETRIES,
+    names.UNUSED, names.POLLS, names.BAD, names.NO_MEMORY, names.DUPLICATES, names.UNUSED,
+    names.DCD, names.LOST))
+ML1000_COUNTERS = CounterLayout((
+    names.UNUSED, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_SENT,
+    names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NO_MEMORY, names.DUPLICATES,
+    'framing errors'))
+
 MAJOR_ERROR_HALTED = 0x20  # byte 20
 _NO_OWNER = 0xFC  # byte 24: nobody owns the program
 _MINOR_ERROR_LEFT = 0x0020  # the major error of an emulated processor
@@ -77,10 +99,10 @@ def decode(data: bytes) -> Identity | None:
     code, name = data[3], name_in(data[5:16])
     model, remarks = _model(code, name)
     if not model:
-        return Identity('', name or f'processor 0x{code:02X}', *release(data[4]), name=name,
+        return Identity(None, name or f'processor 0x{code:02X}', *release(data[4]), name=name,
                         interface=data[2])
     mode, mode_text = mode_of(MODES, data[18] & 0x1F)
-    error = word_at(data, 16)
+    error, processor = word_at(data, 16), _processor(model)
     halted = bool(data[19] & MAJOR_ERROR_HALTED)
     faults = (f'{major_error(error)}, processor halted',) if halted else ()
     remarks += named({
@@ -88,8 +110,22 @@ def decode(data: bytes) -> Identity | None:
         'forces active': data[18] & 0x20, 'forces installed': data[18] & 0x40,
         'testing edits': data[0] & 0x40, 'edits in the processor': data[0] & 0x80,
         'program directory corrupted': data[23] & 0x01})
-    return Identity('SLC', model, *release(data[4]), mode, mode_text, faults, remarks, name,
-                    word_at(data, 20), f'{data[22]} K', data[2], processor=_processor(model))
+    return Identity(PlcType.SLC, model, *release(data[4]), mode, mode_text, faults, remarks, name,
+                    word_at(data, 20), f'{data[22]} K', data[2], processor=processor,
+                    counter_layout=_counters(processor, data[2]))
+
+
+def _counters(processor: Processor | None, interface: int) -> CounterLayout:
+    if processor is Processor.ML1000:
+        return ML1000_COUNTERS
+    return SLAVE_COUNTERS if interface == HALF_DUPLEX_PORT else FULL_DUPLEX_COUNTERS
+
+
+def served_counters(is_full_duplex: bool, is_master: bool) -> CounterLayout:
+    """Return the layout of the port of an SLC in such a role."""
+    if is_full_duplex:
+        return FULL_DUPLEX_COUNTERS
+    return MASTER_COUNTERS if is_master else SLAVE_COUNTERS
 
 
 def _processor(model: str) -> Processor | None:

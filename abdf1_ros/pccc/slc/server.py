@@ -27,8 +27,7 @@ from abdf1_ros.pccc.plc2.server import BasicService, Window
 from abdf1_ros.pccc.plc5.server import TypedService
 from abdf1_ros.pccc.serving import Codes, Commands, Refusal
 from abdf1_ros.pccc.slc import commands as slc
-from abdf1_ros.pccc.slc.address import ADDRESSING
-from abdf1_ros.pccc.slc.files import BY_CODE
+from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 
 _COMMON_INTERFACE_FILE = 9
 _ADDRESSING_MODE = Address(ADDRESSING, FileType.STATUS, 2, 2)
@@ -45,7 +44,8 @@ class SlcCommands:
     def __init__(self, table: DataTable) -> None:
         self._table = table
         self.basic_commands = BasicService(
-            table, self._common_interface_file, slc.MAX_READ, slc.MAX_WRITE).reads_and_writes()
+            table, self._common_interface_file, slc.MAX_READ, slc.MAX_WRITE,
+            takes_odd=True).reads_and_writes()
         own: Commands = {
             (slc.CMD, slc.LOGICAL_READ): self._read,
             (slc.CMD, slc.SHORT_READ): partial(self._read, is_short=True),

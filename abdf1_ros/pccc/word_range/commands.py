@@ -26,7 +26,9 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.fields import Reader, word
+from abdf1_ros.pccc.file_types import FileType
 
 CMD = 0x0F
 WRITE = 0x00
@@ -120,3 +122,31 @@ class WordBitWrite(Generic[_Place]):
         change = cls(read_address(reader), reader.word(), reader.word())
         reader.end()
         return change
+
+
+# Such commands move words as a PLC-5 stores them: the high word of a float comes first (M 13-17).
+# Everywhere else in this package, as in typed commands, the low word does.
+_WITH_FLOATS = (FileType.FLOAT, FileType.PID)
+
+
+def word_on_line(address: Address) -> Address:
+    """Return which of our words is the one that the line has at ``address``."""
+    return address.at_offset(address.offset + _step(address))
+
+
+def in_line_order(address: Address, data: bytes) -> bytes:
+    """Return whole values from ``address`` on in the line's order, or from it in ours."""
+    if address.file_type not in _WITH_FLOATS:
+        return data
+    words = [data[at:at + 2] for at in range(0, len(data), 2)]
+    places = (address.at_offset(address.offset + n) for n in range(len(words)))
+    return b''.join(words[n + _step(place)] for n, place in enumerate(places))
+
+
+def _step(address: Address) -> int:
+    """Return 1 for the first word of a float, -1 for the second, 0 for any other word."""
+    if address.file_type is FileType.FLOAT:
+        return -1 if address.word else 1
+    if address.file_type is FileType.PID:
+        return {2: 1, 0: -1}.get(address.layout.value_words(address.word), 0)
+    return 0

@@ -22,9 +22,9 @@ from typing import Protocol
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import exactly, Request, Transfer
 from abdf1_ros.pccc.file_types import FileType, Layout
-from abdf1_ros.pccc.line_order import in_line_order
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.pccc.word_range.commands import (
+    in_line_order,
     WireAddress,
     WordRangeRead,
     WordRangeWrite,

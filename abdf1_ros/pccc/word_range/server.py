@@ -23,11 +23,11 @@ from typing import Generic, TypeVar
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, OutOfRange
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.line_order import word_on_line
 from abdf1_ros.pccc.serving import Codes, Commands, Refusal
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.pccc.word_range.commands import (
     WireAddress,
+    word_on_line,
     WordBitWrite,
     WordRangeRead,
     WordRangeWrite,

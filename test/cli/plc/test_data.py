@@ -34,6 +34,7 @@ from abdf1_ros.cli.plc.data import (
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
@@ -142,7 +143,7 @@ def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
     ('SLC 5/02', '5/02'), ('SLC 5/03', ''), ('SLC 5/05', '5/05'), ('MicroLogix 1000', 'ML1000'),
     ('MicroLogix 1500 LRP', 'ML1500'), ('SLC 500 fixed', ''), ('1763-LEC', '')])
 def test_processor_that_says_what_it_is(model: str, processor: str) -> None:
-    assert processor_of(Identity('SLC', model)) == processor
+    assert processor_of(Identity(PlcType.SLC, model)) == processor
 
 
 @given(st.integers(-32768, 32767))

@@ -24,7 +24,7 @@ from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 from support.vectors import pair, vector
 
-PLC2, PLC3, PLC5, SLC = PlcType
+PLC2, PLC3, PLC5, SLC = PlcType.PLC2, PlcType.PLC3, PlcType.PLC5, PlcType.SLC
 BIT_WRITES = (0x02, 0x05)
 
 

@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.address_errors import AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc3.address import ADDRESSING, SECTIONS

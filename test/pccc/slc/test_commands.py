@@ -22,6 +22,7 @@ from functools import partial
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.slc.address import BY_CODE
 from abdf1_ros.pccc.slc.commands import (
     FLAT_CODES,
     LogicalAddress,
@@ -31,7 +32,6 @@ from abdf1_ros.pccc.slc.commands import (
     MAX_READ,
     MAX_WRITE,
 )
-from abdf1_ros.pccc.slc.files import BY_CODE
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

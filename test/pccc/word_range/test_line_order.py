@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.line_order import in_line_order, word_on_line
+from abdf1_ros.pccc.word_range.commands import in_line_order, word_on_line
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -1,0 +1,52 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands of a PLC-2, told to people."""
+
+from __future__ import annotations
+
+from abdf1_ros.pccc.notation import CommandCode, count_of, KnownCommand, words_text
+from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc2.address import show_word
+
+
+def _byte_address(address: int) -> str:
+    # The octal word of a PLC-2, which an SLC may take for a word's number.
+    return f'{show_word(address // 2)} (ADDR {address})'
+
+
+def _read(request: plc2.BasicRead) -> str:
+    return f'{_byte_address(request.address)}, {count_of(request.size, "byte")}'
+
+
+def _write(request: plc2.BasicWrite) -> str:
+    return f'{_byte_address(request.address)} = {words_text(request.data) or "nothing"}'
+
+
+def _bit_write(request: plc2.BasicBitWrite) -> str:
+    return ', '.join(
+        f'{_byte_address(change.address)} {"high" if change.address % 2 else "low"} byte '
+        f'set {change.set:02X} reset {change.reset:02X}' for change in request.changes)
+
+
+DESCRIBED: dict[CommandCode, KnownCommand] = {
+    (plc2.READ, None): KnownCommand(
+        'unprotected read', plc2.BasicRead.read, _read, lambda request, data: words_text(data)),
+    (plc2.UNPROTECTED_WRITE, None): KnownCommand(
+        'unprotected write', plc2.BasicWrite.read, _write),
+    (plc2.PROTECTED_WRITE, None): KnownCommand('protected write', plc2.BasicWrite.read, _write),
+    (plc2.UNPROTECTED_BIT_WRITE, None): KnownCommand(
+        'unprotected bit write', plc2.BasicBitWrite.read, _bit_write),
+    (plc2.PROTECTED_BIT_WRITE, None): KnownCommand(
+        'protected bit write', plc2.BasicBitWrite.read, _bit_write)}
