@@ -72,9 +72,13 @@ MESSAGES: dict[Message, Cause] = {
         'Power, cable, station number, baud rate, check; is the channel set to the duplex of '
         'Mode? `plc scan` shows who is there. The station comes back by itself.'),
     Message.ERR_WRONG_MESSAGE: Cause(
-        'A reply answers nothing that is outstanding: it came after its command had been given '
-        'up.',
-        'Harmless once in a while. Often: Timeout or Cmd_Timeout is too short for this PLC.'),
+        'A message that is neither a command for us nor a reply to one of ours: the reply came '
+        'after its command had been given up, or was meant for another master, or has another SRC '
+        'than the station that was polled; or it is a command, and the map has no Serve row, or '
+        'it carries an STS.',
+        'Harmless once in a while, when Src and Dst are right. Often: Timeout or Cmd_Timeout is '
+        'too short for this PLC, or a gateway holds replies back. Another Dst than our Station: '
+        'a second master, or a station number that two devices have.'),
     Message.ERR_RCVD_NAK_SYMBOL: Cause(
         'A station answered a command with DLE NAK, which slaves of Allen-Bradley never do.',
         'Is it set to full duplex, or is it another make? The command is repeated.'),

@@ -311,7 +311,8 @@ def _times_text(report: Report) -> str:
     response = report.response_time * 1000
     return (f'expected poll cycle: {report.poll_cycle * 1000:.1f} ms for everything once, with '
             f'{response:g} ms for each answer of a PLC\n'
-            f'load of the line: {report.load:.0%} of the time is needed to keep the periods'
+            f'load of the line: {report.load:.0%} of the time is needed to keep the periods\n'
+            f'longest transaction: {report.longest_transaction * 1000:.0f} ms with all repetitions'
             + ''.join(f'\n{printable(str(bound))}' for bound in report.bounds))
 
 
@@ -326,7 +327,8 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
         'errors': [_problem(problem) for problem in found.problems],
         'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),
         'rows': _rows(found.mappings, report), 'blocks': [],
-        'scan_time_ms': None, 'load': None, 'needed_baud': None, 'bounds': [],
+        'scan_time_ms': None, 'load': None, 'longest_transaction_ms': None, 'needed_baud': None,
+        'bounds': [],
         'response_time_ms': None}
     if report is not None:
         content |= {
@@ -334,6 +336,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
             'scan_time_ms': _ms(report.poll_cycle), 'load': round(report.load, 4),
+            'longest_transaction_ms': _ms(report.longest_transaction),
             'needed_baud': report.needed_baud(),
             'bounds': [_bound(bound) for bound in report.bounds],
             'response_time_ms': _ms(report.response_time)}

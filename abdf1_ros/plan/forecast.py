@@ -23,13 +23,12 @@ reply. PLCs serve the port once in a program scan.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.plan.line_model import LineModel
-from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import BAUD_RATES, Network
+from abdf1_ros.settings.network import Network
 
 USUAL_RESPONSE_TIME = 0.01
 ANSWERS = 2
@@ -124,14 +123,3 @@ def longest_probe(network: Network) -> float:
     """Return the seconds that one poll of a silent station takes."""
     return max(network.timeout / 1000, MIN_RESPONSE_TIME) + network.timing.tx_delay \
         + _POLL_CHARACTERS * network.timing.char_time
-
-
-def needed_baud(network: Network, mappings: Iterable[Mapping], default_period: float,
-                response_time: float = USUAL_RESPONSE_TIME) -> int | None:
-    """Return the lowest baud rate at which every period can be kept; None: not at any."""
-    mappings = list(mappings)
-    for baud in BAUD_RATES:
-        planner = Planner(line_model(replace(network, baud=baud)), default_period)
-        if load(planner.plan(mappings), response_time) <= 1:
-            return baud
-    return None

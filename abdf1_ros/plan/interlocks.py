@@ -76,7 +76,7 @@ def _ms(seconds: float | None) -> str:
 def bounds(network: Network, mappings: Sequence[Mapping],
            response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[Bound]:
     """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
-    longest = _longest(network, mappings, response_time)
+    longest = longest_transaction(network, mappings, response_time)
     fallbacks = sum(write_time(network, mapping, response_time)
                     for mapping in mappings if mapping.fallback and not mapping.serves)
     beats = sum(write_time(network, mapping, response_time)
@@ -101,7 +101,7 @@ def bounds(network: Network, mappings: Sequence[Mapping],
 def remarks(network: Network, mappings: Sequence[Mapping],
             response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
     """Yield remarks on the times of heartbeats and fallbacks (rule 16)."""
-    longest = _longest(network, mappings, response_time)
+    longest = longest_transaction(network, mappings, response_time)
     for mapping in mappings:
         if mapping.heartbeat is not None and mapping.period is not None \
                 and longest > mapping.period / 1000:
@@ -175,7 +175,8 @@ def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
                    f'{_ms(period)} takes {part:.0%} of the time')
 
 
-def _longest(network: Network, mappings: Iterable[Mapping], response_time: float) -> float:
+def longest_transaction(network: Network, mappings: Iterable[Mapping],
+                        response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
     """Return T: the longest transaction of the settings plus the time of our longest write."""
     return forecast.longest_transaction(network) + max(
         (write_time(network, mapping, response_time) for mapping in mappings

@@ -29,11 +29,12 @@ from enum import Enum
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.plan import forecast, interlocks
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
-from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.values import ValueType
 
@@ -90,6 +91,11 @@ class Report:
             self.network, self.mappings, self.default_period, self.response_time)
 
     @property
+    def longest_transaction(self) -> float:
+        """Return T: the seconds of the longest transaction, with every repetition."""
+        return interlocks.longest_transaction(self.network, self.mappings, self.response_time)
+
+    @property
     def bounds(self) -> list[interlocks.Bound]:
         """Return the bounds of heartbeats and fallbacks."""
         return list(interlocks.bounds(self.network, self.mappings, self.response_time))
@@ -108,9 +114,10 @@ class Report:
         return forecast.block_time(block, self.response_time)
 
     def needed_baud(self) -> int | None:
-        """Return the lowest baud rate that is enough for the periods, None when none is."""
-        return forecast.needed_baud(
-            self.network, self.mappings, self.default_period, self.response_time)
+        """Return the lowest baud rate that is enough for all that is to be done, or None."""
+        return next((baud for baud in BAUD_RATES if make_report(
+            replace(self.network, baud=baud), self.mappings, self.default_period,
+            self.response_time).load <= 1), None)
 
     def notes(self) -> list[str]:
         """Return what somebody should know, and what is not odd at all."""
@@ -208,6 +215,7 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
             kinds = ', '.join(f'{name} ({_tags(group)})' for name, group in types.items())
             yield Remark(RemarkKind.STATION, (
                 f'station {station} has more than one PLC_Type: {kinds}'), station)
+        yield from _file_remarks(station, mappings)
     yield from _gateway_remarks(network, stations)
     if network.mode == 'Peer' and 0 in (network.station, *stations):
         whose = 'our own Station is 0' if network.station == 0 else 'station 0 is in the map'
@@ -219,6 +227,23 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
         yield Remark(RemarkKind.STATION, (
             f'a full-duplex line has one PLC, the map has stations {listed}; only a gateway '
             'answers for several'))
+
+
+def _file_remarks(station: int, mappings: Iterable[Mapping]) -> Iterator[Remark]:
+    """Find files of a PLC that rows take for files of different types."""
+    files: defaultdict[tuple[PlcType, int], dict[FileType, list[Mapping]]] = defaultdict(dict)
+    for mapping in mappings:
+        address = mapping.address
+        if not address.addressing.has_sections and mapping.access is not Access.CIF:
+            files[mapping.plc_type, address.file].setdefault(
+                address.file_type, []).append(mapping)
+    for (_, number), types in sorted(files.items(), key=lambda item: item[0][1]):
+        if len(types) > 1:
+            kinds = ', '.join(f'{kind.value}{number} ({_tags(group)})'
+                              for kind, group in types.items())
+            yield Remark(RemarkKind.STATION, (
+                f'station {station}: file {number} cannot be {kinds} at the same time; a file of '
+                'a PLC has one type'), station)
 
 
 def _gateway_remarks(network: Network,

@@ -158,8 +158,10 @@ class _Clashes:
                                   f'({other.message_type.value}) and Length ({other.length})')
         here, other = _processor(mapping), self._slcs.get(mapping.station)
         if here and other and (there := _processor(other)) and there is not here:
-            clash('Processor', other, f'Processor of station {mapping.station} is {here.value} '
-                                      f'here, but {there.value} in the row')
+            names = [entry.value + ('' if row.processor else ' (an empty cell)')
+                     for entry, row in ((here, mapping), (there, other))]
+            clash('Processor', other, f'Processor of station {mapping.station} is {names[0]} '
+                                      f'here, but {names[1]} in the row')
         self._check_route(mapping, clash)
         self._check_words(mapping, clash)
         if not faults:

@@ -43,7 +43,7 @@ from abdf1_ros.settings.heartbeats import (
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
-from abdf1_ros.settings.remarks import row_remarks
+from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.settings.structures import type_fault, write_fault
 from abdf1_ros.settings.values import types_of, ValueType, WordOrder
@@ -285,8 +285,8 @@ class RowReader:
             return None
         processor = self._choice('Processor', Processor, None)
         if processor and address and not processor.has_file(address.file, address.file_type):
-            self._fault('Address', f'{processor.value} has no file '
-                                   f'{address.file_type.value}{address.file}')
+            self._fault('Address', f'{processor.value} has no file {address.file_type.value}'
+                                   f'{address.file}; {having(address)} may have it')
         return processor
 
     def _address(self, plc_type: PlcType, access: Access | None) -> Address | None:

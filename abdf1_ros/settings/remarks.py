@@ -21,7 +21,9 @@ import math
 
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.errors import Problem
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -47,9 +49,6 @@ def _time_remarks(network: Network) -> Iterator[str]:
         yield (f'Timeout {network.timeout} ms: an ACK takes {least:.0f} ms on this line, '
                f'{MIN_RESPONSE_TIME * 1000:.0f} ms until a station answers and two characters at '
                f'{network.baud} baud; answers may come too late')
-    if network.timeout >= network.cmd_timeout:
-        yield (f'Timeout {network.timeout} ms is not shorter than Cmd_Timeout '
-               f'{network.cmd_timeout} ms: after one lost frame there is no time to repeat it')
     # The command comes before the reply, and in half duplex the poll as well.
     times = 1 if network.mode == 'Peer' else 2
     if times * network.tx_delay >= network.cmd_timeout:
@@ -61,6 +60,11 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     """Yield what is odd about a row of the map, each with its place."""
     yield from octal_remarks(row)
     yield from _name_remarks(row, mapping)
+    address = mapping.address
+    if mapping.plc_type is PlcType.SLC and not mapping.serves and mapping.processor is None \
+            and not USUAL.has_file(address.file, address.file_type):
+        yield _at(row, 'Address', f'{address}: a {USUAL.value}, for which an empty Processor '
+                                  f'stands, has no such file; {having(address)} may have it')
     if not mapping.writes:
         return
     if not mapping.serves and mapping.address.file_type is FileType.INPUT:
@@ -80,6 +84,12 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     if mapping.maximum > high and mapping.maximum != math.inf:
         yield _at(row, 'Max', f'Max {mapping.maximum:.10g} is above {high:.10g}, the most that '
                               f'{mapping.type.value} can hold here')
+
+
+def having(address: Address) -> str:
+    """Return the names of the SLC and MicroLogix processors that may have such a file."""
+    return ', '.join(processor.value for processor in Processor
+                     if processor.has_file(address.file, address.file_type))
 
 
 def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:

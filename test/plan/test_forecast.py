@@ -24,7 +24,6 @@ from abdf1_ros.plan.forecast import (
     line_model,
     load,
     longest_wait,
-    needed_baud,
     PATIENCE,
     poll_cycle,
 )
@@ -111,19 +110,6 @@ def test_nobody_waits_longer_than_for_one_packet() -> None:
     assert len(long.requests) > 1
     assert longest_wait([long]) == pytest.approx(block_time(long) / len(long.requests))
     assert longest_wait([]) == 0.0
-
-
-def test_needed_baud_is_the_lowest_at_which_the_periods_are_kept() -> None:
-    rows = [make_mapping('N7:0', length=100, period=250)]
-
-    def load_at(baud: int) -> float:
-        planner = Planner(line_model(replace(NETWORK, baud=baud)), 0.1)
-        return load(planner.plan(rows), 0.01)
-
-    assert needed_baud(NETWORK, rows, 0.1, 0.01) == 19200
-    assert load_at(9600) > 1 >= load_at(19200)
-    assert needed_baud(NETWORK, rows, 0.1, 0.2) is None
-    assert needed_baud(NETWORK, [], 0.1) == 1200
 
 
 @pytest.mark.parametrize('mode, transmissions', [('Master', 3), ('Peer', 2)])

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
-from abdf1_ros.settings.heartbeats import PublishWhile
+from abdf1_ros.settings.heartbeats import Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -145,6 +145,22 @@ def test_period_that_another_baud_rate_can_keep() -> None:
         'speed: a read takes 74.2 ms, the period is 50.0 ms']
 
 
+def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
+    rows = [make_mapping('N7:0', length=2, period=100, tag='speed'),
+            make_mapping('N10:0', 'Heartbeat', tag='beat', period=100, heartbeat=Heartbeat())]
+    report = report_of(*rows)
+    assert report_of(rows[0]).load < 1 < report.load
+    needed = report.needed_baud()
+    assert needed == 19200
+    assert f'{needed} baud would do' in texts(report, RemarkKind.LOAD)[0]
+    assert report_of(*rows, baud=needed).load <= 1
+
+
+def test_longest_transaction_has_every_repetition() -> None:
+    read = report_of(make_mapping('N7:0'), cmd_timeout=500, nak_retries=1, enq_retries=1)
+    assert read.longest_transaction == pytest.approx(4 * 0.3 + 0.5)
+
+
 def test_period_that_no_baud_rate_can_keep() -> None:
     report = report_of(make_mapping('N7:0', period=15))  # the answers alone take 20 ms
     assert report.needed_baud() is None
@@ -195,6 +211,21 @@ def test_two_plc_types_at_one_station() -> None:
                        make_mapping('B3:0', plc='SLC', tag='c', item=2))
     assert texts(report, RemarkKind.STATION) == [
         'station 1 has more than one PLC_Type: PLC5 (a, b), SLC (c)']
+
+
+def test_file_of_a_plc_has_one_type() -> None:
+    rows = [make_mapping(f'{kind}10:{number}', station=station, plc='SLC', tag=f'{kind}{station}')
+            for number, kind in enumerate('NBF') for station in (1, 2)][:-1]
+    assert texts(report_of(*rows), RemarkKind.STATION) == [
+        'station 1: file 10 cannot be N10 (N1), B10 (B1), F10 (F1) at the same time; a file of a '
+        'PLC has one type',
+        'station 2: file 10 cannot be N10 (N2), B10 (B2) at the same time; a file of a PLC has '
+        'one type']
+    # A PLC-3 numbers the files of each type by themselves; an I/O slot is of no file.
+    assert texts(report_of(*[make_mapping(f'{kind}10:0', plc='PLC3') for kind in 'NB']),
+                 RemarkKind.STATION) == []
+    assert texts(report_of(make_mapping('I:1.0', plc='SLC'), make_mapping('O:1.0', plc='SLC')),
+                 RemarkKind.STATION) == []
 
 
 def test_common_interface_file_is_no_second_plc() -> None:

@@ -131,8 +131,8 @@ def test_rows_of_one_station_name_one_processor() -> None:
         '3:17 (Processor): Item: 2, Processor of station 1 is ML1000 here, but 5/01 in the '
         'row of item 1 (line 2, tag "a")']
     assert faults(slc(Tag='a'), slc(Processor='5/01', Tag='b')) == [
-        '3:17 (Processor): Item: 2, Processor of station 1 is 5/01 here, but 5/03 in the '
-        'row of item 1 (line 2, tag "a")']
+        '3:17 (Processor): Item: 2, Processor of station 1 is 5/01 here, but 5/03 (an '
+        'empty cell) in the row of item 1 (line 2, tag "a")']
 
 
 def test_rows_of_several_stations_and_an_empty_cell_for_the_usual_one() -> None:

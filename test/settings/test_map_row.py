@@ -465,11 +465,16 @@ def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
      'type SLC that we read or write; leave the cell empty'),
     ({'Processor': '5/03', 'Command': 'Serve'}, '(Processor): Item: 1, Processor is for PLCs of '
      'type SLC that we read or write; leave the cell empty'),
-    ({'Processor': '5/05', 'Address': 'L10:0'}, '(Address): Item: 1, 5/05 has no file L10'),
-    ({'Processor': '5/02', 'Address': 'F8:0'}, '(Address): Item: 1, 5/02 has no file F8'),
-    ({'Processor': '5/01', 'Address': 'A10:0'}, '(Address): Item: 1, 5/01 has no file A10'),
-    ({'Processor': '5/02', 'Address': 'D11:0'}, '(Address): Item: 1, 5/02 has no file D11'),
-    ({'Processor': 'ML1000', 'Address': 'N10:0'}, '(Address): Item: 1, ML1000 has no file N10')])
+    ({'Processor': '5/05', 'Address': 'L10:0'}, '(Address): Item: 1, 5/05 has no file L10; '
+     'ML1100, ML1200, ML1400, ML1500 may have it'),
+    ({'Processor': '5/02', 'Address': 'F8:0'}, '(Address): Item: 1, 5/02 has no file F8; '
+     '5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it'),
+    ({'Processor': '5/01', 'Address': 'A10:0'}, '(Address): Item: 1, 5/01 has no file A10; '
+     '5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it'),
+    ({'Processor': '5/02', 'Address': 'D11:0'}, '(Address): Item: 1, 5/02 has no file D11; '
+     '5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it'),
+    ({'Processor': 'ML1000', 'Address': 'N10:0'}, '(Address): Item: 1, ML1000 has no file N10; '
+     '5/01, 5/02, 5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it')])
 def test_processor_that_does_not_fit(cells: dict[str, str], text: str) -> None:
     found, = faults(slc(**cells))
     assert found.endswith(text)
