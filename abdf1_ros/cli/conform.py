@@ -86,17 +86,26 @@ It is not to be run against a machine that is in use.
 
 
 class _PortLine:
-    """A port as a script reads it."""
+    """A port as a script reads it; where it ``echoes``, without what it gives back."""
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: Port, echoes: bool) -> None:
         self._port = port
+        self._echoes = echoes
+        self._echo = b''
         self._never, self._keep = os.pipe()
 
     def read(self, timeout: float) -> bytes:
-        return self._port.read(timeout, self._never)
+        data = self._port.read(timeout, self._never)
+        size = min(len(data), len(self._echo))
+        if data[:size] != self._echo[:size]:
+            raise OSError('what is sent does not come back as it was; leave out --echo')
+        self._echo = self._echo[size:]
+        return data[size:]
 
     def write(self, data: bytes) -> None:
         self._port.write(data)
+        if self._echoes:
+            self._echo += data
 
     def close(self) -> None:
         self._port.close()
@@ -247,11 +256,11 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
     elif options.pty is not None:
         line = PtyEndpoint(options.pty)
     else:
-        return _PortLine(open_port(PortSettings.of(network)))
+        return _PortLine(open_port(PortSettings.of(network)), options.echo)
     print(f'conform: at {line.name}', file=sys.stderr, flush=True)
     while True:
         try:
-            return _PortLine(line.open())
+            return _PortLine(line.open(), options.echo)
         except OSError:  # no client yet; Ctrl-C ends it
             time.sleep(0.05)
 
@@ -285,8 +294,12 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='print the result as text for an issue')
     parser.add_argument('--pty', metavar='LINK', help='make a pseudo-terminal of this name')
     parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
+    parser.add_argument('--echo', action='store_true',
+                        help='the adapter gives back what is sent (half duplex)')
     add_line_options(parser, LineDefaults(), duplex=False)
     options = parser.parse_args(args)
+    if options.echo and not Target(options.target).is_half_duplex:
+        parser.error('--echo: in full duplex nobody can tell what comes back from an answer')
     unknown = set(options.only) - {case.name for case in CASES}
     if unknown:
         parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')

@@ -120,6 +120,22 @@ class _FaultyPort:
         self._port.close()
 
 
+class _EchoingPort:
+    """The port of a line whose adapter gives the other end back what it sends."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self.write = port.write
+        self.unsent = port.unsent
+        self.close = port.close
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        data = self._port.read(timeout, wake)
+        if data:
+            self._port.write(data)
+        return data
+
+
 TimedCommands = list[tuple[float, str]]
 """Seconds and command."""
 
@@ -222,13 +238,15 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
     checksum = Checksum(options.check)
     machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
     open_line: Callable[[], Port] = line.open
+    if options.echo:
+        open_line = lambda: _EchoingPort(line.open())  # noqa: E731
     if options.full_duplex is not None:
         # Only a serial port has a real speed, which the timers have to take into account.
         timing = Network(baud=options.baud).timing if options.port else LineTiming()
         machine = _full_duplex(plcs[0], checksum, timing)
 
-        def open_faulty() -> Port:
-            return _FaultyPort(line.open(), plcs[0], checksum)
+        def open_faulty(open_port: Callable[[], Port] = open_line) -> Port:
+            return _FaultyPort(open_port(), plcs[0], checksum)
 
         open_line = open_faulty
     return LinkThread(machine, open_line, on_state=_Announcer().announce,
@@ -264,6 +282,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                              'control (docs/tutorials/heartbeats.md); may be repeated')
     parser.add_argument('--full-duplex', metavar='STATION',
                         help='this PLC alone, on a full-duplex line')
+    parser.add_argument('--echo', action='store_true',
+                        help='the line gives back what it gets, as some two-wire adapters do')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
                         help='of the serial port (default: %(default)s)')
     parser.add_argument('--check', choices=[check.value for check in Checksum],

@@ -164,6 +164,18 @@ class Frame(NamedTuple):
 Symbol = Control | Unknown | Poll | Frame
 
 
+def beginning_of(symbol: Symbol) -> bytes:
+    """Return the bytes of a symbol up to its check; nothing where they cannot be told."""
+    if isinstance(symbol, Control):
+        return bytes((Code.DLE, symbol.code))
+    if isinstance(symbol, Poll):
+        return poll_frame(symbol.station) if symbol.valid else b''
+    if isinstance(symbol, Frame) and symbol.fault in (None, FrameFault.BAD_CHECK):
+        start = STX if symbol.station is None else _addressed(symbol.station)
+        return start + stuff(symbol.data) + ETX
+    return b''
+
+
 class Duplex(Enum):
     """Which line discipline gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8)."""
 

@@ -39,6 +39,7 @@ from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.echo import LineEcho
 from abdf1_ros.df1.frames import (
     ACK,
     Control,
@@ -47,6 +48,7 @@ from abdf1_ros.df1.frames import (
     FrameDecoder,
     MAX_LINK_DATA,
     NAK,
+    NOISE,
     Symbol,
 )
 from abdf1_ros.df1.line_rate import LineRate
@@ -66,8 +68,7 @@ class Step(NamedTuple):
     pass before the frame goes out, and TX_Delay at least, unless it is AT_ONCE. After ``expires``
     (clock value in s) it does not go out any more: CommandExpired is raised at the ``yield``.
     ``reply_size`` is the bytes after the header of the reply that is expected, if that tells no
-    error; 0 where it is not known. ``is_echoed`` says that the line gives back what is sent from
-    now on, as two-wire adapters do; that ends by itself when a time-out shows an echo missing.
+    error; 0 where it is not known.
     """
 
     frame: bytes | None
@@ -75,7 +76,6 @@ class Step(NamedTuple):
     delay: float = 0.0
     expires: float = math.inf
     reply_size: int = 0
-    is_echoed: bool = False
 
 
 class Silence(NamedTuple):
@@ -110,8 +110,6 @@ _LONGEST = 2 * MAX_LINK_DATA
 
 # Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
 _LAST_CHARACTERS = 16
-
-_HEAD = 2  # bytes of a frame that tell what it is
 
 # What nobody says in full duplex before he has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
@@ -209,9 +207,7 @@ class Machine:
         self._line_free = -math.inf
         self._reply_size = 0
         self._last_heard = -math.inf
-        self._echoes = False
-        self._echo_due: list[bytes] = []  # come back before anything else does
-        self._echo_at = 0  # so much of the first of them has come
+        self._echo = LineEcho(bytewise=forget_on_send)
         self._due = -math.inf  # the deadline, before a message was heard out
         self._message = _Incoming()
 
@@ -238,6 +234,11 @@ class Machine:
     def free_at(self) -> float:
         """Return when what is being sent has left, by its size (clock value in s)."""
         return self._line_free
+
+    @property
+    def echoes(self) -> bool:
+        """Tell whether the line gives back what is sent."""
+        return self._echo.is_heard
 
     def has_left(self, position: int) -> bool:
         """Tell whether the bytes up to this ``position`` have left, as far as the port knows."""
@@ -286,7 +287,7 @@ class Machine:
         self.decoder.reset()
         self._pending, self._resting, self.deadline = None, False, None
         self._is_listening = False
-        self._forget_echo()
+        self._echo.forget()
         if procedure is None:
             return
         if error is not None:
@@ -300,8 +301,7 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        if self._echoes:
-            data = self._without_echo(data)
+        data = self._echo.taken_off(data)
         if self._forget_on_send and (self._out or not self._is_listening):
             return  # it was said before what it would have to answer
         is_idle = self._resting or self.deadline is None
@@ -339,8 +339,9 @@ class Machine:
             self._transmit(self._pending)
         else:
             # A short rest after an ACK proves nothing: its echo may be held back.
-            if self._echo_due and now >= self._line_free + MIN_RESPONSE_TIME:
-                self._forget_echo()
+            if self._forget_on_send and self._echo.is_expected \
+                    and now >= self._line_free + MIN_RESPONSE_TIME:
+                self._echo.forget()
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
@@ -359,31 +360,22 @@ class Machine:
         data, self._out = self._out, b''
         return data
 
-    def _without_echo(self, data: bytes) -> bytes:
+    def _next_symbol(self) -> Symbol | None:
         """
-        Take the echo off.
+        Return what somebody else has said, None when more bytes are needed.
 
-        Its first two bytes tell it from an answer: what comes in their place shows that the line
-        does not echo any more. Damage in the rest is passed over.
+        A message of ours that comes back is noise in full duplex: a response that was given before
+        must not count for it (M 4-8), in case that it is a PLC's after all.
         """
-        while self._echo_due and data:
-            frame, at = self._echo_due[0], self._echo_at
-            if not data.startswith(frame[at:_HEAD][:len(data)]):
-                self._forget_echo()
-                return frame[:at] + data
-            self._echo_at = min(at + len(data), len(frame))
-            data = data[self._echo_at - at:]
-            if self._echo_at == len(frame):
-                del self._echo_due[0]
-                self._echo_at = 0
-        return data
-
-    def _forget_echo(self) -> None:
-        self._echoes, self._echo_at = False, 0
-        self._echo_due.clear()
+        while (symbol := self.decoder.next_symbol()) is not None:
+            if not self._echo.is_ours(symbol, self.has_left):
+                break
+            if isinstance(symbol, Frame) and not self._is_half_duplex:
+                return NOISE
+        return symbol
 
     def _deliver_symbols(self) -> None:
-        while self._is_listening and (symbol := self.decoder.next_symbol()) is not None:
+        while self._is_listening and (symbol := self._next_symbol()) is not None:
             if self._is_half_duplex or symbol in _RESPONSES:
                 self._take_as_answer()
             if isinstance(symbol, Frame):
@@ -417,13 +409,11 @@ class Machine:
             elif not self._take_step(step):
                 return
             elif not step.frame:
-                heard = self.decoder.next_symbol() or _NOTHING
+                heard = self._next_symbol() or _NOTHING
 
     def _take_step(self, step: Step) -> bool:
         """Carry out a step; return whether the procedure goes on at once."""
         self._resting = step.frame is None
-        if step.is_echoed:
-            self._echoes = True
         if self._resting:
             self._is_listening = not self._forget_on_send
             self._set_deadline(step, self.now)
@@ -445,8 +435,7 @@ class Machine:
             self.counters.chars_sent += size
             self.position += size
             self._line_free = free = free + size * self._timing.char_time
-            if self._echoes:
-                self._echo_due.append(step.frame)
+            self._echo.sent(step.frame, self.position)
             if self._forget_on_send:
                 self.decoder.reset()
         self._set_deadline(step, free)

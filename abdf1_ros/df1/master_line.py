@@ -35,7 +35,7 @@ from typing import NoReturn, TypeGuard
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Poll, Unknown
+from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
 from abdf1_ros.df1.machine import (
     Heard,
     LISTEN_ON,
@@ -65,7 +65,6 @@ MAX_KEPT = 2 * MAX_FORWARDS
 # older one for ever.
 MOST_QUEUED = 8
 
-_LISTEN_ON_ECHOED = LISTEN_ON._replace(is_echoed=True)
 _ACKNOWLEDGE = Step(frames.ACK, 0)
 
 # What answers a message and a poll, but for the frames that answer a poll too.
@@ -231,9 +230,8 @@ class MasterLine:
         """
         Send a question; return a ``wanted`` control symbol, a frame of this station, or silence.
 
-        Other symbols are counted and passed over while the time runs: noise, an answer that
-        comes late, or our own frame coming back from a two-wire adapter. Such an echo is
-        expected from then on, or that of our ACK would be taken for the next station's.
+        Other symbols are counted and passed over while the time runs: noise, or an answer that
+        comes late.
         """
         self._last_code = 0
         step = question
@@ -254,8 +252,6 @@ class MasterLine:
                 self._last_code = symbol.byte
                 if not symbol.is_misplaced:
                     self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
-            elif self._is_echo(symbol, question.frame):
-                step = _LISTEN_ON_ECHOED
         if symbol.is_broken_off:
             return Frame(b'', fault=FrameFault.NO_ETX)
         self._last_code = self._last_code or symbol.last_byte
@@ -306,14 +302,6 @@ class MasterLine:
     def _speaks_for(self, number: int, src: int) -> bool:
         """Tell whether a message of ``src`` may come from station ``number`` of this line."""
         return src == number or self.stations.via(src) == number
-
-    def _is_echo(self, symbol: Frame | Poll, frame: bytes | None) -> bool:
-        """Tell whether ``symbol`` is ``frame``, which we have sent ourselves."""
-        if isinstance(symbol, Poll):
-            return frames.poll_frame(symbol.station) == frame
-        assert symbol.station is not None  # a slave's frame is an answer
-        return frames.master_frame(
-            symbol.station, symbol.data, self.settings.checksum) == frame
 
     def receive(self, number: int,
                 frame: Frame) -> Generator[Step, Heard, Packet | None]:

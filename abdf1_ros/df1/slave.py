@@ -126,7 +126,6 @@ class HalfDuplexSlave:
         if isinstance(symbol, Poll):
             return self._polled(symbol)
         if isinstance(symbol, Frame):
-            self._just_sent = just_sent and self._is_echo(symbol)
             return self._received(symbol)
         if symbol is Control.ACK and just_sent:
             # An ACK names no station: it is ours only straight after our own message.
@@ -151,12 +150,6 @@ class HalfDuplexSlave:
         """Do not send a command of our own again; the caller has ended it."""
         if self._held is not None and not self._held.packet.is_reply:
             self._held = None
-
-    def _is_echo(self, frame: Frame) -> bool:
-        """Tell whether this is our own frame, which two-wire adapters give back."""
-        held = self._held
-        return held is not None and frame.station is None and frame.fault is None \
-            and frame.data == held.packet.encode()
 
     def _release(self, error: LinkError | None = None) -> None:
         """Drop the held message; the sender of a command is told the result (KF2 4-31)."""

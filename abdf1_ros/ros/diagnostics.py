@@ -20,6 +20,8 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, ReadPoint, WriteResult
@@ -196,6 +198,8 @@ class Diagnostics:
             return WARN, f'port open, but not polled for {now - polled:.0f} s'
         active = sum(station.active for station in self._driver.stations)
         total = sum(1 for _ in self._driver.stations)
+        if echo := self.echo_text():
+            return ERROR, echo
         if deaf := len(self.deaf_stations(now)):
             return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
         if total and not active:
@@ -204,6 +208,13 @@ class Diagnostics:
             return WARN, f'port open, {total - active} of {total} stations do not answer'
         heard = sum(station.last_heard is not None for station in self._driver.stations)
         return OK, f'port open, {heard} of {total} stations have answered'
+
+    def echo_text(self) -> str:
+        """Return what to tell of a line that echoes where that does harm, mostly nothing."""
+        is_full_duplex = self._driver.network.duplex is Duplex.FULL
+        nobody_answers = not any(station.active for station in self._driver.stations)
+        does_harm = self._driver.machine.echoes and (is_full_duplex or nobody_answers)
+        return COMES_BACK if does_harm else ''
 
     def _link_values(self, now: float) -> dict[str, str]:
         state = self._link.state if self._link else None

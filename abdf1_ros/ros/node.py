@@ -162,6 +162,7 @@ class BridgeNode(Node):
         self._configuration = configuration
         self._wrong_types: list[str] = []
         self._deaf_stations: list[int] = []
+        self._echo_text = ''
         self._has_told_tools = False
         self._may_have_left_over: set[int | None] = set()
         self._duplicate_names = DuplicateNameWatch(
@@ -421,10 +422,17 @@ class BridgeNode(Node):
                 self._notes.warning('types of PLCs', text)
         self._wrong_types = wrong_types
         self._tell_deaf_stations(self._diagnostics.deaf_stations(now))
+        self._tell_echo(self._diagnostics.echo_text())
         levels = self._diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self._publish_diagnostics(now)
+
+    def _tell_echo(self, text: str) -> None:
+        """Log once that the line gives back what is sent, where that does harm."""
+        if text and text != self._echo_text:
+            self._notes.error('echo', f'{self.port}: {text}')
+        self._echo_text = text
 
     def _tell_deaf_stations(self, numbers: list[int]) -> None:
         """Log once that a station takes no commands, and once that it does again."""

@@ -29,6 +29,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 import pytest
+from support.commands import running_simulator
 from support.driver_bench import simulated_plc
 from support.ptys import Pty
 
@@ -99,6 +100,19 @@ def test_nobody_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     dead.close()
 
 
+def test_slave_behind_an_adapter_that_echoes(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'line')
+    with running_simulator('--pty', port, '--echo'):
+        options = ['slave', '--port', port, *QUICK]
+        assert main([*options, '--echo']) == 0
+        assert '2 passed, 0 failed, 1 skipped' in capsys.readouterr().out
+        assert main(options) == 1
+    with running_simulator('--pty', port):
+        assert main([*options, '--echo']) == 1
+    assert 'leave out --echo' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(('args', 'text'), [
     (['slave', '--port', '/nowhere/at/all'], 'No such file'),
     (['slave'], '--port'),
@@ -115,7 +129,7 @@ def test_bad_options_end_with_two(args: list[str], text: str, tmp_path: Path,
 
 @pytest.mark.parametrize('args', [
     ['slave', '--only', 'nothing'], ['slave', '--station', '255'], ['slave', '--count', '0'],
-    ['slave', '--tcp', 'nowhere'], ['peer', '--words', 'F8:0'], []])
+    ['slave', '--tcp', 'nowhere'], ['peer', '--words', 'F8:0'], ['peer', '--echo'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(args)

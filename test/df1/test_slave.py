@@ -408,17 +408,10 @@ def test_bad_broadcast_is_not_executed() -> None:
     assert (bench.served, bench.counts()) == ([], {'crc_errors': 1})
 
 
-def test_echo_of_our_message_leaves_us_waiting_for_the_ack() -> None:
-    bench = Bench()
-    echo_of_ours = Frame(COMMAND.reply().encode())
-    assert bench.hear(sent(COMMAND), POLL, echo_of_ours, HEARD_ACK, POLL)[2:] == [b'', b'', EOT]
-    assert bench.slave.counters.acks_received == 1
-
-
 @pytest.mark.parametrize('heard', [
     Frame(later(1).reply().encode()), Frame(COMMAND.reply().encode(), None, FrameFault.BAD_CHECK),
     Frame(COMMAND.reply().encode(), STATION)])
-def test_what_only_looks_like_an_echo_takes_the_ack_away(heard: Frame) -> None:
+def test_message_of_another_takes_the_ack_away(heard: Frame) -> None:
     bench = Bench()
     bench.hear(sent(COMMAND), POLL, heard)
     assert bench.hear(HEARD_ACK, POLL)[-1] == reply_frame(COMMAND)

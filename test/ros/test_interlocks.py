@@ -21,13 +21,26 @@ from pathlib import Path
 import time
 from typing import Any
 
+from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.ros.node import BridgeNode
 import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.clock import Stopwatch
-from support.ros import details, Inbox, Observer, Plcs, ros_args, until_status, WARN, write_csv
+from support.commands import running_simulator
+from support.ros import (
+    details,
+    ERROR,
+    Inbox,
+    Observer,
+    Plcs,
+    Process,
+    ros_args,
+    until_status,
+    WARN,
+    write_csv,
+)
 
 NET = ('NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout', ['1,1,500,115200,100'])
 MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Requires,'
@@ -219,3 +232,36 @@ def test_rule_18_read_only_writes_nothing_and_says_so(
         assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 0)
     said = capfd.readouterr().err
     assert said.count('read_only: no heartbeat and no fallback value is written: beat, speed') == 1
+
+
+ECHO_NET = ('Station,Mode,PLC_Type,Cmd_Timeout,Timeout,Baud', ['5,Peer,PLC5,500,50,115200'])
+ECHO_MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Publish_While,Heartbeat_Timeout', [
+    'ours,Serve,N7:0,5,PLC5,,,', 'speed,Write,N7:0,1,PLC5,,,', 'doors,Read,N7:0,1,PLC5,50,RUN,',
+    'counter,Read,N7:1,1,PLC5,50,,', 'lamps,Read,N7:2,1,PLC5,50,counter,1000',
+    'beat,Heartbeat,N7:1,1,PLC5,100,,'])
+
+
+def test_rule_21_an_echo_is_no_plc(tmp_path: Path) -> None:
+    net = write_csv(tmp_path / 'net.csv', *ECHO_NET)
+    rows = write_csv(tmp_path / 'map.csv', *ECHO_MAP)
+    port = tmp_path / 'line'
+    with running_simulator('--pty', str(port), '--echo', '--full-duplex', '1',
+                           '--at', '0 silent 1'), Observer() as observer:
+        diagnostics, results = observer.diagnostics(str(port)), observer.results()
+        heard = [observer.listen(Int16MultiArray, f'/abdf1/{topic}') for topic in (
+            'read/ours', 'read/doors', 'read/counter', 'read/lamps')]
+        with Process('node', *ros_args(f'net_file:={net}', f'map_file:={rows}',
+                                       f'port:={port}')) as node:
+            assert f'{port}: {COMES_BACK}' in node.wait_for('[ERROR]', COMES_BACK)
+            speed = observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+            for value in range(1, 6):
+                speed.publish(Int16MultiArray(data=[value]))
+            observer.until(lambda: len(results) >= 5 or None, 'five results')
+            assert COMES_BACK in until_status(diagnostics, 'link', ERROR).message
+            assert 'inactive' in until_status(diagnostics, 'station 1', ERROR).message
+            until_status(diagnostics, 'mappings', ERROR)
+            status = until_status(diagnostics, 'writes', WARN)
+            assert 'beat: heartbeat does not count' in status.message
+            node.end()
+    assert [list(inbox) for inbox in heard] == [[], [], [], []]
+    assert not any('written' in result.message.split(':')[0].split()[:1] for result in results)

@@ -84,13 +84,14 @@ class VirtualLine:
     ``baud`` is bits per second, ``propagation`` seconds that a byte travels. ``chunk`` bytes
     are handed over together, when the last of them is here (1: as a bare UART does; more: as
     its FIFO or an adapter does). ``noise`` may be changed at any time and acts on what is sent
-    from then on.
+    from then on; so does ``echoes``, with which a sender hears itself.
     """
 
     def __init__(self, *machines: Machine, baud: float = 19200, propagation: float = 0.0,
                  chunk: int = 1, noise: Damage = QUIET, seed: int = 0) -> None:
         self.now = 0.0
         self.noise = noise
+        self.echoes = False
         self.char_time = char_time(baud)
         self._machines = list(machines)
         self._propagation = propagation
@@ -202,7 +203,7 @@ class VirtualLine:
         start = max(self.now, self._free[sender])
         self._free[sender] = start + len(data) * self.char_time
         for receiver in range(len(self._machines)):
-            if receiver != sender:
+            if receiver != sender or self.echoes:
                 self._send(data, start, receiver)
 
     def _send(self, data: bytes, start: float, receiver: int) -> None:

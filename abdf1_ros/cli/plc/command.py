@@ -46,6 +46,7 @@ from abdf1_ros.cli.terminal import (
     RED,
     table,
 )
+from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.errors import (
     Abdf1Error,
@@ -348,6 +349,8 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
     search = detect.Search(network, options.stations, progress.show)
     found = search.run(bauds, modes, checks)
     progress.clear()
+    if search.echoes:
+        _complain(COMES_BACK)
     if found is None:
         _complain('nothing answers with any of these settings')
         for trace in search.traces or [_ALL_TRIED_IN_VAIN]:

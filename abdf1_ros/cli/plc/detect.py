@@ -63,12 +63,14 @@ class Search:
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
     ``show`` gets a text about the settings being tried. ``traces`` has texts about bytes that came
-    without an answer.
+    without an answer. ``echoes`` tells that what was sent came back, which settles that no
+    full-duplex PLC can be there.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
                  show: Callable[[str], None] = lambda text: None) -> None:
         self.traces: list[str] = []
+        self.echoes = False
         self._network = replace(network, nak_retries=0, enq_retries=1,
                                 cmd_timeout=max(500, network.timeout))
         self._stations = stations
@@ -89,6 +91,8 @@ class Search:
         # Most full-duplex ports take messages to any station; of the others most have 0 or 1.
         stations = self._stations[:2] if mode == MODES['full'] else self._stations
         for check in checks:
+            if self.echoes and mode == MODES['full']:
+                return None
             heard = []
             is_first = check == checks[0]
             for presence in self._look(LineSettings(baud, mode, check), stations, is_first):
@@ -115,9 +119,12 @@ class Search:
             for station in stations:
                 self._show(f'trying {settings}, station {station}')
                 presence = look_at(session, station)
+                self.echoes |= session.echoes
+                if session.echoes and settings.mode == MODES['full']:
+                    return
                 if presence.takes_commands and not understands(session, station):
                     presence = replace(presence, takes_commands=False)
                 yield presence
-            if session.counters.chars_received:
+            if session.counters.chars_received and not session.echoes:
                 self.traces.append(
                     f'{settings}: {session.counters.chars_received} characters came')

@@ -23,6 +23,7 @@ import time
 
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity
@@ -130,6 +131,8 @@ def hint(session: Session, error: Abdf1Error) -> str:
     """Return what to look at after an error, where that can be told."""
     if not isinstance(error, LinkError) or isinstance(error, PortLost):
         return ''
+    if session.echoes:
+        return COMES_BACK
     received = session.counters.chars_received
     if not received:
         return f'{SILENCE} "plc detect" tries other settings'

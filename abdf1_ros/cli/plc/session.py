@@ -85,6 +85,11 @@ class Session:
         return self._requests.counters
 
     @property
+    def echoes(self) -> bool:
+        """Tell whether the line gives back what is sent."""
+        return self._requests.machine.echoes
+
+    @property
     def stations(self) -> ActiveStationList:
         """Return what is known of each station."""
         return self._requests.stations

@@ -25,6 +25,7 @@ import subprocess
 import sys
 
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.df1.echo import COMES_BACK
 import pytest
 from support.commands import call, running_simulator, Said
 from support.ptys import Pty
@@ -436,6 +437,60 @@ def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
                                      'plc: 9600 baud, half duplex, CRC: 2 characters came',
                                      'plc: --duplex and --baud and --check: nothing else was '
                                      'tried; leave it out to try all']
+
+
+@pytest.fixture(scope='module')
+def echoing(tmp_path_factory: pytest.TempPathFactory, files: Files) -> Iterator[Process]:
+    """Run a simulator on a line that echoes; ``name`` in its ``args`` is the port."""
+    port = str(tmp_path_factory.mktemp('echoing') / 'line')
+    with running_simulator('--pty', port, '--data', str(files.simulator), '--echo') as process:
+        yield process
+
+
+def echoing_port(process: Process) -> str:
+    """Return the port of the line that echoes."""
+    return process.wait_for(' on ').partition(' on ')[2].partition(',')[0]
+
+
+def test_detect_tells_of_the_echo_and_finds_the_plcs_behind_it(
+        echoing: Process, capsys: pytest.CaptureFixture[str]) -> None:
+    for station in (1, 2):
+        echoing.say(f'normal {station}')
+    port = echoing_port(echoing)
+    said = call(main, capsys, 'detect', '--port', port, '--stations', '1,2', *PATIENT)
+    assert (said.status, said.err.splitlines()[-1]) == (0, f'plc: {COMES_BACK}')
+    assert said.lines[0].startswith('19200 baud, half duplex, CRC: station 1 PLC-5/40')
+    assert call(main, capsys, 'read', 'N7:0', '--port', port, *PATIENT).good_lines == ['N7:0 1200']
+
+
+@pytest.mark.parametrize('args', [
+    ('status', '1'), ('ping', '1'), ('read', 'N7:0', '--station', '1'),
+    ('write', 'N7:0', '1', '--station', '1'), ('read', 'N7:0', '--station', '1', '--plc-type',
+                                               'SLC')])
+@pytest.mark.parametrize('duplex', ['full', 'half'])
+def test_echo_alone_is_no_plc(echoing: Process, capsys: pytest.CaptureFixture[str],
+                              args: tuple[str, ...], duplex: str) -> None:
+    for station in (1, 2):
+        echoing.say(f'silent {station}')
+    said = call(main, capsys, *args, '--port', echoing_port(echoing), '--duplex', duplex,
+                '--timeout', '50')
+    assert (said.status, said.out.strip()) == (1, '4 sent, 0 answered' if 'ping' in args else '')
+    assert f'plc: {COMES_BACK}\n' in said.err
+
+
+@pytest.mark.parametrize('args', [('detect',), ('init', '--into', 'new')])
+def test_detect_finds_nobody_in_an_echo(
+        echoing: Process, capsys: pytest.CaptureFixture[str], args: tuple[str, ...],
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for station in (1, 2):
+        echoing.say(f'silent {station}')
+    said = call(main, capsys, *args, '--port', echoing_port(echoing), '--stations', '1,2',
+                '--baud', '9600', '--timeout', '50')
+    assert (said.status, said.out) == (1, '')
+    assert said.err.splitlines()[:2] == [
+        f'plc: {COMES_BACK}', 'plc: nothing answers with any of these settings']
+    assert 'characters came' not in said.err
 
 
 def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
