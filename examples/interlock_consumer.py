@@ -35,7 +35,6 @@ from collections.abc import Sequence
 import math
 import signal
 import sys
-import threading
 from typing import Any
 
 import rclpy
@@ -182,16 +181,16 @@ def main() -> int:
                         help='seconds without a value after which motion is not permitted')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     # rclpy's own handlers take the ground from under a spin that is under way.
-    ended = threading.Event()
+    ended: list[int] = []  # an event may deadlock when a second signal interrupts its set()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+        signal.signal(number, lambda number, _: ended.append(number))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = InterlockConsumer(options.topic, options.bits, options.patience,
                                  latches=options.latch, address=options.address)
     except InvalidTopicNameException as error:
         parser.error(' '.join(str(error).split()))
-    while not ended.is_set():
+    while not ended:
         rclpy.spin_once(node, timeout_sec=0.1)
     node.destroy_node()
     rclpy.try_shutdown()

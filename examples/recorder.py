@@ -34,7 +34,6 @@ import math
 import os
 import signal
 import sys
-import threading
 import time
 from typing import Any, TextIO
 
@@ -101,11 +100,11 @@ class Recorder(Node):
         return take
 
 
-def record(node: Recorder, seconds: float, wait: float, ended: threading.Event) -> bool:
+def record(node: Recorder, seconds: float, wait: float, ended: list[int]) -> bool:
     """Spin until the time is up or a signal has come; whether the bridge was there."""
     begin = said = time.monotonic()
     while time.monotonic() < begin + seconds:
-        if ended.is_set():
+        if ended:
             return True
         rclpy.spin_once(node, timeout_sec=0.1)
         if not node.has_found_topics and time.monotonic() > begin + wait:
@@ -128,9 +127,9 @@ def main() -> int:
                         help='seconds to look for the bridge (default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     # rclpy's own handlers would not let the file be closed in order.
-    ended = threading.Event()
+    ended: list[int] = []  # an event may deadlock when a second signal interrupts its set()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+        signal.signal(number, lambda number, _: ended.append(number))
     try:
         with open(options.file, 'x', newline='', encoding='utf-8') as file:
             return run(options, file, ended)
@@ -139,7 +138,7 @@ def main() -> int:
         return 2
 
 
-def run(options: argparse.Namespace, file: TextIO, ended: threading.Event) -> int:
+def run(options: argparse.Namespace, file: TextIO, ended: list[int]) -> int:
     """Record into ``file``; return the exit status."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Recorder(options.node, file)

@@ -24,7 +24,7 @@ from tools.rooms import imports, MODULES, PACKAGE, room_of
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
-_MAY_WAIT = ('ports/', 'ros/lines.py', 'ros/node.py', 'ros/process.py', 'cli/simulator.py',
+_MAY_WAIT = ('signals.py', 'ports/', 'ros/lines.py', 'ros/process.py', 'cli/simulator.py',
              'cli/sniff.py', 'cli/plc/watch.py')
 
 

@@ -85,7 +85,8 @@ ROOMS = (
     Room(('simulator',), 'simulated PLCs and the commands that they take',
          (*_BASE, 'numbers', 'df1', 'pccc', 'settings')),
     Room(('conform',), 'cases of the manual, played against the other end of a line', ()),
-    Room(('paths.py',), 'where installed files lie, and of which version', (), is_pure=False),
+    Room(('paths.py', 'signals.py'), 'where installed files lie; the end that a signal asks for',
+         (), is_pure=False),
     Room(('ros',), 'the ROS node: parameters, messages, diagnostics, log', is_pure=False),
     Room(('cli', '__main__.py'), 'the commands, one file or folder each', is_pure=False),
 )

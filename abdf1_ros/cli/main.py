@@ -23,13 +23,14 @@ time.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 import os
 from pathlib import Path
 import signal
 import sys
 from types import FrameType
+from typing import NoReturn
 
 _NOT_INSTALLED = 2
 _INTERRUPTED = 130  # of the commands whose exit status tells success or failure
@@ -49,12 +50,19 @@ COMMANDS = {
 
 _TELLING = ('check', 'plc', 'conform')
 
+# They have done all that has to be done, and take signals without effect. What rclpy has in
+# thousands of objects and some threads may hold up the end of the interpreter for ever.
+_LEAVING = ('node', 'lines', 'simulator')
+
 
 def run(name: str) -> int:
     """Run a command with the arguments of this process; return its exit status."""
     with _ending_quietly(_INTERRUPTED if name in _TELLING else 0):
         module = import_module(COMMANDS[name])
-    return _ended(module.main())
+    status = module.main()
+    if name in _LEAVING:
+        _leave(status)
+    return _ended(status)
 
 
 def node() -> int:
@@ -98,8 +106,8 @@ def _ending_quietly(status: int = 0) -> Iterator[None]:
     def leave(number: int, frame: FrameType | None) -> None:
         os._exit(status)
 
-    usual = {number: signal.signal(number, leave)
-             for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, leave)
     try:
         yield
     except ModuleNotFoundError as error:
@@ -110,8 +118,6 @@ def _ending_quietly(status: int = 0) -> Iterator[None]:
         print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; {cure}',
               file=sys.stderr)
         sys.exit(_NOT_INSTALLED)
-    for number, handler in usual.items():
-        signal.signal(number, handler)
 
 
 def _ended(status: int) -> int:
@@ -119,3 +125,11 @@ def _ended(status: int) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     return status
+
+
+def _leave(status: int) -> NoReturn:
+    """End the process at once; what it has said is not lost."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # the reader has left
+            stream.flush()
+    os._exit(status)

@@ -60,6 +60,7 @@ from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, Tcp
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
+from abdf1_ros.signals import EndRequest
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
 from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.ladder import Ladder, Lamp
@@ -182,7 +183,8 @@ def _play(plcs: Sequence[SimulatedPlc], line: Endpoint, script: TimedCommands,
     _say(f'stations {names} on {line.name}, {options.check}')
     try:
         link.start()
-        _converse(plcs, script, link, options)
+        with EndRequest((signal.SIGINT, signal.SIGTERM)) as ended:
+            _converse(plcs, script, link, options, ended)
     finally:  # the thread would keep the process alive
         link.stop()
     return EXIT_FAULT if link.has_failed else 0
@@ -352,7 +354,7 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
 
 
 def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThread,
-              options: argparse.Namespace) -> None:
+              options: argparse.Namespace, ended: EndRequest) -> None:
     """Carry out commands as they come, until it is time to end."""
     def carry_out(line: str) -> None:
         if line.strip() == 'quit':
@@ -364,9 +366,6 @@ def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThr
                 _say(str(error))
             link.wake()
 
-    ended = threading.Event()
-    signal.signal(signal.SIGINT, lambda *_: ended.set())
-    signal.signal(signal.SIGTERM, lambda *_: ended.set())
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # or a background process is stopped
     begin = time.monotonic()
     inputs = [sys.stdin.fileno()] if sys.stdin else []

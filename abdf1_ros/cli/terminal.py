@@ -95,9 +95,9 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def ignore_further() -> None:
-    """Ignore further signals while the process ends."""
-    for number in _ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    """Take further signals without effect while the process ends."""
+    for number in _ENDING:  # not SIG_IGN: Python tells of a signal that comes in that moment
+        signal.signal(number, lambda number, frame: None)
 
 
 def drop_output() -> None:

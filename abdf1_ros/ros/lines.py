@@ -23,15 +23,13 @@ a line needs 1.3 ms. What goes wrong with one line stays with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import difflib
 import itertools
-import os
 from pathlib import Path
 import resource
-import sys
 import threading
 import time
 from typing import Any
@@ -45,14 +43,16 @@ from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
     LAST_WRITES,
     make_parser,
+    Program,
+    REFUSALS,
     run_ros,
     take_last_writes,
 )
+from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
-from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -74,7 +74,7 @@ A line whose files have faults is told and left out; -p strict_lines:=true ends 
 A line that ends by an internal error is started again, the others notice nothing.
 
 exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty parameters or where no line can
-run, 1 where ROS does not start (log directory, network)
+run, 1 after internal errors, and where ROS does not start (log directory, network)
 """
 
 # The parameters of /lines, with what they are by default.
@@ -92,12 +92,10 @@ _GROUPS = 10
 # Without this service, which is not needed, a hundred nodes take 13 MiB of 264 less.
 _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
 
-# Of the end (s): until when writes that have come are waited for, counted from its beginning; how
-# long the last diagnostics may take; and the nodes, of which those that are left end with the
-# process.
+# Of the end (s): until when writes that have come are waited for, counted from its beginning, and
+# how long the last diagnostics may take.
 _LATEST_WRITES = 3.0
 _LAST_WORDS = 0.5
-_DESTRUCTION = 1.0
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -170,7 +168,7 @@ class Line:
                 parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
         except ConfigurationError as error:
             self.faults = tuple(map(str, error.problems))
-        except (NameValidationException, RuntimeError, ValueError) as error:
+        except REFUSALS as error:
             self.faults = (' '.join(str(error).split()),)
         except Exception as error:  # a bug must not end the other lines
             self._begin_again(error)
@@ -223,15 +221,14 @@ class Line:
         if self.node is not None:
             self.node.link.ask_to_stop()
 
-    def quit(self, give_up: float) -> BridgeNode | None:  # noqa: A003
-        """End the link and the callbacks; return the node if nobody uses it any more."""
+    def quit(self, give_up: float) -> None:  # noqa: A003
+        """End the link and the callbacks, up to a monotonic clock value."""
         if self._closing is not None:
             self._closing.join(max(0.0, give_up - time.monotonic()))
         if self.node is not None:
             _say_last_words(self.node, give_up)
         if self._callbacks is not None:
             self._callbacks.end(give_up)
-        return None if self.is_busy else self.node
 
     @property
     def is_busy(self) -> bool:
@@ -321,25 +318,33 @@ class Lines:
         self._executor.add_node(node)
         self._next_status = 0.0
 
-    def start(self, is_ended: Callable[[], bool]) -> None:
-        """
-        Make all nodes, then run them, until asked to end.
-
-        Lines that run would have the interpreter lock most of the time that the others need: a
-        hundred nodes took four times as long, and their threads half as long again. Threads that
-        take callbacks would wake up at each node that is made.
-        """
         for line in self.lines:
-            if is_ended():
-                return
             line.make()
-        for line in self.lines:
-            line.take_callbacks()
-        for line in self.lines:
-            line.open_port()
 
-    def run(self, ended: threading.Event) -> None:
-        """Look after all lines until the end."""
+    def run(self, ended: EndRequest) -> int:
+        """
+        Run all lines until the end; return the exit status.
+
+        All nodes have been made before: lines that run would have the interpreter lock most of the
+        time that the others need: a hundred nodes took four times as long, and their threads half
+        as long again. Threads that take callbacks would wake up at each node that is made.
+        """
+        running = sum(line.node is not None for line in self.lines)
+        self._node.get_logger().info(f'{running} of {len(self.lines)} lines run')
+        if running < (len(self.lines) if self._node.is_strict else 1):
+            return EXIT_CONFIGURATION
+        try:
+            for line in self.lines:
+                line.take_callbacks()
+            for line in self.lines:
+                line.open_port()
+            self._look_after(ended)
+        finally:
+            ended.set()
+            self._end()
+        return 0
+
+    def _look_after(self, ended: EndRequest) -> None:
         groups = min(_GROUPS, len(self.lines))
         for group in itertools.cycle(range(groups)):
             if ended.wait(LEVEL_CHECK_PERIOD / groups):
@@ -362,8 +367,8 @@ class Lines:
             self._next_status = now + _STATUS_PERIOD
             self._node.publish(self.lines)
 
-    def end(self) -> bool:
-        """End all links, then all nodes; return whether there was time for the latter."""
+    def _end(self) -> None:
+        """End all links, then take the last writes and say the last words."""
         began = time.monotonic()
         nodes = [line.node for line in self.lines if line.node is not None]
         for node in nodes:
@@ -377,13 +382,15 @@ class Lines:
         take_last_writes(time.sleep, lambda: sum(node.writes_taken for node in nodes),
                          min(time.monotonic() + LAST_WRITES, began + _LATEST_WRITES))
         give_up = time.monotonic() + _LAST_WORDS
-        left = [*filter(None, (line.quit(give_up) for line in self.lines))]
-        give_up = time.monotonic() + _DESTRUCTION
-        while left and time.monotonic() < give_up:
-            left.pop().destroy_node()
+        for line in self.lines:
+            line.quit(give_up)
+
+    def destroy(self) -> None:
+        """Destroy all nodes that nobody uses any more."""
         self._executor.shutdown()
-        self._node.destroy_node()
-        return not left and not any(line.is_busy for line in self.lines)
+        for node in (self._node, *(line.node for line in self.lines if not line.is_busy)):
+            if node is not None:
+                node.destroy_node()
 
 
 def sections(path: str) -> list[LineName]:
@@ -455,10 +462,10 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run the lines until SIGINT, SIGTERM or SIGHUP.
 
-    Returns 0 after a signal, 2 when parameters are faulty or no line can run, 1 where ROS does
-    not start for a reason that may pass.
+    Returns 0 after a signal, 2 when parameters are faulty or no line can run, 1 after internal
+    errors and where ROS does not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _run, args)
+    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args)
 
 
 def _allow_files() -> None:
@@ -468,7 +475,7 @@ def _allow_files() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
-def _run(given: Sequence[str], ended: threading.Event) -> int:
+def _make(given: Sequence[str]) -> Program:
     if any(word in text for text in given for word in ('__node:=', '__name:=', '__ns:=')):
         raise ConfigurationError([Problem('arguments', (
             'the sections of the parameter file name the nodes; __node and __ns would give all '
@@ -477,17 +484,4 @@ def _run(given: Sequence[str], ended: threading.Event) -> int:
     _allow_files()
     node = LinesNode()
     lines = Lines(chosen([*names], node.wanted), node)
-    lines.start(ended.is_set)
-    running = sum(line.node is not None for line in lines.lines)
-    node.get_logger().info(f'{running} of {len(lines.lines)} lines run')
-    is_fit = running == len(lines.lines) if node.is_strict else running > 0
-    if is_fit:
-        lines.run(ended)
-    status = 0 if is_fit or ended.is_set() else EXIT_CONFIGURATION
-    if not lines.end():
-        # To destroy what is left would take longer than whoever ends us may wait. Others find
-        # these nodes gone when the lease of the participant is over.
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
-    return status
+    return Program(lines.run, lines.destroy)

@@ -27,7 +27,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 import random
-import threading
 import time
 from typing import Any
 
@@ -54,6 +53,7 @@ from abdf1_ros.ros.process import (
     EXIT_FAULT,
     LAST_WRITES,
     make_parser,
+    Program,
     run_ros,
     take_last_writes,
 )
@@ -63,6 +63,7 @@ from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.values import Values
+from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -573,26 +574,31 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors and
     where ROS does not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _run, args)
+    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args)
 
 
-def _run(given: Sequence[str], ended: threading.Event) -> int:
+def _make(given: Sequence[str]) -> Program:
     node = BridgeNode()
-    try:
-        _spin(node, ended)
-    finally:
-        node.stop()
-    failed = node.link.has_failed
-    node.destroy_node()
-    return EXIT_FAULT if failed else 0
+    return Program(partial(_run, node), node.destroy_node)
 
 
-def _spin(node: BridgeNode, ended: threading.Event) -> None:
+def _run(node: BridgeNode, ended: EndRequest) -> int:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    node.start()
-    while not ended.is_set() and not node.link.has_failed:
-        executor.spin_once(timeout_sec=0.1)
+    try:
+        node.start()
+        while not ended.is_set() and not node.link.has_failed:
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        ended.set()
+        try:
+            _end(node, executor)
+        finally:
+            node.stop()
+    return EXIT_FAULT if node.link.has_failed else 0
+
+
+def _end(node: BridgeNode, executor: SingleThreadedExecutor) -> None:
     node.begin_end()
     node.finish_end(time.monotonic() + END_LIMIT)
     node.link.stop()

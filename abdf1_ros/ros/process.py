@@ -21,17 +21,20 @@ It serves ``node`` and ``lines``.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+import faulthandler
 import os
 import re
 import signal
 import sys
 import threading
 import time
-from types import FrameType
+import traceback
+from typing import NamedTuple
 
 from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import ShowVersion
+from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -42,6 +45,16 @@ from rclpy.utilities import remove_ros_args
 
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
+
+# After a signal the process is gone within so many seconds, and nodes are taken off the network
+# for so long. What comes before takes 4 s at most: PLCs, writes that have come, last words.
+_END_LIMIT = 5.0
+_DESTRUCTION_LIMIT = 4.5
+
+# What rclpy raises for names, parameters and arguments, and where ROS does not start. Other errors
+# are bugs.
+REFUSALS = (NameValidationException, ParameterException, rclpy_implementation.RCLError,
+            rclpy_implementation.UnknownROSArgsError)
 
 # A look that takes so long (s) without a write has found none. Only several in a row tell that no
 # write from before the end still waits: another callback, held up by a busy host, takes as long.
@@ -67,44 +80,100 @@ def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
     return parser
 
 
+class Program(NamedTuple):
+    """
+    What a process runs, once it is made.
+
+    ``run`` returns the exit status soon after its argument has been set, when PLCs and the results
+    of writes are done; it sets it itself where it ends for another reason. ``destroy`` does what
+    may be left to the end of the process.
+    """
+
+    run: Callable[[EndRequest], int]
+    destroy: Callable[[], None]
+
+
 def run_ros(name: str, parser: argparse.ArgumentParser,
-            run: Callable[[Sequence[str], threading.Event], int],
-            args: Sequence[str] | None = None) -> int:
+            make: Callable[[Sequence[str]], Program], args: Sequence[str] | None = None) -> int:
     """
-    Call ``run`` in a ROS context until SIGINT, SIGTERM or SIGHUP, and return the exit status.
+    Run in a ROS context until SIGINT, SIGTERM or SIGHUP, and return the exit status.
 
-    ``run`` gets the arguments of the process (``args``, by default its own). It is to end soon
-    after its event has been set, by a signal, and returns the status, 0 after a signal. What has
-    kept it from starting is told as ``name``: EXIT_CONFIGURATION where arguments, parameters or
-    files have to be changed, EXIT_FAULT for a reason that may pass.
+    ``make`` gets the arguments of the process (``args``, by default its own) and opens no port
+    yet. What keeps it from making a program is told as ``name``: EXIT_CONFIGURATION where
+    arguments, parameters or files have to be changed, EXIT_FAULT for a reason that may pass. An
+    error while the program runs is a bug, with a traceback and EXIT_FAULT.
     """
-    ended = threading.Event()
+    program: Program | None = None
 
-    def end(number: int, frame: FrameType | None) -> None:
-        ended.set()
+    def begin_end() -> None:
+        if program is None:  # no port is open: nobody has to be told
+            os._exit(0)
+        _end_by_the_clock()
 
     given = list(sys.argv if args is None else args)
-    signal.signal(signal.SIGINT, end)
-    signal.signal(signal.SIGTERM, end)
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # not under nohup
-        signal.signal(signal.SIGHUP, end)
-    try:
-        if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
-            parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
-                         '--ros-args')
-        _check_log_directory()
-        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
-        return run(given, ended)
-    except ConfigurationError as error:
-        for problem in error.problems:
-            get_logger(name).fatal(str(problem))
-        return EXIT_CONFIGURATION
-    except (NameValidationException, ParameterException, RuntimeError, ValueError) as error:
-        status, text = _refusal(error)
-        print(f'{name}: {text}', file=sys.stderr)
+    with EndRequest(_ending_signals(), begin_end) as ended:
+        try:
+            made = _made(parser, make, given)
+        except ConfigurationError as error:
+            for problem in error.problems:
+                get_logger(name).fatal(str(problem))
+            return EXIT_CONFIGURATION
+        except REFUSALS as error:
+            status, text = _refusal(error)
+            print(f'{name}: {text}', file=sys.stderr)
+            return status
+        program = made
+        try:
+            status = program.run(ended)
+        except Exception as error:
+            get_logger(name).fatal(f'internal error: {error!r}')
+            traceback.print_exc()
+            status = EXIT_FAULT
+        ended.set()
+        _destroy(program, ended.when + _DESTRUCTION_LIMIT)
         return status
-    finally:
+
+
+def _ending_signals() -> Iterator[signal.Signals]:
+    yield from (signal.SIGINT, signal.SIGTERM)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # it is under nohup
+        yield signal.SIGHUP
+
+
+def _made(parser: argparse.ArgumentParser, make: Callable[[Sequence[str]], Program],
+          given: list[str]) -> Program:
+    if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
+        parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
+                     '--ros-args')
+    _check_log_directory()
+    rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        return make(given)
+    except BaseException:
         rclpy.try_shutdown()
+        raise
+
+
+def _end_by_the_clock() -> None:
+    """Have the process ended, whatever holds it up; its threads are shown then."""
+    # Not a thread in Python: code in C that does not come back may hold the interpreter lock.
+    faulthandler.dump_traceback_later(_END_LIMIT, exit=True, file=2)
+
+
+def _destroy(program: Program, give_up: float) -> None:
+    """
+    Take the nodes off the network, if that is done at a monotonic clock value.
+
+    With thousands of topics it takes seconds. Otherwise others find them gone when the lease of
+    the participant is over.
+    """
+    def destroy() -> None:
+        program.destroy()
+        rclpy.try_shutdown()
+
+    thread = threading.Thread(target=destroy, name='destroying', daemon=True)
+    thread.start()
+    thread.join(max(0.0, give_up - time.monotonic()))
 
 
 def take_last_writes(look: Callable[[float], None], taken: Callable[[], int], give_up: float,

@@ -16,20 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 import resource
-import signal
 import threading
 import time
-from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.ros import lines as module
+from abdf1_ros.ros import process
 from abdf1_ros.ros.lines import chosen, LineName, main, parameter_files, sections
 from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.signals import EndRequest
 import pytest
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Int16MultiArray
@@ -115,8 +115,9 @@ def test_no_line_at_all() -> None:
 class Plant:
     """Simulated PLCs on lines of their own, and ``lines`` in a thread of this process."""
 
-    def __init__(self, folder: Path, stack: ExitStack) -> None:
+    def __init__(self, folder: Path, stack: ExitStack, request: EndRequest) -> None:
         self.folder = folder
+        self._request = request
         self.observer = stack.enter_context(Observer())
         rows = ['1,PLC5,N7:0,16,7 8']
         self.plcs = {}
@@ -128,7 +129,6 @@ class Plant:
             self.plcs[name] = stack.enter_context(Plcs(data))
         self.status = 0
         self._thread = threading.Thread()
-        self._end: Callable[..., None] = lambda *arguments: None
         for name in self.plcs:
             self.write_map(name, 'speed,Read,N7:0,1,PLC5,2')
             self.write_net(name, self.plcs[name].port)
@@ -169,34 +169,32 @@ class Plant:
         """Let a bug show in a line."""
         self.nodes[name]._reads._topics = {}
 
-    def end(self, handlers: dict[int, Callable[..., None]]) -> int:
+    def end(self) -> int:
         """End the process as SIGTERM does; return its exit status."""
         if self._thread.is_alive():
-            handlers[signal.SIGTERM](signal.SIGTERM, None)
+            self._request.set()
             self._thread.join(PATIENCE)
             assert not self._thread.is_alive()
         return self.status
 
 
-@pytest.fixture
-def handlers(monkeypatch: pytest.MonkeyPatch) -> dict[int, Callable[..., None]]:
-    """Return the handlers that are set: only the main thread could really set them."""
-    found: dict[int, Callable[..., None]] = {}
-    monkeypatch.setattr(signal, 'signal', found.__setitem__)
-    return found
+@pytest.fixture(autouse=True)
+def end_request(monkeypatch: pytest.MonkeyPatch) -> EndRequest:
+    """Return what asks the process to end: only the main thread could take signals."""
+    event = EndRequest(())
+    monkeypatch.setattr(process, 'EndRequest', lambda *arguments: nullcontext(event))
+    monkeypatch.setattr(process, '_end_by_the_clock', lambda: None)  # it would end all tests too
+    return event
 
 
 @pytest.fixture
-def plant(tmp_path: Path, handlers: dict[int, Callable[..., None]],
+def plant(tmp_path: Path, end_request: EndRequest,
           monkeypatch: pytest.MonkeyPatch) -> Iterator[Plant]:
-    left: list[int] = []  # what does not end in time is left, which would end all tests too
-    monkeypatch.setattr(module, 'os', SimpleNamespace(_exit=left.append))
     with ExitStack() as stack:
-        plant = Plant(tmp_path, stack)
+        plant = Plant(tmp_path, stack, end_request)
         monkeypatch.setattr(module, 'BridgeNode', plant.make_node)
         yield plant
-        plant.end(handlers)
-        assert left == []
+        plant.end()
         assert not get_default_context().ok()
 
 
@@ -206,7 +204,7 @@ def line_status(plant: Plant, level: bytes) -> dict[str, str]:
 
 
 def test_each_line_is_a_node_of_its_own(
-        plant: Plant, handlers: dict[int, Callable[..., None]]) -> None:
+        plant: Plant) -> None:
     plant.start()
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
     assert get_parameters(plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
@@ -215,7 +213,7 @@ def test_each_line_is_a_node_of_its_own(
     assert line_status(plant, OK)['running'] == '3'
     response = plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request())
     assert response.success
-    assert plant.end(handlers) == 0
+    assert plant.end() == 0
     assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
 
 
@@ -244,11 +242,11 @@ def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None
 
 
 def test_faulty_line_ends_all_where_that_is_asked_for(
-        plant: Plant, handlers: dict[int, Callable[..., None]]) -> None:
+        plant: Plant) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
     plant.start('-p', 'strict_lines:=true')
     plant._thread.join(PATIENCE)
-    assert plant.end(handlers) == 2
+    assert plant.end() == 2
 
 
 def test_lines_that_are_named_run_alone(plant: Plant) -> None:
@@ -344,7 +342,7 @@ def test_internal_error_restarts_its_line_only(
 
 
 def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
-        plant: Plant, handlers: dict[int, Callable[..., None]],
+        plant: Plant,
         monkeypatch: pytest.MonkeyPatch) -> None:
     never = threading.Event()
 
@@ -357,13 +355,13 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
     plant.start()
     assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
     began = time.monotonic()
-    assert plant.end(handlers) == 0
+    assert plant.end() == 0
     assert time.monotonic() - began < 5
     never.set()
 
 
 def test_argument_that_is_not_of_ros_is_refused(
-        handlers: dict[int, Callable[..., None]], capsys: pytest.CaptureFixture[str]) -> None:
+        capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['lines', 'map.csv'])
     assert ending.value.code == 2
@@ -373,7 +371,7 @@ def test_argument_that_is_not_of_ros_is_refused(
 
 
 def test_one_name_for_all_lines_is_refused(
-        handlers: dict[int, Callable[..., None]], capfd: pytest.CaptureFixture[str]) -> None:
+        capfd: pytest.CaptureFixture[str]) -> None:
     assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
     assert 'the sections of the parameter file name the nodes' in capfd.readouterr().err
 
@@ -385,7 +383,7 @@ def test_one_name_for_all_lines_is_refused(
     ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
     ('line:=[a]', 'there is no such parameter; did you mean lines?')])
 def test_options_that_cannot_be_meant(
-        tmp_path: Path, option: str, text: str, handlers: dict[int, Callable[..., None]],
+        tmp_path: Path, option: str, text: str,
         capfd: pytest.CaptureFixture[str]) -> None:
     path = yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')
     assert main(['lines', '--ros-args', '--params-file', path, '-p', option]) == 2

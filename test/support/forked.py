@@ -22,6 +22,7 @@ A fork has arguments, environment, folder, standard streams and an exit status o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 import os
@@ -76,7 +77,8 @@ class Forked:
     def send_signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with suppress(ProcessLookupError):  # the server knows before we do
+                os.kill(self.pid, number)
 
     def kill(self) -> None:
         """End it at once."""

@@ -1,0 +1,70 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The end of a process that a signal asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import os
+import signal
+import threading
+import time
+from typing import Self
+
+
+class EndRequest(threading.Event):
+    """
+    Is set when a signal asks this process to end; a context manager of the main thread.
+
+    A handler in Python runs between any two steps of the main thread, also of a handler. One that
+    takes a lock, as an event does, may wait for itself for ever. So the handler does nothing. The
+    interpreter writes each signal to a pipe, and the thread that reads it sets the event, also
+    while the main thread is held up. A process that ends by itself sets it too. ``on_set`` is
+    called then, and ``when`` is the monotonic clock value.
+    """
+
+    def __init__(self, numbers: Iterable[signal.Signals],
+                 on_set: Callable[[], None] = lambda: None) -> None:
+        super().__init__()
+        self.when = 0.0
+        self._on_set = on_set
+        self._numbers = tuple(numbers)
+        self._reader = self._writer = -1
+
+    def __enter__(self) -> Self:
+        self._reader, self._writer = os.pipe()
+        os.set_blocking(self._writer, False)
+        threading.Thread(target=self._wait_for_signals, name='signals', daemon=True).start()
+        signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        for number in self._numbers:
+            signal.signal(number, lambda number, frame: None)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Leave the handlers: a signal disturbs the rest of the process neither."""
+        signal.set_wakeup_fd(-1)
+        os.close(self._writer)
+
+    def set(self) -> None:  # noqa: A003
+        if not self.is_set():
+            self.when = time.monotonic()
+            self._on_set()
+        super().set()
+
+    def _wait_for_signals(self) -> None:
+        while number := os.read(self._reader, 1):
+            if number[0] in self._numbers:
+                self.set()
+        os.close(self._reader)
