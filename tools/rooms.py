@@ -70,9 +70,10 @@ ROOMS = (
     Room(('errors.py',), 'the exceptions', ('messages', 'text')),
     Room(('df1',), 'the link: frames, checksums, machine, stations; master, standard polling, '
                    'slave, peer', _BASE),
-    Room(('pccc',), 'the commands: addresses, data table, server; a folder for each PLC family',
+    Room(('pccc',), 'the commands: addresses, values, data table, server; a folder for each PLC '
+         'family',
          (*_BASE, 'text', 'df1.packet')),
-    Room(('settings',), 'both CSV files and the values in them',
+    Room(('settings',), 'both CSV files',
          (*_BASE, 'numbers', 'text', 'df1', 'pccc')),
     Room(('plan',), 'what is read together, what it costs, what comes of it',
          ('df1', 'pccc', 'settings')),

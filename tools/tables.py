@@ -31,9 +31,9 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import status_text
+from abdf1_ros.pccc.values import types_of
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.network import FIELDS, NetField
-from abdf1_ros.settings.values import types_of
 
 from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
 from tools.rooms import ROOMS

@@ -50,6 +50,7 @@ from abdf1_ros.messages import Event
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.forecast import (
     block_time,
     line_model,
@@ -64,7 +65,6 @@ from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 
 # Other commands go between the packets of one read. On a busy line the read may take so many times
 # its own time.

@@ -25,9 +25,9 @@ from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
+from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, Publish
-from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.text import value_text
 
 _SHOWN_VALUES = 16

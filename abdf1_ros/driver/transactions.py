@@ -28,9 +28,9 @@ from abdf1_ros.pccc.families import decode_identity, family_of
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.values import Values
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')

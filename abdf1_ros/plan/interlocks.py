@@ -24,12 +24,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import ValueType
 
 # A station that we write heartbeats or fallbacks to is asked for its mode so often (s): a change
 # to RUN is a first contact (rule 2).

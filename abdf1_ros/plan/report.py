@@ -30,13 +30,13 @@ from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast, interlocks
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.settings.remarks import network_remarks
-from abdf1_ros.settings.values import ValueType
 
 _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the poll cycle

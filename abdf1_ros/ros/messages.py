@@ -22,8 +22,8 @@ import math
 from typing import Any
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.settings.mapping import Mapping, Publish
-from abdf1_ros.settings.values import Values, ValueType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message

@@ -36,6 +36,7 @@ from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -62,7 +63,6 @@ from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.values import Values
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

@@ -24,9 +24,9 @@ import math
 from typing import Any
 
 from abdf1_ros.driver.points import ReadPoint
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.messages import encoder, MESSAGES, read_qos
 from abdf1_ros.settings.mapping import Mapping, Publish
-from abdf1_ros.settings.values import Values
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 

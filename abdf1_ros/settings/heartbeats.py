@@ -29,8 +29,8 @@ import difflib
 from typing import Protocol
 
 from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.csv_table import Row
-from abdf1_ros.settings.values import ValueType
 
 DEFAULT_PERIOD = 1000
 """Of a heartbeat (ms)."""

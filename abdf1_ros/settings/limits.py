@@ -20,8 +20,8 @@ from array import array
 from collections.abc import Sequence
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.values import ValueType
 from abdf1_ros.text import value_text
 
 

@@ -31,6 +31,8 @@ from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxErro
 from abdf1_ros.pccc.families import accesses_of, FAMILIES, family_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.structures import type_fault, write_fault
+from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row, shown
 from abdf1_ros.settings.heartbeats import (
@@ -45,8 +47,6 @@ from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.settings.structures import type_fault, write_fault
-from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 _NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)
 MAX_PERIOD = 86_400_000  # ms

@@ -30,9 +30,9 @@ from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, values_text
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.settings.values import Codec, ValueType, WordOrder
 
 # Access of a Serve row whose words the other end may only read.
 READ_ONLY = 'Read'

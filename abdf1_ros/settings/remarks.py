@@ -24,11 +24,11 @@ from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.station_lists import octal_remarks
-from abdf1_ros.settings.values import ValueType
 
 _ACK_SIZE = 2
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import math
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.settings.values import FLOAT_MAX, ValueType
+from abdf1_ros.pccc.values import FLOAT_MAX, ValueType
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,8 +41,8 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
+from abdf1_ros.pccc.values import Codec, types_of, ValueType
 from abdf1_ros.settings.csv_table import read_rows, Row
-from abdf1_ros.settings.values import Codec, types_of, ValueType
 from abdf1_ros.simulator.ladder import Ladder
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period', 'Via')

@@ -61,11 +61,11 @@ from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
 from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
+from abdf1_ros.pccc.values import Values  # noqa: E402
 from abdf1_ros.ports.descriptor import DescriptorPort  # noqa: E402
 from abdf1_ros.ports.link_thread import LinkThread  # noqa: E402
 from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import Network  # noqa: E402
-from abdf1_ros.settings.values import Values  # noqa: E402
 from paced_line import BareLine, block_of, Listener, WORDS  # noqa: E402
 
 STATION = 1

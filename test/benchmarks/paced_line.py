@@ -49,11 +49,11 @@ from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 
 BITS = 10

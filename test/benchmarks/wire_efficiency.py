@@ -48,9 +48,9 @@ from abdf1_ros.driver.links import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
+from abdf1_ros.pccc.values import Values  # noqa: E402
 from abdf1_ros.settings.mapping import Mapping  # noqa: E402
 from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
-from abdf1_ros.settings.values import Values  # noqa: E402
 from paced_line import (  # noqa: E402
     answering_line,
     answering_pty,

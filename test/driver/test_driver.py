@@ -30,10 +30,10 @@ from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.forecast import block_time, longest_wait
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.cases import for_all

@@ -27,8 +27,8 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.errors import PortLost
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
 

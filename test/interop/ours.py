@@ -32,11 +32,11 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import Codec, types_of, ValueType
 from abdf1_ros.ports.endpoints import SerialEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.messages import MESSAGES, values_of, write_qos
-from abdf1_ros.settings.values import Codec, types_of, ValueType
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from cases import Case, same, Values
 from std_msgs.msg import String

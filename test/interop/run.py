@@ -47,7 +47,7 @@ from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
 from abdf1_ros.pccc.families import dialect_of  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.server import Server  # noqa: E402
-from abdf1_ros.settings.values import ValueType  # noqa: E402
+from abdf1_ros.pccc.values import ValueType  # noqa: E402
 from cases import Case, CASES, same, Values  # noqa: E402
 from ethernet import ask, DuplexLine, EthernetPlc, serve  # noqa: E402
 from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, wanted  # noqa: E402

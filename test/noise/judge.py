@@ -29,8 +29,8 @@ from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, FrameFault, Symbol
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.values import Values
 from noise.wire import Wire
 
 _VERSIONS = 500

@@ -29,6 +29,7 @@ from abdf1_ros.driver.fallbacks import FallbackCause
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
@@ -37,7 +38,6 @@ from abdf1_ros.ros.write_log import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from support.ros import details, ERROR, OK, WARN, write_csv

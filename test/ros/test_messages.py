@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.ros.messages import (
     encoder,
     latched_qos,
@@ -33,7 +34,6 @@ from abdf1_ros.ros.messages import (
 )
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.values import ValueType
 import pytest
 from rclpy.duration import Duration
 from rclpy.qos import (

@@ -23,9 +23,9 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import accesses_of, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.mapping import Command, Publish
-from abdf1_ros.settings.values import ValueType, WordOrder
 import pytest
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

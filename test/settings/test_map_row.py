@@ -23,10 +23,10 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.settings.values import ValueType, WordOrder
 import pytest
 from support.cases import for_all
 from support.mappings import fault, faults, load_rows, one, row, slc

@@ -20,8 +20,8 @@ from array import array
 import math
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.settings.values import ValueType
 from hypothesis import assume, given
 from hypothesis import strategies as st
 import pytest

@@ -33,11 +33,11 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.diagnostics import Diagnostics
 from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 from soak.hostile import DEAD, hostile_message, LIAR, Liar, OTHER, PLC, SLC, US
 from soak.memory import container_lengths
 from support.driver_bench import simulated_plc

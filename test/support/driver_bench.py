@@ -34,9 +34,9 @@ from abdf1_ros.messages import Event
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Codec, types_of, Values, ValueType
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.virtual_line import VirtualLine
 

@@ -25,10 +25,10 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
-from abdf1_ros.settings.values import types_of, ValueType, WordOrder
 
 HEADER = ','.join(COLUMNS)
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.families import FAMILIES, file_types_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.values import types_of
+from abdf1_ros.pccc.values import types_of
 import pytest
 from support.cases import for_all
 

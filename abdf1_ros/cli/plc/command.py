@@ -59,10 +59,10 @@ from abdf1_ros.errors import (
 )
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
 
 EXIT_FAILED = 1

@@ -32,12 +32,12 @@ from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
-from abdf1_ros.settings.values import Values, ValueType
 from abdf1_ros.text import value_text
 
 # The argument of the command line for each column of a map CSV.

@@ -26,9 +26,9 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.network import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
-from abdf1_ros.settings.values import ValueType, WordOrder
 
 DEFAULT_STATION = 1
 

@@ -35,10 +35,10 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 from abdf1_ros.text import printable
 
 # Ages and errors are shown again so often (s), also without new values.

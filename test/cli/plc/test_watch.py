@@ -24,9 +24,9 @@ from pathlib import Path
 import threading
 
 from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.values import Values
 import pytest
 from support.driver_bench import store
 from support.mappings import make_mapping

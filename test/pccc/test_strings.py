@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.settings.strings import (
+from abdf1_ros.pccc.strings import (
     COUNTED_WORDS,
     decode_counted,
     decode_packed,

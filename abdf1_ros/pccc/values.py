@@ -27,10 +27,10 @@ import sys
 from typing import Any
 
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import strings
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.settings import strings
 
 FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 

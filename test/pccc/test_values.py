@@ -24,7 +24,7 @@ from typing import Any
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.values import Codec, types_of, ValueType, WordOrder
+from abdf1_ros.pccc.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

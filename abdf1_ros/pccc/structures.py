@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from abdf1_ros.pccc.address import Address, BITS
-from abdf1_ros.settings.values import ValueType
+from abdf1_ros.pccc.values import ValueType
 
 
 def type_fault(address: Address, kind: ValueType, length: int) -> str | None:

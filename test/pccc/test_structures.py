@@ -19,8 +19,8 @@ from __future__ import annotations
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.structures import type_fault, write_fault
-from abdf1_ros.settings.values import ValueType
+from abdf1_ros.pccc.structures import type_fault, write_fault
+from abdf1_ros.pccc.values import ValueType
 import pytest
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
