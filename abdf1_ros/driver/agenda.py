@@ -30,16 +30,13 @@ eighth of the line's time (``df1.probes``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Container
 import math
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.checks import Check, Checks
-from abdf1_ros.driver.interlocks import Interlocks, OwnWrite
-from abdf1_ros.driver.job_tasks import JobTask, JobTasks
-from abdf1_ros.driver.points import Write, WriteResult
-from abdf1_ros.driver.read_queue import ReadJob
+from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.interlocks import Interlocks
+from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.driver.reads import Reads
 from abdf1_ros.driver.writes import WriteQueue
 
@@ -49,71 +46,73 @@ MAX_OWN_IN_A_ROW = 7
 
 class Agenda:
     """
-    Decide which of the ``writes``, ``checks`` and ``reads`` has the line next.
+    Decide which job has the line next: one of a queue, or one under way.
 
-    ``tasks`` are those under way: each packet of a write has a turn of its own. ``patience`` and
-    ``report`` are for the writes. ``interlocks`` is set later, where the map has heartbeats or
-    fallbacks.
+    Jobs under way are in ``tasks``: each packet of a write has a turn of its own.
     """
 
-    def __init__(self, stations: ActiveStationList, checks: Checks, tasks: JobTasks, *,
-                 patience: float, report: Callable[[WriteResult], None]) -> None:
+    def __init__(self, stations: ActiveStationList, interlocks: Interlocks, writes: WriteQueue,
+                 checks: Checks, reads: Reads, tasks: JobTasks) -> None:
         self._stations = stations
+        self._interlocks = interlocks or None
+        self._writes = writes
+        self._checks = checks
+        self._reads = reads
         self._tasks = tasks
-        self.checks = checks
-        self.reads = Reads(stations)
-        self.writes = WriteQueue(stations, patience, report)
-        self.interlocks: Interlocks | None = None
         self._own_in_a_row = 0
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
         self._last_probe_was_check = False
 
-    def next(self, now: float, busy: Container[int] = (),  # noqa: A003
-             ) -> OwnWrite | JobTask | Write | Check | ReadJob | None:
+    def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
-        if self.interlocks is None:
+        job = self._next(now, busy)
+        if job is None or isinstance(job, JobTask):
+            return job
+        return self._tasks.start(job, now)
+
+    def _next(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+        if self._interlocks is None:
             return self._usual(now, busy)
         if self._own_in_a_row < MAX_OWN_IN_A_ROW:
             return self._own(now, busy) or self._usual(now, busy)
         self._own_in_a_row = 0
         return self._read(now, busy) or self._own(now, busy) or self._usual(now, busy)
 
-    def _own(self, now: float, busy: Container[int]) -> OwnWrite | None:
+    def _own(self, now: float, busy: Container[int]) -> Job | None:
         """Return a heartbeat or fallback; these do not count as writes in a row (rule 11)."""
-        own = self.interlocks.next(now, busy) if self.interlocks else None
-        if own is not None:
-            self.writes.begin_own(own.write)
-            self._own_in_a_row += 1
+        own = self._interlocks.next(now, busy) if self._interlocks else None
+        self._own_in_a_row += own is not None
         return own
 
-    def _usual(self, now: float,
-               busy: Container[int]) -> JobTask | Write | Check | ReadJob | None:
+    def _usual(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         if self._writes_in_a_row < MAX_WRITES_IN_A_ROW and (write := self._write(now, busy)):
             return write
         return self._check(now, busy) or self._read(now, busy) or self._write(now, busy)
 
-    def _write(self, now: float, busy: Container[int]) -> JobTask | Write | None:
+    def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a new write, or the next packet of one under way, in turns."""
         under_way = self._tasks.waiting(busy)
         write = None
         if under_way is None or not self._has_begun_write:
-            write = self.writes.next(now, busy)
+            write = self._writes.next(now, busy)
         self._has_begun_write = write is not None
         self._writes_in_a_row += (write or under_way) is not None
-        return write or under_way
+        if write is not None or under_way is None:
+            return write
+        return self._tasks.take(under_way, now)
 
-    def _check(self, now: float, busy: Container[int]) -> Check | None:
+    def _check(self, now: float, busy: Container[int]) -> Job | None:
         """Return a check that is due; the turn of the reads comes after it."""
-        if not self.checks.is_due(now) or self.reads.is_due(self._last_check):
+        if not self._checks.is_due(now) or self._reads.is_due(self._last_check):
             return None
-        check = self.checks.next(now, busy, self._probe_from(now))
+        check = self._checks.next(now, busy, self._probe_from(now))
         if check is None:
             return None
         self._last_check = now
         self._last_probe_was_check |= check.is_probe
-        if self.writes:
+        if self._writes:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
 
@@ -124,12 +123,12 @@ class Agenda:
         Where reads of silent stations wait as well, checks and reads take turns.
         """
         probes = self._stations.probes
-        is_reads_turn = self._last_probe_was_check and self.reads.has_silent
+        is_reads_turn = self._last_probe_was_check and self._reads.has_silent
         return now + probes.pause if is_reads_turn and now >= probes.next else probes.next
 
-    def _read(self, now: float, busy: Container[int]) -> ReadJob | None:
+    def _read(self, now: float, busy: Container[int]) -> Job | None:
         """Return a probe or read that is due."""
-        job = self.reads.next(now, busy)
+        job = self._reads.next(now, busy)
         if job is not None:
             self._last_probe_was_check &= not job.is_probe
             self._writes_in_a_row = self._own_in_a_row = 0
@@ -137,19 +136,8 @@ class Agenda:
 
     def next_due(self) -> float | None:
         """Return when there is something to do next (clock value in s), None for never."""
-        moments = [moment for moment in (self.reads.next_due(), self.checks.next_due())
+        moments = [moment for moment in (self._reads.next_due(), self._checks.next_due())
                    if moment is not None]
-        if self.interlocks is not None and (own := self.interlocks.next_due()) < math.inf:
+        if self._interlocks is not None and (own := self._interlocks.next_due()) < math.inf:
             moments.append(own)
         return min(moments, default=None)
-
-    def write_ended(self, write: Write, begun: float, now: float) -> None:
-        """Take note that a write has ended that had the line from ``begun`` on."""
-        self.writes.ended(write)
-        if write.mapping.station != BROADCAST:
-            self._stations.tried(write.mapping.station, begun, now, was_silent=write.is_probe,
-                                 is_message=True)
-
-    def check_ended(self, check: Check, begun: float, now: float) -> None:
-        """Take note that a check has ended that had the line from ``begun`` on."""
-        self._stations.tried(check.station, begun, now, was_silent=check.is_probe)

@@ -32,7 +32,7 @@ import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Steps
+from abdf1_ros.driver.job_tasks import Job, LineTime, Steps
 from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
@@ -56,21 +56,29 @@ class CheckKind(Enum):
     COUNTERS = 'link counters'
 
 
-@dataclass(eq=False, slots=True)
-class Check:
+class Check(Job):
     """
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
-    It is infinite while the job is under way, and while there is no station to ask.
-    ``period`` is in seconds, infinite for a job that is done once. ``is_probe`` tells that it asks
-    a silent station whether it is there again.
+    It is infinite while the job is under way, which has ``begun`` then, and while there is no
+    station to ask. ``period`` is in seconds, infinite for a job that is done once.
     """
 
-    station: int
-    kind: CheckKind
-    period: float
-    due: float = 0.0
-    is_probe: bool = False
+    def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
+                 due: float = 0.0) -> None:
+        self.station, self.kind = station, kind
+        self.period, self.due = period, due
+        self.begun = 0.0
+        self._checks = checks
+
+    def steps(self, now: float) -> Steps[None]:
+        """Ask, and take the answer."""
+        self.begun = now
+        return self._checks.question(self)
+
+    def ended(self, error: Exception | None) -> None:
+        """Plan the next one."""
+        self._checks.ended(self, error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,25 +104,29 @@ class Checks:
 
     ``period`` is the seconds between two questions for the diagnostic status, 0 for never;
     ``wanted`` has the longest period (s) of stations that have to be asked more often.
-    ``link_failed`` is called for a transaction without a reply. Only ``request_counters`` may be
-    called from another thread; what ``known`` returns is never changed.
+    ``link_failed`` is called for a transaction without a reply, ``told`` when a station was asked
+    what it is: with its answer, None for none, and the clock value (s) of the question. What
+    ``known`` returns is never changed. Only ``request_counters`` may be called from another
+    thread.
     """
 
     def __init__(self, stations: ActiveStationList, read: Container[int], period: float,
-                 link_failed: Callable[[int, LinkError], None], clock: Callable[[], float],
+                 line: LineTime, link_failed: Callable[[int, LinkError], None],
+                 told: Callable[[int, Identity | None, float], None],
                  wanted: Mapping[int, float] | None = None) -> None:
         self.counters_wanted: set[int] = set()
         self._stations = stations
         self._link_failed = link_failed
-        self._clock = clock
+        self._told = told
+        self._line = line
         self._known: dict[int, StationHealth] = {}
         self._requests: Inbox[int] = Inbox(is_open=False)
         self._wanted = wanted or {}
         periods = {station.number: min(self._wanted.get(station.number, math.inf),
                                        period or math.inf) for station in stations}
-        self._checks = [Check(number, CheckKind.STATUS, often) for number, often in periods.items()
-                        if not math.isinf(often)]
-        self._checks += [Check(station.number, CheckKind.ECHO, ECHO_PERIOD)
+        self._checks = [Check(self, number, CheckKind.STATUS, often)
+                        for number, often in periods.items() if not math.isinf(often)]
+        self._checks += [Check(self, station.number, CheckKind.ECHO, ECHO_PERIOD)
                          for station in stations if station.number not in read]
         self._next_due = 0.0
 
@@ -184,34 +196,38 @@ class Checks:
         self._plan()
         return None
 
-    def steps(self, check: Check) -> Steps[None]:
-        """Ask, and take the answer."""
-        next_due = self._clock() + check.period
-        try:
-            yield from self._question(check)
-        except (FormatError, RemoteError) as error:
-            self._take_refusal(check, str(error))
-        except LinkError as error:
-            self._link_failed(check.station, error)
-            if check.kind is CheckKind.COUNTERS or self.known(check.station).identity is None:
-                self._take_refusal(check, str(error))
-                if check.station not in self._wanted:
-                    next_due += check.period * _UNANSWERED
-        finally:
-            self._finish(check, next_due)
-
-    def _question(self, check: Check) -> Steps[None]:
+    def question(self, check: Check) -> Steps[None]:
+        """Return what is to be asked."""
         station, known = check.station, self.known(check.station)
         if check.kind is CheckKind.ECHO:
             yield from echo(b'')
         elif check.kind is CheckKind.STATUS:
             identity = yield from identify()
             self._known[station] = replace(
-                known, processor=str(identity), identity=identity, told=self._clock())
+                known, processor=str(identity), identity=identity, told=self._line.now)
         else:
             asked = known.identity or Identity(None, '')
             reply = check_status((yield diagnostics.CMD, asked.counters.encode()))
             self._take_counters(station, decode_counters(reply, asked.counter_layout))
+
+    def ended(self, check: Check, error: Exception | None) -> None:
+        """Take the end of a check: an answer that has been taken already, or an error."""
+        next_due = check.begun + check.period
+        if isinstance(error, FormatError | RemoteError):
+            self._take_refusal(check, str(error))
+        elif isinstance(error, LinkError):
+            self._link_failed(check.station, error)
+            if check.kind is CheckKind.COUNTERS or self.known(check.station).identity is None:
+                self._take_refusal(check, str(error))
+                if check.station not in self._wanted:
+                    next_due += check.period * _UNANSWERED
+        self._finish(check, next_due)
+        self._stations.tried(
+            check.station, check.begun, self._line.now, was_silent=check.is_probe)
+        if check.kind is CheckKind.STATUS:
+            known = self.known(check.station)
+            is_answer = known.told is not None and known.told >= check.begun
+            self._told(check.station, known.identity if is_answer else None, check.begun)
 
     def _take_refusal(self, check: Check, reason: str) -> None:
         if check.kind is CheckKind.STATUS:
@@ -235,7 +251,7 @@ class Checks:
         elif self._stations[check.station].active:
             check.due = next_due
         elif check.kind is CheckKind.ECHO:
-            check.due = self._clock() + check.period
+            check.due = self._line.now + check.period
         self._plan()
 
     def _wanted_from(self, check: Check, probe_from: float) -> float:
@@ -248,7 +264,7 @@ class Checks:
         return check.due
 
     def _add_request(self, station: int, now: float) -> None:
-        check = Check(station, CheckKind.COUNTERS, math.inf, now)
+        check = Check(self, station, CheckKind.COUNTERS, math.inf, now)
         if not self._stations[station].active:
             self._take_counters(station, {}, 'the station does not answer')
         elif not any(other.station == station and other.kind is CheckKind.COUNTERS

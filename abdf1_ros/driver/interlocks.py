@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
@@ -33,6 +32,8 @@ from abdf1_ros.driver.fallbacks import FallbackCause, FallbackRow
 from abdf1_ros.driver.heartbeats import HeartbeatRow
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes import WriteQueue
+from abdf1_ros.driver.writing import WriteJob, WritesUnderWay
+from abdf1_ros.errors import RemoteError
 from abdf1_ros.settings.mapping import Mapping
 
 # A stopped executor does not wake the link, so the link looks by itself every so many seconds.
@@ -48,30 +49,26 @@ _LEAST_PAUSE = 1.0
 _SHARE_OF_OTHERS = 7
 
 
-class Urgency(Enum):
-    """What goes before all messages, in this order (rule 11)."""
-
-    ZERO = 'heartbeat 0'
-    FALLBACK = 'fallback'
-    BEAT = 'heartbeat'
-
-
-@dataclass(eq=False, slots=True)
-class OwnWrite:
+class OwnWrite(WriteJob):
     """
     A write that no message has asked for.
 
     It must not be sent after ``expires`` (clock value in s): its value may be wrong by then.
     """
 
-    urgency: Urgency
-    row: HeartbeatRow | FallbackRow
-    write: Write
-    expires: float = math.inf
+    def __init__(self, row: HeartbeatRow | FallbackRow, write: Write, writing: WritesUnderWay,
+                 interlocks: Interlocks, expires: float = math.inf) -> None:
+        super().__init__(write, writing)
+        self.row = row
+        self.expires = expires
+        self._interlocks = interlocks
+        write.is_own = True
+        writing.begin(write)
 
-    @property
-    def station(self) -> int:
-        return self.write.mapping.station
+    def ended(self, error: Exception | None) -> None:
+        """Tell the row."""
+        self._writing.ended(self)
+        self._interlocks.ended(self)
 
 
 @dataclass(slots=True)
@@ -97,8 +94,9 @@ class Interlocks:
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
-                 writes: WriteQueue, cmd_timeout: float, store: Callable[[Write], None],
-                 report: Callable[[WriteResult], None]) -> None:
+                 writes: WriteQueue, writing: WritesUnderWay, cmd_timeout: float,
+                 store: Callable[[Write], None], report: Callable[[WriteResult], None],
+                 tell: Callable[[Mapping, str], None]) -> None:
         self.heartbeats = [HeartbeatRow(mapping) for mapping in mappings if mapping.heartbeat]
         self.fallbacks = [FallbackRow(mapping, cmd_timeout)
                           for mapping in mappings if mapping.fallback]
@@ -108,8 +106,11 @@ class Interlocks:
         self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
         self._stations = stations
         self._writes = writes
+        writes.message_ended = self.message_ended
+        self._writing = writing
         self._store = store
         self._report = report
+        self._tell = tell
         self._messages: dict[str, float] = {}
         self._executor = -math.inf
         self._is_running: dict[int, bool] = {}
@@ -252,7 +253,7 @@ class Interlocks:
             if row.mapping.station in free:
                 self._judge(row, now)
                 if row.wants_zero(row.is_held, now):
-                    return OwnWrite(Urgency.ZERO, row, row.take(now, is_zero=True))
+                    return self._job(row, row.take(now, is_zero=True))
         return None
 
     def _judge(self, row: HeartbeatRow, now: float) -> None:
@@ -280,11 +281,11 @@ class Interlocks:
                     or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
                 continue
             write = row.take(now)
-            if self._writes.is_held_up(write):  # by a message that is under way (rule 9)
+            if self._writing.is_held_up(write):  # by a message that is under way (rule 9)
                 row.is_under_way, row.is_held_up = False, True
                 continue
             self._writes.drop('fallback', now, mapping)
-            return OwnWrite(Urgency.FALLBACK, row, write)
+            return self._job(row, write)
         return None
 
     def _beat(self, now: float, free: Container[int]) -> OwnWrite | None:
@@ -294,9 +295,12 @@ class Interlocks:
             if row.reason:
                 row.put_off(now + _GLANCE)
             else:
-                return OwnWrite(
-                    Urgency.BEAT, row, row.take(now, is_zero=False), self._good_until(row))
+                return self._job(row, row.take(now, is_zero=False), self._good_until(row))
         return None
+
+    def _job(self, row: HeartbeatRow | FallbackRow, write: Write,
+             expires: float = math.inf) -> OwnWrite:
+        return OwnWrite(row, write, self._writing, self, expires)
 
     def _good_until(self, row: HeartbeatRow) -> float:
         """Return until when a heartbeat may be sent (clock value in s): later it may be wrong."""
@@ -305,14 +309,20 @@ class Interlocks:
                 for fallback in self._fallbacks_of(row.mapping.station)]
         return min([row.executor_until(self._executor), row.topics_until(self._messages), *ends])
 
-    def ended(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
+    def ended(self, own: OwnWrite) -> None:
         """Take note how one of our writes ended."""
-        row = own.row
+        row, result, now = own.row, own.result, self._writing.line.now
+        outcome = Outcome.NOT_SENT if result is None else result.outcome
         self._judge_reach(own, outcome, now)
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, own.write, outcome, now)
+        if result is not None and outcome is not Outcome.NOT_SENT:
+            refusal = '' if outcome is Outcome.WRITTEN else str(result.error)
+            if isinstance(result.error, RemoteError) and refusal != row.refusal:
+                self._tell(row.mapping, f'not written: {refusal}')
+            row.refusal = refusal
 
     def _judge_reach(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
         """

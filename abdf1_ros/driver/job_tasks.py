@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Jobs under way: each is a task for the link, one command after the other.
+Jobs, and those of them that are under way: each is a task for the link.
 
-A job is a generator that yields requests and is sent the replies; where there is none, the
-error is raised in it.
+What a job does is a generator that yields requests and is sent the replies; where there is none,
+the error is raised in it.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from collections import deque
 from collections.abc import Callable, Container, Generator
 from inspect import GEN_CLOSED, getgeneratorstate
 import math
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import CommandExpired, LinkError
+from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError
 from abdf1_ros.pccc.dialect import Request
 
 _Result = TypeVar('_Result')
@@ -37,6 +37,38 @@ Steps = Generator[Request, Packet, _Result]
 """What is done with a station: yields requests, is sent the replies, returns the result."""
 
 _With = TypeVar('_With', Packet, LinkError)
+
+
+class LineTime(Protocol):
+    """The clock of a line, such as its machine: see there."""
+
+    now: float
+    late: float
+
+
+class Job:
+    """
+    What is done with a station, one command after the other; each kind has a queue.
+
+    The reply to the first command has ``reply_size`` bytes after its header, 0 where that is not
+    known. That command must not be sent after ``expires`` (clock value in s); each later one has
+    ``patience`` s after the command before it, without that command's own time on the line.
+    ``is_probe`` tells that a silent station is asked whether it is there again.
+    """
+
+    station: int
+    reply_size = 0
+    expires = math.inf
+    patience = 0.0
+    is_probe = False
+
+    def steps(self, now: float) -> Steps[None]:
+        """Return what is to be done from ``now`` on (clock value in s)."""
+        raise NotImplementedError
+
+    def ended(self, error: Exception | None) -> None:
+        """Take note that it has ended, by an error that it has not handled or by itself."""
+        raise NotImplementedError
 
 
 class JobTasks:
@@ -58,17 +90,9 @@ class JobTasks:
         self._waiting: deque[JobTask] = deque()
         self.next_expiry = math.inf
 
-    def start(self, station: int, steps: Steps[None], now: float, *, reply_size: int = 0,
-              expires: float = math.inf, patience: float = 0.0) -> JobTask:
-        """
-        Return the task of a new job with its first command, whose reply has ``reply_size``.
-
-        The first command must not be sent after ``expires`` (clock value in s). Each later one has
-        ``patience`` s after the command before it, without that command's own time on the line.
-        """
-        task = JobTask(self, station, steps, reply_size, expires)
-        task.patience = patience
-        task.taken = now
+    def start(self, job: Job, now: float) -> JobTask:
+        """Return the task of a new job with its first command."""
+        task = JobTask(self, job, now)
         self._tasks.add(task)
         return task
 
@@ -107,13 +131,14 @@ class JobTasks:
         cmd, data = request
         return Packet(station, self._station, cmd, 0, self._next_tns(station), data)
 
-    def advanced(self, task: JobTask, is_done: bool) -> None:
-        """Take note that a task has its next command ready, or is done."""
-        if is_done:
-            self._tasks.discard(task)
-        else:
-            self._waiting.append(task)
-            self.next_expiry = min(self.next_expiry, task.expires)
+    def advanced(self, task: JobTask) -> None:
+        """Take note that a task has its next command ready."""
+        self._waiting.append(task)
+        self.next_expiry = min(self.next_expiry, task.expires)
+
+    def ended(self, task: JobTask) -> None:
+        """Take note that a task is done."""
+        self._tasks.discard(task)
 
     def _next_tns(self, station: int) -> int:
         """Return the next transaction number, never the one this station had last."""
@@ -127,16 +152,16 @@ class JobTasks:
 class JobTask:
     """A job as the link sees it; ``taken`` is when the link took its command."""
 
-    def __init__(self, tasks: JobTasks, station: int, steps: Steps[None], reply_size: int,
-                 expires: float) -> None:
+    def __init__(self, tasks: JobTasks, job: Job, now: float) -> None:
+        self.job = job
         self.sent = False
-        self.reply_size = reply_size
-        self.expires = expires
-        self.taken = self.patience = 0.0
-        self.station = station
+        self.reply_size = job.reply_size
+        self.expires = job.expires
+        self.taken = now
+        self.station = job.station
         self._tasks = tasks
-        self._steps = steps
-        self.command = tasks.new_command(station, next(steps))
+        self._steps = job.steps(now)
+        self.command = tasks.new_command(job.station, next(self._steps))
 
     def reply(self, packet: Packet) -> None:
         """Take the reply and go on to the next request."""
@@ -154,14 +179,21 @@ class JobTask:
         try:
             request = resume(what)
         except StopIteration:
-            self._tasks.advanced(self, is_done=True)
+            self._end(None)
             return
-        except Exception:  # a bug has ended the job
-            self._tasks.advanced(self, is_done=True)
+        except Abdf1Error as error:
+            self._end(error)
+            return
+        except Exception as bug:
+            self._end(bug)
             raise
         self.sent, self.reply_size = False, 0
-        if self.patience:
+        if self.job.patience:
             line_time = len(self.command.encode()) * self._tasks.char_time
-            self.expires = max(self.expires, self.taken + line_time + self.patience)
+            self.expires = max(self.expires, self.taken + line_time + self.job.patience)
         self.command = self._tasks.new_command(self.station, request)
-        self._tasks.advanced(self, is_done=False)
+        self._tasks.advanced(self)
+
+    def _end(self, error: Exception | None) -> None:
+        self._tasks.ended(self)
+        self.job.ended(error)

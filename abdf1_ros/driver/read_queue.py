@@ -29,12 +29,12 @@ others leave: its period counts as four times the time of reading everything onc
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import heapq
 import itertools
 import math
 
-from abdf1_ros.driver.job_tasks import Steps
+from abdf1_ros.driver.job_tasks import Job, LineTime, Steps
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.driver.transactions import words_of
 from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
@@ -48,7 +48,7 @@ _MOST_ENTRIES = 4  # for each read
 MOST_LATE = 0.2
 
 
-class ReadJob:
+class ReadJob(Job):
     """
     A block to be read again and again, and the points it serves.
 
@@ -58,11 +58,12 @@ class ReadJob:
     last time at ``refreshed``. ``started`` is when the read under way or the last one began, and
     ``late`` was ``Machine.late`` then; its last packet was ``asked`` for. All packets of a read
     have to come within ``longest_read`` seconds. ``is_to_repeat`` tells that the last read was
-    dropped, ``is_probe`` that it asks a silent station. ``ticket`` is the number of its valid
-    entry in the queue.
+    dropped. ``ticket`` is the number of its valid entry in the queue. ``take`` is told of the end
+    of each packet.
     """
 
-    def __init__(self, block: Block, points: Sequence[ReadPoint],
+    def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
+                 take: Callable[[ReadJob, Exception | None], None],
                  longest_read: float = math.inf) -> None:
         self.block = block
         self.station = block.station
@@ -71,6 +72,7 @@ class ReadJob:
         self._commands = block.commands()
         self.extent = block.extent
         self._reply_sizes = block.reply_sizes()
+        self.reply_size = self._reply_sizes[0]
         self.slices = [block.slice_of(point.mapping) for point in points]
         self.due = 0.0
         self.interval: float | None = None
@@ -80,56 +82,64 @@ class ReadJob:
         self.started = self.asked = 0.0
         self.late = 0.0
         self.is_to_repeat = False
-        self.is_probe = False
+        self._line = line
+        self._take = take
         self._longest_read = longest_read
         self.ticket = 0
         self._last_done: float | None = None
         self._packets: list[bytes] = []
 
     @property
-    def reply_size(self) -> int:
-        """Return the bytes after the header of a good reply to the next command."""
-        return self._reply_sizes[len(self._packets)]
-
-    @property
     def is_under_way(self) -> bool:
         """Tell whether there are packets already, and more to come."""
         return bool(self._packets)
 
-    def read_on(self, now: float, late: float) -> Steps[bytes | None]:
-        """
-        Read one packet; return all words after the last, None before.
-
-        Raises LinkError, and like ``words_of``; the next read then begins anew.
-        """
-        packets, self._packets = self._packets, []
-        number, self.asked = len(packets), now
+    def steps(self, now: float) -> Steps[None]:
+        """Read one packet; raises LinkError, and like ``words_of``."""
+        self.asked, number = now, len(self._packets)
         if not number:
-            self.started, self.late, self.is_to_repeat = now, late, False
-        packets.append(words_of(self.block, number, (yield self._commands[number])))
-        if len(packets) == len(self._commands):
-            return b''.join(packets)
-        self._packets = packets
-        return None
+            self.started, self.late, self.is_to_repeat = now, self._line.late, False
+        reply = yield self._commands[number]
+        self._packets.append(words_of(self.block, number, reply))
 
-    def why_too_old(self, now: float, late: float) -> str:
+    def ended(self, error: Exception | None) -> None:
+        """Let the packet be made use of; after an error the next read begins anew."""
+        if error is not None:
+            self._forget()
+        self._take(self, error)
+
+    def data(self) -> bytes | None:
+        """Return all words after the last packet, None before."""
+        if len(self._packets) < len(self._commands):
+            self.reply_size = self._reply_sizes[len(self._packets)]
+            return None
+        data = b''.join(self._packets)
+        self._forget()
+        return data
+
+    def why_too_old(self) -> str:
         """
         Return why the data of this read must be dropped, empty where they are good.
 
         Since its first command this process has stood still, or other commands had the line for so
         long that words of one value differ too much in age.
         """
-        if late - self.late > MOST_LATE:
-            return f'this process, or its host, stood still for {late - self.late:.1f} s'
-        spent = now - self.started
+        stood_still = self._line.late - self.late
+        if stood_still > MOST_LATE:
+            return f'this process, or its host, stood still for {stood_still:.1f} s'
+        spent = self._line.now - self.started
         if len(self._commands) > 1 and spent > self._longest_read:
             return f'its packets took {spent:.1f} s, more than {self._longest_read:.1f} s'
         return ''
 
     def begin_anew(self) -> None:
         """Drop the packets that were read; the whole block is due again."""
-        self._packets = []
+        self._forget()
         self.is_to_repeat = True
+
+    def _forget(self) -> None:
+        self._packets.clear()
+        self.reply_size = self._reply_sizes[0]
 
     def done(self, now: float) -> None:
         """Take note of a good read."""
@@ -142,7 +152,7 @@ class ReadJob:
     def interrupted(self) -> None:
         """Take note that a read has failed: no interval spans an outage."""
         self.interval = self._last_done = None
-        self._packets = []
+        self._forget()
 
 
 _QueueEntry = tuple[float, int, ReadJob]

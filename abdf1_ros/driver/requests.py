@@ -21,7 +21,6 @@ They use the same links, with the same rules, as the driver.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
@@ -29,7 +28,7 @@ from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import JobTasks, Steps
+from abdf1_ros.driver.job_tasks import Job, JobTasks, Steps
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
 from abdf1_ros.driver.served import Served
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
@@ -39,23 +38,25 @@ from abdf1_ros.settings.network import Network
 _Result = TypeVar('_Result')
 
 
-@dataclass(frozen=True, slots=True)
-class _WaitingRequest:
+class _RequestJob(Job):
     """Steps with a station, and who wants to know how they end."""
 
-    station: int
-    work: Steps[Any]
-    succeed: Callable[[Any], None]
-    fail: Callable[[Exception], None]
+    def __init__(self, station: int, work: Steps[Any], succeed: Callable[[Any], None],
+                 fail: Callable[[Exception], None]) -> None:
+        self.station = station
+        self._work, self._succeed, self.fail = work, succeed, fail
+        self._result: Any = None
 
-    def steps(self) -> Steps[None]:
-        """Carry out the request and report its end."""
-        try:
-            result = yield from self.work
-        except Abdf1Error as error:
+    def steps(self, now: float) -> Steps[None]:
+        """Carry out the request."""
+        self._result = yield from self._work
+
+    def ended(self, error: Exception | None) -> None:
+        """Report the end."""
+        if error is None:
+            self._succeed(self._result)
+        elif isinstance(error, Abdf1Error):
             self.fail(error)
-        else:
-            self.succeed(result)
 
 
 class Requests:
@@ -76,7 +77,7 @@ class Requests:
             self.stations.lost(number, 0.0)
         self.machine = make_machine(network, self._run, self.counters)
         self._tasks = JobTasks(network.station, first_tns)
-        self._waiting: Inbox[_WaitingRequest] = Inbox()
+        self._waiting: Inbox[_RequestJob] = Inbox()
         served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = make_link(network, DriverSettings(nak_on_command_timeout=False),
@@ -89,7 +90,7 @@ class Requests:
 
         Exactly one of ``succeed`` and ``fail`` is called, in the link thread.
         """
-        self._waiting.put(_WaitingRequest(station, work, succeed, fail))
+        self._waiting.put(_RequestJob(station, work, succeed, fail))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command of the request under way, or the first of the next one."""
@@ -97,7 +98,7 @@ class Requests:
         if under_way is not None:
             return self._tasks.take(under_way, now)
         request = next(self._waiting.take(), None)
-        return self._tasks.start(request.station, request.steps(), now) if request else None
+        return self._tasks.start(request, now) if request else None
 
     def next_due(self) -> float | None:
         """Return None: nothing comes by itself."""

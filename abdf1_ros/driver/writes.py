@@ -26,9 +26,9 @@ from collections.abc import Callable, Container
 import itertools
 import math
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
+from abdf1_ros.driver.writing import WriteJob, WritesUnderWay
 from abdf1_ros.messages import Message
 from abdf1_ros.settings.mapping import Mapping
 
@@ -40,27 +40,43 @@ def waited_too_long(seconds: float) -> str:
     return f'waited longer than {seconds:g} s for the line'
 
 
-def patience_of(mapping: Mapping, patience: float) -> float:
-    """Return the seconds that a message may wait: less where a fallback is due before (rule 7)."""
-    return min(patience, mapping.fallback.after / 1000) if mapping.fallback else patience
+class MessageJob(WriteJob):
+    """A write that a message has asked for."""
+
+    def __init__(self, write: Write, writing: WritesUnderWay, queue: WriteQueue,
+                 slack: float) -> None:
+        super().__init__(write, writing)
+        patience = queue.patience_of(write.mapping) + slack
+        self.expires = write.requested + patience
+        # With a fallback all packets of a long write have to leave before it is due.
+        self.patience = 0.0 if write.mapping.fallback else patience
+        self._queue = queue
+
+    def ended(self, error: Exception | None) -> None:
+        """Report the result."""
+        self._queue.ended(self)
 
 
 class WriteQueue:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
 
-    ``report`` gets the results of those that end here. A write to a silent station is a probe;
-    one that ``stations.probes`` does not admit ends unsent. Another thread may only ask for the
+    ``report`` gets the results. ``tx_delay`` (s) comes before each transmission. A write to a
+    silent station is a probe; one that ``stations.probes`` does not admit ends unsent.
+    ``message_ended`` is called for each that had the line. Another thread may only ask for the
     length. ``next_expiry`` is when ``expire`` has something to do (clock value in s).
     """
 
-    def __init__(self, stations: ActiveStationList, patience: float,
-                 report: Callable[[WriteResult], None]) -> None:
+    def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
+                 report: Callable[[WriteResult], None], tx_delay: float = 0.0) -> None:
+        self.message_ended: Callable[[Write, Outcome], None] = lambda write, outcome: None
         self._stations = stations
+        self._writing = writing
         self._patience = patience
         self._report = report
+        # It does not count as waiting: it comes before a probe, and before the command.
+        self._slack = 2 * tx_delay
         self._waiting: deque[Write] = deque()
-        self._under_way: list[Write] = []
         self.next_expiry = math.inf
 
     def __len__(self) -> int:
@@ -90,9 +106,9 @@ class WriteQueue:
             self._report(older[-1].result(Outcome.SUPERSEDED, '', now))
         self._waiting.insert(len(self._waiting) if is_overlapped else at, write)
 
-    def next(self, now: float, busy: Container[int] = ()) -> Write | None:  # noqa: A003
+    def next(self, now: float, busy: Container[int] = ()) -> MessageJob | None:  # noqa: A003
         """
-        Return the next write, which ends with ``ended``.
+        Return the next write.
 
         Writes to stations in ``busy`` keep waiting, and so do writes of words that are being
         written: the packets of two writes must not mix.
@@ -101,15 +117,18 @@ class WriteQueue:
             return None
         self.expire(now)
         write = self._first_free(busy)
-        if write is not None:
-            self._waiting.remove(write)
-            self._begin(write)
-        return write
+        if write is None:
+            return None
+        self._waiting.remove(write)
+        self._writing.begin(write)
+        return MessageJob(write, self._writing, self, self._slack)
 
-    def _begin(self, write: Write) -> None:
-        self._under_way.append(write)
-        station = write.mapping.station
-        write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
+    def ended(self, job: MessageJob) -> None:
+        """Take note that a write that had the line has ended."""
+        self._writing.report(job, self._report)
+        self._writing.ended(job)
+        if job.result is not None:
+            self.message_ended(job.write, job.result.outcome)
 
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that does not have to wait."""
@@ -118,7 +137,7 @@ class WriteQueue:
             station = write.mapping.station
             if station in busy or station in held_up:
                 continue
-            if not any(write.overlaps(other) for other in self._under_way):
+            if not self._writing.is_held_up(write):
                 return write
             held_up.add(station)
         return None
@@ -130,24 +149,11 @@ class WriteQueue:
         By the ``id`` of the mapping, of messages that wait or are under way.
         """
         found: dict[int, float] = {}
-        for write in itertools.chain(self._waiting, self._under_way):
+        for write in itertools.chain(self._waiting, self._writing.under_way):
             if write.mapping.fallback is not None and not write.is_own:
                 key = id(write.mapping)
                 found[key] = max(write.requested, found.get(key, -math.inf))
         return found
-
-    def is_held_up(self, write: Write) -> bool:
-        """Tell whether a write has to wait for one of the same words that is under way."""
-        return any(map(write.overlaps, self._under_way))
-
-    def begin_own(self, write: Write) -> None:
-        """Take note that a write of our own is under way, until it has ``ended``."""
-        write.is_own = True
-        self._begin(write)
-
-    def ended(self, write: Write) -> None:
-        """Take note that a write is not under way any more; the next of its words may be sent."""
-        self._under_way.remove(write)
 
     def expire(self, now: float) -> None:
         """End the writes that are not to be sent any more."""
@@ -160,6 +166,11 @@ class WriteQueue:
             else:
                 self.next_expiry = min(self.next_expiry, self._expiry(write))
 
+    def patience_of(self, mapping: Mapping) -> float:
+        """Return how long (s) a message may wait: less where a fallback is due before (rule 7)."""
+        after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
+        return min(self._patience, after)
+
     def drop(self, reason: str, now: float, mapping: Mapping | None = None) -> None:
         """End the waiting writes, of one mapping or all, without sending them."""
         dropped = [write for write in self._waiting if mapping in (None, write.mapping)]
@@ -169,12 +180,12 @@ class WriteQueue:
 
     def _expiry(self, write: Write) -> float:
         """Return the clock value (s) from which a write is too old."""
-        return write.requested + patience_of(write.mapping, self._patience)
+        return write.requested + self.patience_of(write.mapping)
 
     def _reject_reason(self, write: Write, now: float) -> str:
         """Return why a write is not to be sent any more, empty if it is."""
         if now >= self._expiry(write):
-            return waited_too_long(patience_of(write.mapping, self._patience))
+            return waited_too_long(self.patience_of(write.mapping))
         station = write.mapping.station
         if self._stations.admits_message(station, now):
             return ''

@@ -26,25 +26,40 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.job_tasks import JobTasks, Steps
+from abdf1_ros.driver.interlocks import Interlocks
+from abdf1_ros.driver.job_tasks import Job, JobTasks, Steps
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
+from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.read_queue import ReadJob
+from abdf1_ros.driver.readings import Readings
+from abdf1_ros.driver.writes import MessageJob, WriteQueue
+from abdf1_ros.driver.writing import WritesUnderWay
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from support.driver_bench import Recorder
 from support.mappings import make_mapping
 
 PROBE_TIME = 0.5
+LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
+
+
+class StillClock:
+    """The time of a line, which stands still."""
+
+    now = late = 0.0
 
 
 def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob:
     mapping = make_mapping(text, station=station, period=period)
-    line = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
-    block, = Planner(line, 0.1).plan([mapping])
-    return ReadJob(block, [ReadPoint(mapping, period / 1000, 1.0)])
+    block, = Planner(LINE, 0.1).plan([mapping])
+    return ReadJob(block, [ReadPoint(mapping, period / 1000, 1.0)], StillClock(),
+                   lambda job, error: None)
 
 
 class Bench:
@@ -54,27 +69,41 @@ class Bench:
         self.results: list[WriteResult] = []
         self.stations = ActiveStationList(
             [job.station for job in jobs], probe_time=PROBE_TIME)
-        self.tasks = JobTasks(5, 0)
-        stations = {job.station for job in jobs}
-        checks = Checks(self.stations, stations, 0.0, lambda station, error: None, lambda: 0.0)
+        self.tasks, line = JobTasks(5, 0), StillClock()
+        planner, backs = Planner(LINE, 0.1), ReadBacks(write_timeout, self.results.append)
+        readings = Readings(Network(), (), DriverSettings(), planner, self.stations, line,
+                            Recorder(lambda: 0.0), backs)
+        writing = WritesUnderWay(planner, self.stations, line, readings, backs)
+        self.under_way = writing.under_way
+        self.reads = readings.reads
+        self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append)
+        checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
+                        lambda station, error: None, lambda station, identity, asked: None)
         checks.begin(0.0)
-        self.agenda = Agenda(self.stations, checks, self.tasks,
-                             patience=write_timeout, report=self.results.append)
-        self.reads, self.writes = self.agenda.reads, self.agenda.writes
+        interlocks = Interlocks((), self.stations, self.writes, writing, 1.0, lambda write: None,
+                                self.results.append, lambda mapping, reason: None)
+        self.agenda = Agenda(
+            self.stations, interlocks, self.writes, checks, self.reads, self.tasks)
         self.reads.replace((), jobs, 0.0)
 
     def next(self, now: float) -> object:  # noqa: A003
         """Return who has the line next; a write ends at once."""
-        job = self.agenda.next(now)
-        if isinstance(job, Write):
-            self.writes.ended(job)
-        return job
+        task = self.agenda.next(now)
+        if task is None or not isinstance(task.job, MessageJob):
+            return task and task.job
+        self.under_way.remove(task.job.write)
+        return task.job.write
+
+    def begin_write(self, now: float, busy: Container[int] = ()) -> Write | None:
+        """Take the next write, which is under way from then on."""
+        job = self.writes.next(now, busy)
+        return job and job.write
 
     def next_write(self, now: float) -> Write | None:
         """Take the next write, which ends at once."""
-        write = self.writes.next(now)
+        write = self.begin_write(now)
         if write is not None:
-            self.writes.ended(write)
+            self.under_way.remove(write)
         return write
 
     def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
@@ -175,10 +204,15 @@ def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
     assert order == [*writes[:4], job, *writes[4:8], job, *writes[8:]]
 
 
-def nine_packets() -> Steps[None]:
-    """Yield as many requests."""
-    for _ in range(9):
-        yield 0x0F, b''
+class NinePackets(Job):
+    """As many requests."""
+
+    station = 1
+
+    def steps(self, now: float) -> Steps[None]:
+        """Yield them."""
+        for _ in range(9):
+            yield 0x0F, b''
 
 
 def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
@@ -186,11 +220,10 @@ def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
     bench = Bench(job)
     write = bench.write(WORD, 1, 0.0)
     assert bench.next(0.0) is write
-    task = bench.tasks.start(1, nine_packets(), 0.0)
+    task = bench.tasks.start(NinePackets(), 0.0)
     for _ in range(MAX_WRITES_IN_A_ROW - 1):
         task.reply(task.command.reply())
-        assert bench.next(0.0) is task
-        bench.tasks.take(task, 0.0)
+        assert bench.next(0.0) is task.job
     another = bench.write(WORD, 2, 0.0)
     assert bench.next(0.0) is job
     assert bench.next(0.0) is another
@@ -284,13 +317,13 @@ def test_writes_of_the_same_words_are_never_under_way_together() -> None:
     bench, elsewhere = Bench(), make_mapping('N7:0', 'Write', station=2)
     first, second = bench.write(BIT, 1, 0.0), bench.write(BIT, 0, 0.0)
     behind, other = bench.write(WORD, 1, 0.0), bench.write(elsewhere, 1, 0.0)
-    assert bench.writes.next(0.0) is first
-    assert bench.writes.next(0.0) is other  # but not another of the same station, out of turn
-    assert bench.writes.next(0.0) is None
-    bench.writes.ended(first)
-    assert bench.writes.next(0.0) is second
-    assert bench.writes.next(0.0) is behind
-    assert bench.writes.next(0.0) is None
+    assert bench.begin_write(0.0) is first
+    assert bench.begin_write(0.0) is other  # but not another of the same station, out of turn
+    assert bench.begin_write(0.0) is None
+    bench.under_way.remove(first)
+    assert bench.begin_write(0.0) is second
+    assert bench.begin_write(0.0) is behind
+    assert bench.begin_write(0.0) is None
 
 
 def test_write_that_has_waited_too_long_is_not_sent() -> None:
@@ -333,7 +366,7 @@ def test_dropped_writes_all_have_their_result() -> None:
     bench.next(0.0)
     for n in range(3):
         bench.write(BIT, n % 2, 0.0)
-    bench.writes.next(0.0)
+    bench.begin_write(0.0)
     bench.write(WORD, 1, 0.5)
     bench.writes.drop('the cable is off', 1.0)
     assert bench.outcomes() == [Outcome.NOT_SENT] * 3
@@ -417,10 +450,10 @@ def test_writes_and_reads_take_turns_at_a_silent_station() -> None:
     now, turns = 0.0, ''
     while now < 200:
         bench.write(make_mapping('N7:5', 'Write', station=2), 1, now)
-        job, begun = bench.agenda.next(now), now
+        job, begun = bench.next(now), now
         now += 0.02 if job is living else 1.0
         if isinstance(job, Write):
-            bench.agenda.write_ended(job, begun, now)
+            bench.stations.tried(2, begun, now, was_silent=job.is_probe, is_message=True)
             turns += 'w'
         else:
             assert isinstance(job, ReadJob)
@@ -543,9 +576,9 @@ def test_writes_to_a_busy_station_wait_and_the_others_go() -> None:
     bench = Bench()
     first = bench.write(WORD, 1, 0.0)
     second = bench.write(make_mapping('N7:5', 'Write', station=2), 1, 0.0)
-    assert bench.writes.next(0.0, busy={1}) is second
-    assert bench.writes.next(0.0, busy={1}) is None
-    assert bench.writes.next(0.0) is first
+    assert bench.begin_write(0.0, busy={1}) is second
+    assert bench.begin_write(0.0, busy={1}) is None
+    assert bench.begin_write(0.0) is first
 
 
 def test_parts_replace_a_job() -> None:
@@ -661,7 +694,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule()
     def drop(self) -> None:
         self.bench.writes.drop('port', self.now)
-        assert self.bench.writes.next(self.now) is None
+        assert self.bench.begin_write(self.now) is None
 
     @invariant()
     def every_write_is_in_one_place(self) -> None:

@@ -19,33 +19,42 @@ from __future__ import annotations
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.job_tasks import JobTasks, Steps
-from abdf1_ros.errors import CommandTimeout, LinkError, PortLost
+from abdf1_ros.driver.job_tasks import Job, JobTasks, Steps
+from abdf1_ros.errors import CommandTimeout, PortLost
 import pytest
 
 OURS = 5
 NOW = 50.0
 
 
-class Job:
+class TwoRequests(Job):
     """Two requests; it keeps what becomes of them."""
 
-    def __init__(self) -> None:
+    def __init__(self, station: int = 1, expires: float = math.inf, patience: float = 0.0,
+                 reply_size: int = 0) -> None:
+        self.station, self.reply_size = station, reply_size
+        self.expires, self.patience = expires, patience
         self.replies: list[bytes] = []
-        self.errors: list[LinkError] = []
+        self.errors: list[Exception | None] = []
+        self.under_way: Steps[None] | None = None
 
-    def steps(self) -> Steps[None]:
+    def steps(self, now: float) -> Steps[None]:
         """Ask twice."""
-        try:
-            for data in (b'a', b'b'):
-                self.replies.append((yield 0x0F, data).data)
-        except LinkError as error:
-            self.errors.append(error)
+        self.under_way = self._steps()
+        return self.under_way
+
+    def _steps(self) -> Steps[None]:
+        for data in (b'a', b'b'):
+            self.replies.append((yield 0x0F, data).data)
+
+    def ended(self, error: Exception | None) -> None:
+        """Keep it."""
+        self.errors.append(error)
 
 
 def test_job_is_one_command_after_the_other() -> None:
-    job, tasks = Job(), JobTasks(OURS, 0x10)
-    task = tasks.start(1, job.steps(), NOW)
+    job, tasks = TwoRequests(), JobTasks(OURS, 0x10)
+    task = tasks.start(job, NOW)
     assert task.command == Packet(1, OURS, 0x0F, 0, 0x11, b'a')
     assert tasks.waiting(()) is None  # whoever has started it sends it
     task.sent = True
@@ -55,33 +64,33 @@ def test_job_is_one_command_after_the_other() -> None:
     assert tasks.waiting(()) is None
     assert (task.command, task.sent) == (Packet(1, OURS, 0x0F, 0, 0x12, b'b'), False)
     task.reply(task.command.reply(b'two'))
-    assert (job.replies, job.errors) == ([b'one', b'two'], [])
+    assert (job.replies, job.errors) == ([b'one', b'two'], [None])
     assert (tasks.transactions, tasks.waiting(())) == (2, None)
 
 
 def test_size_of_the_reply_is_that_of_the_first_command() -> None:
-    task = JobTasks(OURS, 0).start(1, Job().steps(), NOW, reply_size=20)
+    task = JobTasks(OURS, 0).start(TwoRequests(reply_size=20), NOW)
     assert task.reply_size == 20
     task.reply(task.command.reply(bytes(20)))
     assert task.reply_size == 0
 
 
 def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
-    job, tasks = Job(), JobTasks(OURS, 0)
-    task = tasks.start(1, job.steps(), NOW)
-    task.fail(CommandTimeout())
-    assert [error.sent for error in job.errors] == [False]
-    other = Job()
-    task = tasks.start(1, other.steps(), NOW)
-    task.sent = True
-    task.fail(CommandTimeout())
-    assert [error.sent for error in other.errors] == [True]
+    tasks = JobTasks(OURS, 0)
+    for was_sent in (False, True):
+        job = TwoRequests()
+        task = tasks.start(job, NOW)
+        task.sent = was_sent
+        task.fail(CommandTimeout())
+        error, = job.errors
+        assert isinstance(error, CommandTimeout)
+        assert error.sent is was_sent
     assert tasks.transactions == 0
 
 
 def test_all_jobs_end_with_the_port() -> None:
-    jobs, tasks = (Job(), Job()), JobTasks(OURS, 0)
-    first, _ = (tasks.start(station, job.steps(), NOW) for station, job in enumerate(jobs))
+    jobs, tasks = (TwoRequests(1), TwoRequests(2)), JobTasks(OURS, 0)
+    first, _ = (tasks.start(job, NOW) for job in jobs)
     first.reply(first.command.reply(b'one'))
     tasks.fail(PortLost('unplugged'))
     assert [str(error) for job in jobs for error in job.errors] == ['port lost: unplugged'] * 2
@@ -89,15 +98,17 @@ def test_all_jobs_end_with_the_port() -> None:
 
 
 def test_error_in_a_job_ends_it() -> None:
-    def steps() -> Steps[None]:
-        yield 0x0F, b''
-        raise ZeroDivisionError
+    class Faulty(TwoRequests):
+        def _steps(self) -> Steps[None]:
+            yield 0x0F, b''
+            raise ZeroDivisionError
 
-    tasks = JobTasks(OURS, 0)
-    task = tasks.start(1, steps(), NOW)
+    job, tasks = Faulty(), JobTasks(OURS, 0)
+    task = tasks.start(job, NOW)
     with pytest.raises(ZeroDivisionError):
         task.reply(task.command.reply())
     tasks.fail(PortLost('unplugged'))  # there is nothing left to be ended
+    assert [type(error) for error in job.errors] == [ZeroDivisionError]
     assert tasks.waiting(()) is None
 
 
@@ -115,24 +126,24 @@ def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> 
 
 
 def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
-    job, tasks = Job(), JobTasks(OURS, 0)
-    steps = job.steps()
-    tasks.start(1, steps, NOW)
-    steps.close()
+    job, tasks = TwoRequests(), JobTasks(OURS, 0)
+    tasks.start(job, NOW)
+    assert job.under_way is not None
+    job.under_way.close()
     tasks.fail(PortLost('unplugged'))
     assert job.errors == []
 
 
 def test_job_that_nobody_has_asked_for_does_not_expire() -> None:
     tasks = JobTasks(OURS, 0)
-    task = tasks.start(1, Job().steps(), NOW)
+    task = tasks.start(TwoRequests(), NOW)
     task.reply(task.command.reply())
     assert (task.expires, tasks.next_expiry) == (math.inf, math.inf)
 
 
 def test_command_expires_by_the_request_or_by_the_command_before() -> None:
     tasks = JobTasks(OURS, 0, char_time=0.01)
-    task = tasks.start(1, Job().steps(), NOW, expires=NOW + 1.5, patience=2.0)
+    task = tasks.start(TwoRequests(expires=NOW + 1.5, patience=2.0), NOW)
     size = len(task.command.encode())
     task.reply(task.command.reply())
     assert task.expires == pytest.approx(NOW + 2.0 + 0.01 * size)
@@ -141,8 +152,8 @@ def test_command_expires_by_the_request_or_by_the_command_before() -> None:
 
 @pytest.mark.parametrize('after, errors', [(-0.001, 0), (0.0, 1), (4.0, 1)])
 def test_job_ends_whose_next_command_has_waited_too_long(after: float, errors: int) -> None:
-    job, tasks = Job(), JobTasks(OURS, 0)
-    task = tasks.start(1, job.steps(), NOW, expires=NOW + 2.0, patience=2.0)
+    job, tasks = TwoRequests(expires=NOW + 2.0, patience=2.0), JobTasks(OURS, 0)
+    task = tasks.start(job, NOW)
     task.sent = True
     task.reply(task.command.reply())
     tasks.expire(task.expires + after)

@@ -46,9 +46,16 @@ def make_block(period: int, text: str, length: int) -> Block:
     return block
 
 
+class StillClock:
+    """The time of a line, which stands still."""
+
+    now = late = 0.0
+
+
 def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:
     block = make_block(period, text, length)
-    return ReadJob(block, [ReadPoint(block.mappings[0], period / 1000, 1.0)])
+    return ReadJob(block, [ReadPoint(block.mappings[0], period / 1000, 1.0)], StillClock(),
+                   lambda job, error: None)
 
 
 TOOK = block_time(make_job().block)
@@ -232,24 +239,19 @@ def test_packets_of_a_long_block_go_one_by_one_and_others_between_them() -> None
 
 def read_packet_of(job: ReadJob, now: float) -> bytes | None:
     """Have a job read its next packet; return what it returns."""
-    steps = job.read_on(now, 0.0)
+    steps = job.steps(now)
     cmd, _ = next(steps)
-    try:
+    with pytest.raises(StopIteration):
         steps.send(Packet(0, 1, cmd | 0x40, 0, 1, bytes(2 * job.block.requests[0].words)))
-    except StopIteration as end:
-        result: bytes | None = end.value
-        return result
-    raise AssertionError('a packet is one request')
+    return job.data()
 
 
 def test_long_read_begins_anew_after_an_error() -> None:
     job = make_job(length=236)
     assert read_packet_of(job, 1.0) is None
     assert (job.is_under_way, job.started) == (True, 1.0)
-    steps = job.read_on(2.0, 0.0)
-    next(steps)
-    with pytest.raises(RemoteError):
-        steps.throw(RemoteError(0x10, 0, 'refused'))
+    next(job.steps(2.0))
+    job.ended(RemoteError(0x10, 0, 'refused'))
     assert (job.is_under_way, job.started) == (False, 1.0)
     assert read_packet_of(job, 3.0) is None
     assert job.started == 3.0
