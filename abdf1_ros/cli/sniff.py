@@ -17,7 +17,8 @@ Decode the traffic on a DF1 line, live or from a recording.
 
 Live: --port listens on a port that is wired to the line, without sending; --tap stands between
 two ports and passes everything on at once. A file is a capture (of --save, or of the node's
-parameter trace_file), a hex dump as xxd or hexdump -C write it, or with --binary raw bytes.
+parameter trace_file), pcap or pcapng (of --pcapng, of an SEL RTAC, or PCCC in EtherNet/IP), a hex
+dump as xxd or hexdump -C write it, or with --binary raw bytes.
 
 A line has the time in seconds, the direction (">" sent by the master, the first port of the tap
 or whoever has recorded it; "<" the other way; "?" not known), the station, what it is, and
@@ -217,7 +218,7 @@ def _decode(options: argparse.Namespace) -> int:
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('sniff', __doc__, _EPILOG)
     parser.add_argument('files', metavar='FILE', nargs='*',
-                        help='captures or hex dumps, decoded one after the other')
+                        help='captures, pcap, pcapng or hex dumps, decoded one after the other')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
     parser.add_argument('--port', metavar='NAME',
                         help='listen on a serial port, a socket:// or rfc2217:// URL, pty, '

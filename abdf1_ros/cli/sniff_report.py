@@ -87,7 +87,7 @@ class ReportBundle:
         if len(self._entries) < _MOST_ENTRIES:
             self._entries.append(entry)
         packet = entry.packet
-        if packet is None or not entry.valid:
+        if packet is None or entry.valid is False:
             return
         if entry.kind is Kind.COMMAND and (packet.cmd, packet.data) == _STATUS_REQUEST:
             self._asked.add((packet.dst, packet.src, packet.tns))
@@ -109,7 +109,7 @@ class ReportBundle:
     def write(self, path: str, summary: Summary, kind: LineKind) -> None:
         processors = [f'station {station}: {text}'
                       for station, text in sorted(self._processors.items())]
-        texts = {
+        texts: dict[str, str | bytes] = {
             'summary.txt': '\n'.join(summary_lines(summary, kind)),
             'summary.json': summary_json(summary, kind),
             'processors.txt': '\n'.join(processors) or 'no diagnostic status was seen',
@@ -119,8 +119,7 @@ class ReportBundle:
         else:
             texts['entries.txt'] = '\n'.join(map(text_line, self._entries))
             for name in self.captures:
-                texts[_free_name('capture', name, texts)] = Path(name).read_text(
-                    'ascii', 'replace')
+                texts[_free_name('capture', name, texts)] = Path(name).read_bytes()
         for folder, names in (('settings', self.settings), ('conformance', self.conformance)):
             for name in names:
                 text = Path(name).read_text('utf-8-sig', 'replace')
@@ -129,8 +128,9 @@ class ReportBundle:
         with ZipFile(path, 'w', ZIP_DEFLATED) as bundle:
             bundle.comment = _COMMENT
             bundle.writestr('README.txt', self._readme(texts))
-            for name, text in texts.items():
-                bundle.writestr(name, text + '\n')
+            for name, content in texts.items():
+                bundle.writestr(
+                    name, content if isinstance(content, bytes) else f'{content}\n')
 
     def _readme(self, names: Iterable[str]) -> str:
         lines = ['A report about a DF1 line, made by "sniff --report" of abdf1_ros.', '',

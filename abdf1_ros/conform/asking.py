@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.ends import Answering
+from abdf1_ros.conform.ends import AnsweringEnd
 from abdf1_ros.conform.wire import Failed
 
 _ASKING = (Target.MASTER, Target.CLIENT)
@@ -28,7 +28,7 @@ _REPLY_BIT = 0x40
 
 @case('command-form', 'A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the '
       'manual says.', 'M 5-2 to 5-7, 6-3', *_ASKING)
-def command_form(end: Answering) -> None:
+def command_form(end: AnsweringEnd) -> None:
     command = end.next_command()
     data = command.data
     if len(data) < codec.HEADER_SIZE or data[2] & _REPLY_BIT or data[3]:
@@ -37,7 +37,7 @@ def command_form(end: Answering) -> None:
 
 
 @case('tns-differs', 'Each new command has another TNS.', 'M 6-7', *_ASKING)
-def tns_differs(end: Answering) -> None:
+def tns_differs(end: AnsweringEnd) -> None:
     seen = []
     for _ in range(3):
         command = end.next_command()

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import HeardSymbol, SymbolKind
+from abdf1_ros.conform.codec import SymbolKind
 from abdf1_ros.conform.ends import PATIENCE, ServerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
@@ -103,17 +103,19 @@ def _refuse(end: ServerEnd, *then: bytes) -> None:
     end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
 
 
+def _expect_ack(end: ServerEnd, what: str) -> None:
+    """Wait for the next response, whatever comes before it; it has to be DLE ACK."""
+    symbol = end.wire.until(lambda heard: heard.kind in (SymbolKind.ACK, SymbolKind.NAK), what,
+                            end.wire.answer_time)
+    if symbol.kind is not SymbolKind.ACK:
+        raise Failed(what, str(symbol))
+
+
 @case('enquiry-repeats-response', 'DLE ENQ has the last response repeated.', 'M 4-13', _CLIENT)
 def enquiry_repeats_response(end: ServerEnd) -> None:
     end.finish(end.next_command())
     end.wire.send(codec.ENQ)
-
-    def is_response(symbol: HeardSymbol) -> bool:
-        return symbol.kind in (SymbolKind.ACK, SymbolKind.NAK)
-
-    symbol = end.wire.until(is_response, 'the last response', end.wire.answer_time)
-    if symbol.kind is not SymbolKind.ACK:
-        raise Failed('DLE ACK again', str(symbol))
+    _expect_ack(end, 'DLE ACK again')
 
 
 @case('enquiry-repeats-refusal', 'DLE ENQ after DLE NAK has DLE NAK repeated.', 'M 4-13', _CLIENT)
@@ -127,13 +129,7 @@ def duplicate_acknowledged(end: ServerEnd) -> None:
     command = end.next_command()
     end.finish(command)
     end.reply_to(command)
-
-    def is_response(symbol: HeardSymbol) -> bool:
-        return symbol.kind in (SymbolKind.ACK, SymbolKind.NAK)
-
-    symbol = end.wire.until(is_response, 'a response', end.wire.answer_time)
-    if symbol.kind is not SymbolKind.ACK:
-        raise Failed('DLE ACK for a reply that came before', str(symbol))
+    _expect_ack(end, 'DLE ACK for a reply that came before')
 
 
 @case('embedded-response', 'A response inside our reply counts, and is not part of it.',

@@ -19,7 +19,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import HeardSymbol, SymbolKind
@@ -214,38 +213,46 @@ Serve = Callable[[bytes], bytes]
 """Executes a command: link data in, link data of the reply out."""
 
 
-class Answering(Protocol):
-    """An end that answers commands: what the cases of ``asking`` need."""
+class AnsweringEnd(ABC):
+    """What both ends that answer commands have."""
 
-    wire: Wire
-
-    def next_command(self) -> HeardSymbol:
-        """Wait for a good command."""
-
-    def finish(self, command: HeardSymbol) -> None:
-        """Answer a command to its end."""
-
-
-def _settle(end: Answering) -> None:
-    for _ in range(_MOST_TRIES):
-        try:
-            end.finish(end.next_command())
-        except Failed:  # the case will show it; the target may still be busy
-            continue
-        return
-
-
-class SlaveEnd:
-    """A slave, ``station``, that a half-duplex master polls and sends commands to."""
-
-    def __init__(self, wire: Wire, station: int, serve: Serve) -> None:
+    def __init__(self, wire: Wire, serve: Serve) -> None:
         self.wire = wire
-        self.station = station
         self.serve = serve
 
     def settle(self) -> None:
-        """Answer one command, so that no case begins with a master that counts us as inactive."""
-        _settle(self)
+        """Answer one command, so that no case begins with an end that counts us as inactive."""
+        for _ in range(_MOST_TRIES):
+            try:
+                self.finish(self.next_command())
+            except Failed:  # the case will show it; the target may still be busy
+                continue
+            return
+
+    @abstractmethod
+    def next_command(self, what: str = 'a command') -> HeardSymbol:
+        """Wait for a good command."""
+
+    @abstractmethod
+    def finish(self, command: HeardSymbol) -> None:
+        """Answer a command to its end: acknowledge, reply, hear the ACK."""
+
+    def reply_to(self, command: HeardSymbol) -> None:
+        """Send the reply to a command; on a half-duplex line that is the answer to a poll."""
+        self.wire.send(codec.message(self.serve(command.data), self.wire.check))
+
+    def _command(self, symbol: HeardSymbol) -> HeardSymbol:
+        if not symbol.is_good:
+            raise Failed('a message with the right check', symbol.raw.hex(' '))
+        return symbol
+
+
+class SlaveEnd(AnsweringEnd):
+    """A slave, ``station``, that a half-duplex master polls and sends commands to."""
+
+    def __init__(self, wire: Wire, station: int, serve: Serve) -> None:
+        super().__init__(wire, serve)
+        self.station = station
 
     def next_command(self, what: str = 'a command for our station') -> HeardSymbol:
         """Wait for a good message to us; polls before it are answered DLE EOT."""
@@ -254,10 +261,7 @@ class SlaveEnd:
                 self.wire.send(codec.EOT)
             return symbol.kind is SymbolKind.MASTER_MESSAGE and symbol.station == self.station
 
-        symbol = self.wire.until(is_command, what, PATIENCE)
-        if not symbol.is_good:
-            raise Failed('a message with the right check', symbol.raw.hex(' '))
-        return symbol
+        return self._command(self.wire.until(is_command, what, PATIENCE))
 
     def next_poll(self, what: str = 'a poll of our station',
                   within: float = PATIENCE) -> HeardSymbol:
@@ -270,39 +274,19 @@ class SlaveEnd:
             raise Failed(what, str(symbol))
         return symbol
 
-    def reply_to(self, command: HeardSymbol) -> None:
-        """Send the reply to a command, as answer to a poll."""
-        self.wire.send(codec.message(self.serve(command.data), self.wire.check))
-
     def finish(self, command: HeardSymbol) -> None:
-        """Answer a command to its end: acknowledge, wait for the poll, reply, hear the ACK."""
         self.wire.send(codec.ACK)
         self.next_poll()
         self.reply_to(command)
         self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
 
 
-class ServerEnd:
+class ServerEnd(AnsweringEnd):
     """A full-duplex node that answers the commands of another."""
 
-    def __init__(self, wire: Wire, serve: Serve) -> None:
-        self.wire = wire
-        self.serve = serve
-
-    def settle(self) -> None:
-        """Answer one command, so that no case begins with a node that counts us as inactive."""
-        _settle(self)
-
     def next_command(self, what: str = 'a command') -> HeardSymbol:
-        """Wait for a good message."""
-        symbol = self.wire.until(lambda heard: heard.kind is SymbolKind.MESSAGE, what, PATIENCE)
-        if not symbol.is_good:
-            raise Failed('a message with the right check', symbol.raw.hex(' '))
-        return symbol
-
-    def reply_to(self, command: HeardSymbol) -> None:
-        """Send the reply to a command."""
-        self.wire.send(codec.message(self.serve(command.data), self.wire.check))
+        return self._command(self.wire.until(
+            lambda heard: heard.kind is SymbolKind.MESSAGE, what, PATIENCE))
 
     def finish(self, command: HeardSymbol) -> None:
         self.wire.send(codec.ACK)

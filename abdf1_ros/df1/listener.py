@@ -37,7 +37,7 @@ from abdf1_ros.df1.frames import (
 
 # One in 256 wrong frames seems to have a good BCC, so a single one proves nothing.
 _BCC_FRAMES = 2
-# After so many frames in a row that are right with the other check only, the guess was wrong.
+# After so many frames in a row that are right with BCC only, the guess CRC was wrong.
 _CONTRARY_FRAMES = 3
 # Bytes that are kept of noise, or of a message that does not end.
 _MOST_KEPT = 2048
@@ -63,8 +63,8 @@ class ListeningDecoder(FrameDecoder):
     DLE SOH and DLE EOT exist in half duplex only (M 2-6); a message before the first of them is
     taken for full duplex. One frame with a right CRC settles the check for CRC, two with a right
     BCC settle it for BCC. Until then a frame is given out when the byte after its BCC is there,
-    which may be the second byte of a CRC. When three frames in a row are right with the other
-    check only, the check is changed.
+    which may be the second byte of a CRC. A guess is given up for CRC when a frame is right with
+    CRC only, for BCC when three in a row are right with BCC only.
 
     ``wire`` has the bytes of the last symbol, without noise before it.
     """
@@ -122,10 +122,15 @@ class ListeningDecoder(FrameDecoder):
         self.wire = heard[start:]
 
     def finish(self) -> Frame | None:
-        """Return a frame that still waits for a second check byte, at the end of the traffic."""
+        """Return a frame that waits for a second check byte, where none will come any more."""
+        kind = self._kind
         waits = self._step == self._check and len(self._buffer) == 1
-        if not waits or self._kind.checksum is not None or not self._matches(Checksum.BCC):
+        if not waits or kind.is_certain or not self._matches(Checksum.BCC):
             return None
+        if kind.checksum is None:
+            self._find_checksum()
+        else:
+            self._reconsider()
         self._checksum = Checksum.BCC
         result = super()._check()
         assert isinstance(result, Frame)
@@ -152,7 +157,11 @@ class ListeningDecoder(FrameDecoder):
         if self._kind.checksum is not None:
             self._checksum = self._kind.checksum
             if not self._kind.is_certain and len(self._buffer) >= self._checksum.size:
+                if len(self._buffer) == 1 and not self._matches(self._checksum) and (
+                        self._matches(Checksum.CRC, 1)):
+                    return MORE  # a CRC may be what it is
                 self._reconsider()
+                self._checksum = self._kind.checksum
         elif len(self._buffer) < Checksum.CRC.size:
             return MORE
         else:
@@ -174,9 +183,9 @@ class ListeningDecoder(FrameDecoder):
         other = Checksum.BCC if self._checksum is Checksum.CRC else Checksum.CRC
         if self._matches(self._checksum):
             self._contrary_frames = 0
-        elif self._matches(other, self._checksum.size):
+        elif self._matches(other):
             self._contrary_frames += 1
-        if self._contrary_frames == _CONTRARY_FRAMES:
+        if self._contrary_frames == (1 if other is Checksum.CRC else _CONTRARY_FRAMES):
             self._contrary_frames = 0
             self._kind.checksum = other
 

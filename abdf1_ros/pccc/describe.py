@@ -233,6 +233,8 @@ _SHARED: dict[CommandCode, KnownCommand] = {
 # All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
 _NAMES: dict[CommandCode, str] = {
     (0x03, None): 'physical write', (0x04, None): 'physical read',
+    # CIP of a Logix controller on its serial port (1756-PM020F p. 75).
+    (0x0A, None): 'connected CIP message', (0x0B, None): 'unconnected CIP message',
     (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables',
     (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs', (0x06, 0x06): 'set ENQs',
     (0x06, 0x07): 'reset diagnostic counters', (0x06, 0x08): 'set data table size',
@@ -253,4 +255,6 @@ _NAMES: dict[CommandCode, str] = {
     (0x0F, 0x88): 'execute command list', (0x0F, 0x8F): 'apply port configuration',
     (0x0F, 0x94): 'read file information', (0x0F, 0xA7): 'protected typed file read',
     (0x0F, 0xAF): 'protected typed file write',
+    # In no manual; recorded of a MicroLogix 1400, each item is FF and an address.
+    (0x0F, 0xA3): 'read of words by physical address',
 }

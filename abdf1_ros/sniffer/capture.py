@@ -66,11 +66,16 @@ class Direction(Enum):
 
 
 class Chunk(NamedTuple):
-    """Bytes as they were read or written; ``time`` in seconds, None where not recorded."""
+    """
+    Bytes as they were read or written; ``time`` in seconds, None where not recorded.
+
+    With ``is_message`` they are the link data of one message, which had no frame.
+    """
 
     time: float | None
     direction: Direction
     data: bytes
+    is_message: bool = False
 
     def __str__(self) -> str:
         """Return the line of a capture."""

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Read recorded bytes from files of several kinds: captures, hex dumps, raw bytes.
+Read recorded bytes from files of several kinds: captures, packets, hex dumps, raw bytes.
 
 A hex dump is bytes in hexadecimal, with or without spaces, and with or without the offsets and
 characters that ``xxd`` and ``hexdump -C`` put beside them. It has neither times nor directions.
@@ -27,6 +27,9 @@ import re
 
 from abdf1_ros.errors import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
+from abdf1_ros.sniffer.ethernet_ip import chunks_of
+from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
+from abdf1_ros.sniffer.pcapng import LINK_TYPE
 
 _BLOCK = 4096
 # The longest text line in bytes: no program writes longer ones, and a file without line ends, such
@@ -69,6 +72,9 @@ class Recording:
     def chunks(self) -> Iterator[Chunk]:
         """Yield the chunks; Problem names file and line where something cannot be read."""
         with self._file:
+            if not self._is_binary and is_packet_file(self._file.peek(4)):
+                yield from self._packets()
+                return
             if self._is_binary:
                 yield from self._binary()
                 return
@@ -78,6 +84,16 @@ class Recording:
                 yield from read_capture(self._name, _chained(first, lines), self.settings)
             else:
                 yield from read_hex(self._name, _chained(first, lines))
+
+    def _packets(self) -> Iterator[Chunk]:
+        file = PacketFile(self._name, self._file)
+        is_empty = True
+        for chunk in chunks_of(file.packets()):
+            is_empty, self._position = False, file.position
+            yield chunk
+        if is_empty:
+            raise Problem(self._name, f'byte {file.position}: no packet up to here has DF1 (link '
+                          f'type {LINK_TYPE}) or PCCC in EtherNet/IP (CIP service 4B)')
 
     def _binary(self) -> Iterator[Chunk]:
         while data := self._file.read(_BLOCK):

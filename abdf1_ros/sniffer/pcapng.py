@@ -34,6 +34,7 @@ from abdf1_ros.sniffer.entries import Entry
 
 VERSION = 1
 LINK_TYPE = 147  # USER0
+HEAD_SIZE = 4
 _SECTION = 0x0A0D0D0A
 _INTERFACE = 1
 _PACKET = 6
@@ -42,7 +43,7 @@ _NO_LENGTH = 0xFFFFFFFFFFFFFFFF
 _NAME = 2  # option of an interface
 _FLAGS = 2  # option of a packet; its lowest two bits are the direction
 _SNAP_LENGTH = 0  # no limit
-_DIRECTIONS = {Direction.UNKNOWN: 0, Direction.OUT: 1, Direction.IN: 2}
+DIRECTIONS = {Direction.UNKNOWN: 0, Direction.OUT: 1, Direction.IN: 2}
 # Inbound is 1 for pcapng, outbound 2.
 _FLAG = {Direction.UNKNOWN: 0, Direction.OUT: 2, Direction.IN: 1}
 _CHECKS = {None: 0, Checksum.BCC: 1, Checksum.CRC: 2}
@@ -78,7 +79,7 @@ class PcapngWriter:
         """Write the bytes of an entry, if it has any."""
         if not entry.wire:
             return
-        data = bytes((VERSION, _DIRECTIONS[entry.direction], _CHECKS[entry.checksum],
+        data = bytes((VERSION, DIRECTIONS[entry.direction], _CHECKS[entry.checksum],
                       _VERDICTS[entry.valid])) + entry.wire
         microseconds = max(0, round((self.begun + (entry.time or 0.0)) * 1e6))
         flags = struct.pack('<I', _FLAG[entry.direction])

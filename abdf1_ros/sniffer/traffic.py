@@ -50,13 +50,10 @@ class _OneDirection:
         self.last_time: float | None = None
         self._noise_told = 0
 
-    def feed(self, chunk: Chunk) -> None:
-        """Take bytes; a frame that broke off before a pause or another recording is noise."""
-        if chunk.time is not None and self.last_time is not None and (
-                not 0 <= chunk.time - self.last_time <= _PAUSE):
-            self.decoder.reset()
-        self.last_time = chunk.time
-        self.decoder.feed(chunk.data)
+    def ends_before(self, chunk: Chunk) -> bool:
+        """Tell whether a pause, or another recording, ends a frame that is not complete."""
+        return chunk.time is not None and self.last_time is not None and (
+            not 0 <= chunk.time - self.last_time <= _PAUSE)
 
     def new_noise(self) -> int:
         """Return the number of bytes of noise since the last call."""
@@ -86,29 +83,46 @@ class TrafficDecoder:
 
     def feed(self, chunk: Chunk) -> Iterator[Entry]:
         """Yield the entries that these bytes complete."""
+        if chunk.is_message:
+            yield self._message(Packet.decode(chunk.data), chunk.time, chunk.direction)
+        else:
+            yield from self._line(chunk)
+        for transaction in self._conversation.expired(chunk.time):
+            yield self._unanswered(transaction, chunk.time)
+
+    def _line(self, chunk: Chunk) -> Iterator[Entry]:
+        """Yield the symbols that the bytes of a line complete."""
         wire = self._wires.get(chunk.direction)
         if wire is None:
             wire = self._wires[chunk.direction] = _OneDirection(self.kind)
+        for direction, other in self._wires.items():
+            is_end = other is wire and wire.ends_before(chunk)
+            if is_end or other is not wire:  # who is answered has said all of the check
+                yield from self._whole(other, direction, is_end)
+        wire.last_time = chunk.time
         for start in range(0, len(chunk.data) or 1, _PART):
-            wire.feed(chunk._replace(data=chunk.data[start:start + _PART]))
+            wire.decoder.feed(chunk.data[start:start + _PART])
             while (symbol := wire.decoder.next_symbol()) is not None:
                 yield from self._noise(wire, chunk)
                 yield from self._entries(symbol, chunk, wire.decoder)
-        for transaction in self._conversation.expired(chunk.time):
-            yield self._unanswered(transaction, chunk.time)
 
     def finish(self) -> Iterator[Entry]:
         """Yield what is left at the end."""
         for direction, wire in self._wires.items():
-            chunk = Chunk(wire.last_time, direction, b'')
-            symbol = wire.decoder.finish()
-            wire.decoder.reset()
-            yield from self._noise(wire, chunk)
-            if symbol is not None:
-                yield from self._entries(symbol, chunk, wire.decoder)
+            yield from self._whole(wire, direction, is_end=True)
         times = [wire.last_time for wire in self._wires.values() if wire.last_time is not None]
         for transaction in self._conversation.unanswered():
             yield self._unanswered(transaction, max(times, default=None))
+
+    def _whole(self, wire: _OneDirection, direction: Direction, is_end: bool) -> Iterator[Entry]:
+        """Yield a frame that has a right BCC and waits for more; at an end, drop what is left."""
+        symbol = wire.decoder.finish()
+        if is_end:
+            wire.decoder.reset()
+        chunk = Chunk(wire.last_time, direction, b'')
+        yield from self._noise(wire, chunk)
+        if symbol is not None:
+            yield from self._entries(symbol, chunk, wire.decoder)
 
     def _noise(self, wire: _OneDirection, chunk: Chunk) -> Iterator[Entry]:
         count = wire.new_noise()
@@ -187,13 +201,16 @@ class TrafficDecoder:
                checksum: Checksum) -> Entry:
         if frame.fault is not None:
             return self._damaged(frame, time, direction, checksum)
-        packet = Packet.decode(frame.data)
-        facts = self._conversation.take(packet, time, direction, frame.station is not None)
+        entry = self._message(Packet.decode(frame.data), time, direction, frame.station)
+        return replace(entry, checksum=checksum, valid=True)
+
+    def _message(self, packet: Packet, time: float | None, direction: Direction,
+                 station: int | None = None) -> Entry:
+        facts = self._conversation.take(packet, time, direction, station is not None)
         kind = Kind.REPLY if packet.is_reply else Kind.COMMAND
         return Entry(
             time, direction, kind, f'{_route(packet)}: {describe(packet, facts.command)}',
-            self._node(frame.station, packet), checksum, True, packet, facts.latency,
-            facts.marks)
+            self._node(station, packet), packet=packet, latency=facts.latency, marks=facts.marks)
 
     def _damaged(self, frame: Frame, time: float | None, direction: Direction,
                  checksum: Checksum) -> Entry:

@@ -140,10 +140,10 @@ def test_recording_that_begins_in_the_middle_is_half_duplex_after_all() -> None:
 
 
 def test_what_is_given_is_not_found_anew() -> None:
-    kind = LineKind(Checksum.BCC, Duplex.FULL)
+    kind = LineKind(Checksum.BCC, Duplex.FULL, is_certain=True)
     decoder = ListeningDecoder(kind)
     symbols(decoder, frames.EOT + frames.poll_frame(1) + frame(Checksum.CRC))
-    assert kind == LineKind(Checksum.BCC, Duplex.FULL)
+    assert kind == LineKind(Checksum.BCC, Duplex.FULL, is_certain=True)
 
 
 @given(strategies.lists(strategies.binary(max_size=30), max_size=20))
@@ -156,15 +156,20 @@ def test_any_bytes_are_symbols_or_noise(chunks: list[bytes]) -> None:
     assert pieces.finish() == whole.finish()
 
 
-@pytest.mark.parametrize('wrong', Checksum)
-def test_a_guess_that_three_frames_contradict_is_changed(wrong: Checksum) -> None:
-    right = Checksum.BCC if wrong is Checksum.CRC else Checksum.CRC
+@pytest.mark.parametrize('size', [1, 1000])
+@pytest.mark.parametrize(('wrong', 'right', 'damaged'), [
+    (Checksum.CRC, Checksum.BCC, 2), (Checksum.BCC, Checksum.CRC, 0)])
+def test_a_guess_that_frames_contradict_is_changed(
+        wrong: Checksum, right: Checksum, damaged: int, size: int) -> None:
+    """Three right BCCs can be no chance, nor can one right CRC."""
     kind = LineKind(wrong)
     decoder = ListeningDecoder(kind)
     said = b''.join(frames.ACK + frame(right, tns) for tns in range(4))
-    found = [symbol for symbol in symbols(decoder, said) if isinstance(symbol, Frame)]
+    found = [symbol for at in range(0, len(said), size)
+             for symbol in symbols(decoder, said[at:at + size]) if isinstance(symbol, Frame)]
     assert kind.checksum is right
-    assert [symbol.fault for symbol in found] == [FrameFault.BAD_CHECK] * 3 + [None]
+    assert [symbol.fault for symbol in found] == (
+        [FrameFault.BAD_CHECK] * damaged + [None] * (4 - damaged))
 
 
 def test_a_check_that_is_certain_stays() -> None:

@@ -321,3 +321,21 @@ def test_chunks_do_not_matter(data: strategies.DataObject) -> None:
     expected = [(entry.kind, entry.text) for entry in decode(TRANSACTION)]
     assert [(entry.kind, entry.text)
             for entry in decode([(UNKNOWN, part) for part in parts])] == expected
+
+
+@pytest.mark.parametrize('checksum', Checksum)
+@pytest.mark.parametrize('guess', [None, *Checksum])
+def test_check_is_found_though_silence_follows_each_message(
+        guess: Checksum | None, checksum: Checksum) -> None:
+    """A dead PLC: with BCC the pause came before a second byte of check that never comes."""
+    commands = [COMMAND._replace(tns=count) for count in range(20)]
+    session = TrafficDecoder(guess, is_certain=False)
+    entries = decode([(OUT, message(command, checksum)) for command in commands], session, 1.0)
+    assert [entry.packet for entry in entries if entry.kind is Kind.COMMAND] == commands
+    assert session.kind.checksum is checksum
+    assert Kind.NOISE not in kinds(entries)
+
+
+def test_first_bcc_message_comes_before_its_answer() -> None:
+    said = [(OUT, master(COMMAND, Checksum.BCC)), (IN, frames.ACK)]
+    assert kinds(decode(said))[:2] == [Kind.COMMAND, Kind.ACK]

@@ -1,0 +1,128 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Packets of files that Wireshark and tcpdump write: pcap and pcapng.
+
+The formats are those of draft-ietf-opsawg-pcap and draft-ietf-opsawg-pcapng, sections 4.1 to 4.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import struct
+from typing import BinaryIO, NamedTuple
+
+from abdf1_ros.errors import Problem
+
+_PCAPNG = b'\x0A\x0D\x0D\x0A'
+# Byte order and length of a tick, by the first four bytes of a pcap.
+_PCAP = {b'\xD4\xC3\xB2\xA1': ('<', 1e-6), b'\xA1\xB2\xC3\xD4': ('>', 1e-6),
+         b'\x4D\x3C\xB2\xA1': ('<', 1e-9), b'\xA1\xB2\x3C\x4D': ('>', 1e-9)}
+_BYTE_ORDERS = {b'\x4D\x3C\x2B\x1A': '<', b'\x1A\x2B\x3C\x4D': '>'}
+_INTERFACE, _SIMPLE, _ENHANCED = 1, 3, 6
+_RESOLUTION = 9  # option of an interface
+_LONGEST = 1_000_000  # bytes of a packet or block; no network has longer ones
+
+
+class RecordedPacket(NamedTuple):
+    """A packet: seconds since 1970 (None: not recorded), link type, bytes as far as kept."""
+
+    time: float | None
+    link_type: int
+    data: bytes
+
+
+def is_packet_file(start: bytes) -> bool:
+    """Tell whether a file that begins with these bytes is pcap or pcapng."""
+    return start[:4] == _PCAPNG or start[:4] in _PCAP
+
+
+class PacketFile:
+    """Reads the packets of ``file``; raises Problem, which names ``name`` and the byte."""
+
+    def __init__(self, name: str, file: BinaryIO) -> None:
+        self.position = 0
+        self._name = name
+        self._file = file
+
+    def packets(self) -> Iterator[RecordedPacket]:
+        """Yield the packets in the order of the file."""
+        magic = self._take(4)
+        if magic == _PCAPNG:
+            yield from self._pcapng()
+        else:
+            yield from self._pcap(*_PCAP[magic])
+
+    def _pcap(self, order: str, tick: float) -> Iterator[RecordedPacket]:
+        link_type = struct.unpack(f'{order}I', self._take(20)[16:])[0] & 0xFFFF
+        while head := self._take(16, may_end=True):
+            seconds, ticks, kept, _ = struct.unpack(f'{order}4I', head)
+            yield RecordedPacket(seconds + ticks * tick, link_type, self._take(kept))
+
+    def _pcapng(self) -> Iterator[RecordedPacket]:
+        order, interfaces = '<', list[tuple[int, float]]()
+        head = _PCAPNG + self._take(4)
+        while head:
+            if head.startswith(_PCAPNG):  # a section, which has its own byte order
+                mark = self._take(4)
+                order, interfaces = _BYTE_ORDERS.get(mark, '<'), []
+                size = struct.unpack(f'{order}I', head[4:])[0] - 16
+                kind = 0
+            else:
+                kind, size = struct.unpack(f'{order}2I', head)
+                size -= 12
+            body = self._take(size)
+            self._take(4)  # the size again
+            if kind == _INTERFACE:
+                interfaces.append((struct.unpack_from(f'{order}H', body.ljust(2, b'\0'))[0],
+                                   _tick(order, body[8:])))
+            elif kind in (_ENHANCED, _SIMPLE):
+                yield self._packet(order, kind, body, interfaces)
+            head = self._take(8, may_end=True)
+
+    def _packet(self, order: str, kind: int, body: bytes,
+                interfaces: list[tuple[int, float]]) -> RecordedPacket:
+        try:
+            if kind == _SIMPLE:
+                return RecordedPacket(None, interfaces[0][0], body[4:])
+            which, high, low, kept, _ = struct.unpack_from(f'{order}5I', body)
+            link_type, tick = interfaces[which]
+        except (struct.error, IndexError):
+            raise self._damaged('a packet without its interface') from None
+        return RecordedPacket((high << 32 | low) * tick, link_type, body[20:20 + kept])
+
+    def _take(self, size: int, may_end: bool = False) -> bytes:
+        if not 0 <= size <= _LONGEST:
+            raise self._damaged(f'a size of {size} bytes')
+        data = self._file.read(size)
+        self.position += len(data)
+        if len(data) < size and not (may_end and not data):
+            raise self._damaged('the file ends inside a packet')
+        return data
+
+    def _damaged(self, reason: str) -> Problem:
+        return Problem(self._name, f'byte {self.position}: {reason}; what stands before it has '
+                                   'been read')
+
+
+def _tick(order: str, options: bytes) -> float:
+    """Return the seconds that a time stamp of an interface counts in."""
+    while len(options) >= 5:
+        code, size = struct.unpack_from(f'{order}HH', options)
+        if code == _RESOLUTION:
+            value = options[4]
+            return 2.0 ** -(value & 0x7F) if value & 0x80 else 10.0 ** -value
+        options = options[4 + size + -size % 4:]
+    return 1e-6

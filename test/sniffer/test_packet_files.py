@@ -1,0 +1,211 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""pcap and pcapng: our own, PCCC in EtherNet/IP, and files that are damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import struct
+
+from abdf1_ros.errors import Problem
+from abdf1_ros.sniffer.capture import Chunk, Direction
+from abdf1_ros.sniffer.dumps import Recording
+from abdf1_ros.sniffer.entries import Entry, Kind
+from abdf1_ros.sniffer.pcapng import PcapngWriter
+from abdf1_ros.sniffer.report import text_line
+from abdf1_ros.sniffer.traffic import TrafficDecoder
+import pytest
+from support.captures import CAPTURES
+
+ETHERNET, LOOPBACK, COOKED = 1, 0, 113
+
+# Recorded of a MicroLogix 1400 (ITI/ICS-Security-Tools, pcaps/CIP/cip_only.pcap, CC-BY-4.0).
+STATUS = bytes.fromhex('06 00 63 C5 03')
+STATUS_REPLY = bytes.fromhex('46 00 63 C5 00EE4A9F23313736362D4C4543202020000026003682 9EFC01')
+STATUS_TEXT = 'MicroLogix 1400 series B revision 4'
+
+
+def cip(pccc: bytes, is_reply: bool = False) -> bytes:
+    """Return Execute PCCC; the requestor has 7 bytes."""
+    head = bytes.fromhex('CB 00 00 00') if is_reply else bytes.fromhex('4B 02 20 67 24 01')
+    return head + bytes.fromhex('07 4D 00 78 56 34 12') + pccc
+
+
+def sent_through(message: bytes) -> bytes:
+    """Return an Unconnected Send of a message to slot 0."""
+    return (bytes.fromhex('52 02 20 06 24 01 05 F9') + struct.pack('<H', len(message)) + message
+            + bytes.fromhex('01 00 01 00'))
+
+
+def encapsulated(data: bytes, is_connected: bool = False) -> bytes:
+    """Return SendRRData, or with a sequence count SendUnitData."""
+    items = b'\0\0\0\0' if not is_connected else bytes.fromhex('A1 00 04 00 01 02 03 04')
+    body = b'\x07\0' + data if is_connected else data
+    content = (bytes(6) + b'\x02\0' + items + struct.pack(
+        '<HH', 0xB1 if is_connected else 0xB2, len(body)) + body)
+    return struct.pack('<HH', 0x70 if is_connected else 0x6F, len(content)) + bytes(20) + content
+
+
+def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18) -> bytes:
+    """Return a segment in IP, without options."""
+    hosts = bytes((192, 168, 0, 65)), bytes((192, 168, 0, 30))
+    ports = 50000, 44818
+    ways = (hosts, ports) if to_plc else (hosts[::-1], ports[::-1])
+    segment = struct.pack('>HHIIBBHHH', *ways[1], number & 0xFFFFFFFF, 0, 0x50, flags, 0, 0, 0)
+    return (struct.pack('>BBHIBBH', 0x45, 0, 40 + len(payload), 0, 64, 6, 0) + b''.join(ways[0])
+            + segment + payload)
+
+
+def ethernet(ip: bytes, vlan: bool = False) -> bytes:
+    return bytes(12) + (b'\x81\0\0\x07' if vlan else b'') + b'\x08\0' + ip + b'padding'
+
+
+def pcap(packets: Sequence[tuple[float, bytes]], link_type: int = ETHERNET, order: str = '<',
+         magic: int = 0xA1B2C3D4) -> bytes:
+    ticks = 10 ** (9 if magic == 0xA1B23C4D else 6)
+    return struct.pack(f'{order}IHHIIII', magic, 2, 4, 0, 0, 65535, link_type) + b''.join(
+        struct.pack(f'{order}IIII', int(time), round(time % 1 * ticks), len(data), len(data))
+        + data for time, data in packets)
+
+
+def block(order: str, kind: int, body: bytes) -> bytes:
+    body += bytes(-len(body) % 4)
+    size = struct.pack(f'{order}I', len(body) + 12)
+    return struct.pack(f'{order}I', kind) + size + body + size
+
+
+def pcapng(packets: Sequence[tuple[float, bytes]], order: str, options: bytes,
+           ticks: float) -> bytes:
+    return b''.join((
+        block(order, 0x0A0D0D0A, struct.pack(f'{order}IHHq', 0x1A2B3C4D, 1, 0, -1)),
+        block(order, 1, struct.pack(f'{order}HHI', ETHERNET, 0, 0) + options),
+        block(order, 5, bytes(20)),  # statistics
+        *(block(order, 6, struct.pack(
+            f'{order}IIIII', 0, round(time * ticks) >> 32, round(time * ticks) & 0xFFFFFFFF,
+            len(data), len(data)) + data) for time, data in packets)))
+
+
+def chunks_of(path: Path, content: bytes) -> list[Chunk]:
+    path.write_bytes(content)
+    return list(Recording(path).chunks())
+
+
+def entries_of(chunks: Sequence[Chunk]) -> list[Entry]:
+    session = TrafficDecoder()
+    return [*(entry for chunk in chunks for entry in session.feed(chunk)), *session.finish()]
+
+
+def exchange(begun: float = 1000.0) -> list[tuple[float, bytes]]:
+    return [(begun, ethernet(tcp(encapsulated(cip(STATUS)), 0x1000))),
+            (begun + 0.005, ethernet(tcp(encapsulated(cip(STATUS_REPLY, is_reply=True)), 500,
+                                         to_plc=False)))]
+
+
+@pytest.mark.parametrize('content', [
+    pcap(exchange()), pcap(exchange(), order='>'), pcap(exchange(), magic=0xA1B23C4D),
+    pcapng(exchange(), '<', b'', 1e6), pcapng(exchange(), '>', b'', 1e6),
+    pcapng(exchange(), '<', bytes.fromhex('0200 0300 65746800 0900 0100 09000000 00000000'), 1e9),
+    pcapng(exchange(), '>', bytes.fromhex('0009 0001 94000000 00000000'), 2 ** 20)])
+def test_pccc_of_a_real_processor_is_told_in_words(tmp_path: Path, content: bytes) -> None:
+    command, reply = entries_of(chunks_of(tmp_path / 'x', content))
+    assert text_line(command) == ('     0.000000 >  30 command  65 to 30, TNS C563: '
+                                  'diagnostic status')
+    assert (reply.kind, reply.station, reply.valid) == (Kind.REPLY, 30, None)
+    assert STATUS_TEXT in reply.text
+    assert reply.latency == pytest.approx(0.005, abs=2e-6)
+
+
+@pytest.mark.parametrize('data', [
+    encapsulated(cip(STATUS), is_connected=True), encapsulated(sent_through(cip(STATUS)))])
+def test_pccc_comes_connected_and_through_a_backplane(tmp_path: Path, data: bytes) -> None:
+    chunk, = chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(tcp(data, 1), vlan=True))]))
+    assert chunk == Chunk(0.0, Direction.OUT, bytes((30, 65)) + STATUS, is_message=True)
+
+
+@pytest.mark.parametrize(('link_type', 'head'), [
+    (LOOPBACK, b'\2\0\0\0'), (101, b''), (COOKED, bytes(14) + b'\x08\0'),
+    (276, b'\x08\0' + bytes(18))])
+def test_packets_come_over_any_usual_link(tmp_path: Path, link_type: int, head: bytes) -> None:
+    packet = head + tcp(encapsulated(cip(STATUS)), 1)
+    assert len(chunks_of(tmp_path / 'x', pcap([(0.0, packet)], link_type))) == 1
+
+
+def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_path: Path) -> None:
+    data = encapsulated(cip(STATUS))
+    again = encapsulated(cip(STATUS[:2] + b'\1\0' + STATUS[4:]))
+    parts = [(b'', -1, 0x02), (data[:10], 0, 0x18), (data[:10], 0, 0x18), (data[5:30], 5, 0x18),
+             (data[30:] + again, 30, 0x18),
+             (b'lost before this', 9999, 0x18), (data, 20000, 0x18)]
+    packets = [(float(at), ethernet(tcp(part, 0xFFFFFFF0 + number, flags=flags)))
+               for at, (part, number, flags) in enumerate(parts)]
+    found = chunks_of(tmp_path / 'x', pcap(packets))
+    assert [(chunk.time, chunk.data[4:6].hex()) for chunk in found] == [
+        (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5')]
+
+
+def test_what_sniff_has_written_is_read_as_it_was(tmp_path: Path) -> None:
+    for capture in CAPTURES[:6]:
+        writer = PcapngWriter(str(tmp_path / 'own'))
+        session = TrafficDecoder()
+        entries = [entry for chunk in capture.chunks for entry in session.feed(chunk)]
+        writer.begin('2026-11-23T00:00:00+00:00')
+        for entry in entries:
+            writer.write(entry)
+        writer.close()
+        said = [entry for entry in entries if entry.wire]
+        again = [entry for entry in entries_of(list(Recording(tmp_path / 'own').chunks()))
+                 if entry.wire]
+        assert [(entry.kind, entry.wire, entry.text) for entry in again] == [
+            (entry.kind, entry.wire, entry.text) for entry in said]
+
+
+def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
+    """A write with BCC after which nothing comes (samt707/ambersloth, df1_orig_half_duplex)."""
+    sent = bytes.fromhex('1002 0000 0F00 0139 AA02 0789 0500 4934'), bytes.fromhex('1003F9')
+    head = bytes.fromhex('5BBE0468 00016378')
+    packets = [(at + count * 32.0, head + bytes((event, 0, 0, 0)) + part) for count in range(3)
+               for at, event, part in ((0.0, 4, sent[0]), (0.001, 4, sent[1]), (1.0, 0, b'x'))]
+    entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets, link_type=250)))
+    commands = [entry for entry in entries if entry.kind is Kind.COMMAND]
+    assert [entry.text for entry in commands] == [
+        '0 to 0, TNS 3901: protected typed logical write N7:5 = 13385'] * 3
+    assert not any(entry.kind is Kind.NOISE for entry in entries)
+
+
+@pytest.mark.parametrize(('content', 'fault'), [
+    (pcap(exchange())[:-5], 'byte 311: the file ends inside a packet'),
+    (pcap([])[:20], 'byte 20: the file ends inside a packet'),
+    (pcap([]) + struct.pack('<4I', 0, 0, 1 << 30, 0), 'a size of 1073741824 bytes'),
+    (pcap([(0.0, b'x')]), 'byte 41: no packet up to here has DF1'),
+    (pcapng([], '<', b'', 1e6) + block('<', 6, struct.pack('<5I', 7, 0, 0, 0, 0)),
+     'a packet without its interface'),
+    (pcapng([], '<', b'', 1e6) + struct.pack('<2I', 6, 5), 'a size of -7 bytes')])
+def test_damage_is_told_with_its_place(tmp_path: Path, content: bytes, fault: str) -> None:
+    with pytest.raises(Problem) as problem:
+        chunks_of(tmp_path / 'x', content)
+    assert fault in str(problem.value)
+
+
+@pytest.mark.parametrize('packet', [
+    b'', bytes(14), ethernet(b''), ethernet(bytes(60)), ethernet(tcp(b'', 0)[:30]),
+    ethernet(tcp(bytes(100), 0)), ethernet(tcp(encapsulated(b''), 0)),
+    ethernet(tcp(encapsulated(bytes.fromhex('4B 02 20 67 24 01')), 0)),
+    ethernet(tcp(encapsulated(bytes.fromhex('52 02 20 06 24 01 05 F9 00 00')), 0)),
+    ethernet(tcp(encapsulated(cip(b'\x06')), 0)),
+    ethernet(tcp(encapsulated(cip(STATUS)), 0).replace(b'\xAF\x12', b'\x01\x02'))])
+def test_other_packets_are_passed_over(tmp_path: Path, packet: bytes) -> None:
+    found = chunks_of(tmp_path / 'x', pcap([(0.0, packet), *exchange()]))
+    assert [chunk.is_message for chunk in found] == [True, True]
