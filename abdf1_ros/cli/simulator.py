@@ -55,7 +55,7 @@ from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.data_table import NoSuchFile
-from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
@@ -87,11 +87,11 @@ _LAMPS = {Lamp.ALIVE: 'ROS alive', Lamp.IN_CONTROL: 'ROS in control',
           Lamp.LOST: 'ROS lost (heartbeat stands still)'}
 
 
-class _FaultyPort:
+class _FaultyPort(PortAround):
     """The port of the one PLC on a full-duplex line, with the effects of its faults."""
 
     def __init__(self, port: Port, plc: SimulatedPlc, checksum: Checksum) -> None:
-        self._port = port
+        super().__init__(port)
         self._plc = plc
         self._decoder = FrameDecoder(checksum, Duplex.FULL)
 
@@ -114,21 +114,9 @@ class _FaultyPort:
         if not self._plc.faults.silent:
             self._port.write(self._plc.damaged(data))
 
-    def unsent(self) -> int:
-        return self._port.unsent()
 
-    def close(self) -> None:
-        self._port.close()
-
-
-class _EchoingPort:
+class _EchoingPort(PortAround):
     """The port of a line whose adapter gives the other end back what it sends."""
-
-    def __init__(self, port: Port) -> None:
-        self._port = port
-        self.write = port.write
-        self.unsent = port.unsent
-        self.close = port.close
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         data = self._port.read(timeout, wake)

@@ -39,7 +39,18 @@ _WRITE_TIMEOUT = 2.0
 
 
 class Port(Protocol):
-    """An open line. Every method raises OSError when the line is gone."""
+    """
+    An open line. Every method raises OSError when the line is gone.
+
+    ``has_more`` tells that the last ``read`` has not taken all that was there. A port that
+    ``is_terminal`` is a device of this machine, not a connection.
+    """
+
+    @property
+    def has_more(self) -> bool: ...
+
+    @property
+    def is_terminal(self) -> bool: ...
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Wait for bytes up to ``timeout`` s, or until the descriptor ``wake`` is readable."""
@@ -54,12 +65,41 @@ class Port(Protocol):
         """Give the line back."""
 
 
+class PortAround:
+    """A port that does something to what another one brings or gets."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+
+    @property
+    def has_more(self) -> bool:
+        return self._port.has_more
+
+    @property
+    def is_terminal(self) -> bool:
+        return self._port.is_terminal
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        return self._port.read(timeout, wake)
+
+    def write(self, data: bytes) -> None:
+        self._port.write(data)
+
+    def unsent(self) -> int:
+        return self._port.unsent()
+
+    def close(self) -> None:
+        self._port.close()
+
+
 class DescriptorPort:
     """A port with a file descriptor, which is set to non-blocking; ``close`` closes it."""
 
     def __init__(self, descriptor: int, close: Callable[[], None]) -> None:
         self._descriptor = descriptor
         self._close = close
+        self.has_more = False
+        self.is_terminal = os.isatty(descriptor)
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
         self._wake = -1
@@ -81,6 +121,7 @@ class DescriptorPort:
             data = os.read(self._descriptor, READ_SIZE)
         except BlockingIOError:
             return b''
+        self.has_more = len(data) == READ_SIZE
         if not data:
             raise OSError('the other end has closed the connection')
         return data

@@ -29,7 +29,7 @@ import time
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.descriptor import DescriptorPort, Port, READ_SIZE
+from abdf1_ros.ports.descriptor import Port, READ_SIZE
 
 # Between attempts to open a port (s). They cost almost nothing, and a person who has plugged the
 # cable in again is waiting.
@@ -41,10 +41,13 @@ _FAULT_WINDOW = 60.0
 _WAKES = 4096  # read at a time
 _POLL_STEP = 0.001  # poll(2) counts milliseconds
 
-# Where bytes come faster than they can be worked on, so many are at a time (symbols that nobody
-# wants take up to 18 us a byte), and the others have so many times as long before the next.
+# Where bytes come faster than they can be worked on, so many are at a time: symbols that nobody
+# wants take up to 18 us a byte. Before the next the other lines have so many times as long as that
+# took of the processor, but no longer than the line would have needed for these bytes.
 _PORTION = 64
 _OTHERS = 19
+
+_FASTEST = 10 / 115200  # s a character, where the line has no speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +144,8 @@ class LinkThread(threading.Thread):
                  on_fault: Callable[[Exception], None] = lambda error: None,
                  while_sending: Callable[[], None] = lambda: None,
                  retry_period: float = _RETRY_PERIOD,
-                 clock: Callable[[], float] = line_time) -> None:
+                 clock: Callable[[], float] = line_time,
+                 processor_clock: Callable[[], float] = time.thread_time) -> None:
         super().__init__(name='df1 link')
         self.state = PortState(False, 'not opened yet')
         self.has_failed = False
@@ -154,6 +158,9 @@ class LinkThread(threading.Thread):
         self._while_sending = while_sending
         self._retry_period = retry_period
         self._clock = clock
+        self._processor_clock = processor_clock
+        self._worked = 0.0  # processor time (s) up to the last portion of a burst
+        self._paced = -math.inf  # until then a line would have needed for a burst so far
         self._next: _Exchange | None = None
         self._is_lost = False
         self._stopping = False
@@ -310,8 +317,6 @@ class LinkThread(threading.Thread):
         """Run the machine until something else is wanted."""
         machine, clock = self._machine, self._clock
         machine.send_at_once, machine.unsent = port.write, port.unsent
-        # Only on a UART do bytes come at the speed of the line; other ports may be faster.
-        is_terminal = isinstance(port, DescriptorPort) and os.isatty(port.fileno())
         machine.start(clock())
         left = b''
         while not (self._stopping or self.is_released or self._next):
@@ -319,7 +324,8 @@ class LinkThread(threading.Thread):
             if data:
                 port.write(data)
             self._while_sending()
-            if is_terminal and (spare_time := machine.spare_time):
+            # A connection is read as its bytes come: they may be here before their time.
+            if port.is_terminal and (spare_time := machine.spare_time):
                 self._pause(spare_time)
             deadline = machine.next_call
             timeout = None if deadline is None else max(0.0, deadline - clock())
@@ -329,9 +335,11 @@ class LinkThread(threading.Thread):
                 # The deadline first: after a pause of this process nobody can tell whether an
                 # answer in the buffer came in time.
                 machine.handle_timeout(now)
-            if left or len(data) == READ_SIZE:
+            if left or port.has_more:
                 left = self._take_portion(data, now)
-            elif data:
+                continue
+            self._paced = -math.inf
+            if data:
                 machine.receive_data(data, now)
             elif self._take_wake() and not self._stopping:
                 machine.wake(now)
@@ -354,17 +362,26 @@ class LinkThread(threading.Thread):
         self._wakes.poll()
         self._take_wake()
 
-    def _take_portion(self, data: bytes, begun: float) -> bytes:
+    def _take_portion(self, data: bytes, now: float) -> bytes:
         """
         Work on some of what comes faster than it can be worked on, then rest; return what is left.
 
         No line does that. But a connection can, to a server that is broken or means harm: it would
         take a whole processor, and keep the interpreter lock from the other lines of this process.
+        A burst that ends is worked off in the time that it would have taken on the line.
         """
-        self._machine.receive_data(data[:_PORTION], begun)
-        self._rest(_OTHERS * (self._clock() - begun))
+        machine, portion = self._machine, data[:_PORTION]
+        if portion:
+            machine.receive_data(portion, now)
+        if self._paced == -math.inf:
+            self._paced = now
+        # Nothing is left where all of it were commands of a device server.
+        self._paced += (len(portion) or READ_SIZE) * (machine.char_time or _FASTEST)
+        used = self._processor_clock() - self._worked
+        self._rest(max(0.0, min(_OTHERS * used, self._paced - self._clock())))
+        self._worked = self._processor_clock()
         if self._take_wake() and not self._stopping:
-            self._machine.wake(self._clock())
+            machine.wake(self._clock())
         return data[_PORTION:]
 
     def _rest(self, seconds: float) -> None:

@@ -22,7 +22,7 @@ import math
 from pathlib import Path
 import time
 
-from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import is_pseudo_terminal, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
@@ -63,12 +63,12 @@ class Trace:
             writer.close()
 
 
-class TracedPort:
+class TracedPort(PortAround):
     """A port whose bytes go into ``trace`` as well, with the seconds since ``begun``."""
 
     def __init__(self, port: Port, trace: Trace, begun: float,
                  clock: Callable[[], float] = time.monotonic) -> None:
-        self._port = port
+        super().__init__(port)
         self._trace = trace
         self._begun = begun
         self._clock = clock
@@ -82,12 +82,6 @@ class TracedPort:
     def write(self, data: bytes) -> None:
         self._port.write(data)
         self._note(Direction.OUT, data)
-
-    def unsent(self) -> int:
-        return self._port.unsent()
-
-    def close(self) -> None:
-        self._port.close()
 
     def _note(self, direction: Direction, data: bytes) -> None:
         self._trace.write(Chunk(self._clock() - self._begun, direction, data))

@@ -25,6 +25,7 @@ one kind, each with a device server of this table on a TCP port of its own:
   noise      random bytes, as fast as the connection takes them
   enquiries  DLE ENQ, the same
   replies    good frames that nobody has asked for, the same
+  commands   telnet commands that mean nothing, over rfc2217://, the same
   terminal   noise on a pseudo-terminal, as fast as that takes it; no serial port can do this
 
 A row is the sound line's transactions a second, and the time from the end of a reply to its ACK,
@@ -60,7 +61,11 @@ from support.ros import Process, write_csv
 FLOODS = {
     'noise': Random(1).randbytes(1 << 16),
     'enquiries': ENQ * (1 << 15),
-    'replies': message_frame(Packet(5, 1, 0x4F, 0, 7, bytes(200)).encode(), Checksum.CRC) * 200}
+    'replies': message_frame(Packet(5, 1, 0x4F, 0, 7, bytes(200)).encode(), Checksum.CRC) * 200,
+    'commands': b'\xff\xf1' * (1 << 15)}
+
+# DO COM-PORT, and the answers to 19200 baud, 8 data bits, no parity, 1 stop bit (RFC 2217).
+_AGREED = bytes.fromhex('fffd2c fffa2c6500004b00fff0 fffa2c6608fff0 fffa2c6701fff0 fffa2c6801fff0')
 KINDS = ('refuses', 'closes', 'stalls', 'dribbles', *FLOODS, 'terminal')
 
 
@@ -88,6 +93,8 @@ def _behave(kind: str, client: socket.socket) -> None:
         time.sleep(0.01)
     client.setblocking(True)
     threading.Thread(target=_swallow, args=(client,), daemon=True).start()
+    if kind == 'commands':
+        client.sendall(_AGREED)
     while True:
         client.sendall(FLOODS[kind])
 
@@ -133,7 +140,8 @@ def neighbours(kind: str, count: int) -> Iterator[list[str]]:
             yield ports
         return
     listeners = [socket.create_server(('127.0.0.1', 0)) for _ in range(count)]
-    ports = [f'socket://127.0.0.1:{listener.getsockname()[1]}' for listener in listeners]
+    scheme = 'rfc2217' if kind == 'commands' else 'socket'
+    ports = [f'{scheme}://127.0.0.1:{listener.getsockname()[1]}' for listener in listeners]
     if kind == 'refuses':
         for listener in listeners:
             listener.close()

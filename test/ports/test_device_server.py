@@ -23,7 +23,7 @@ import threading
 import time
 
 from abdf1_ros.ports import device_server
-from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
 from abdf1_ros.ports.device_server import Rfc2217Port
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -149,6 +149,19 @@ def read(port: Rfc2217Port, wake: int, size: int) -> bytes:
     while len(data) < size:
         data += port.read(PATIENCE, wake)
     return data
+
+
+@pytest.mark.parametrize('stream', [b'\xff\xf1' * READ_SIZE, b'\xff\xff' * READ_SIZE])
+def test_commands_count_for_whether_there_is_more(
+        ends: tuple[Rfc2217Port, socket.socket], wake: int, stream: bytes) -> None:
+    port, server = ends
+    server.sendall(stream)
+    for _ in range(2):
+        assert len(port.read(PATIENCE, wake)) in (0, READ_SIZE // 2)
+        assert port.has_more
+    server.sendall(b'x')
+    assert port.read(PATIENCE, wake) == b'x'
+    assert not port.has_more
 
 
 @pytest.mark.parametrize('chunk', [1, 2, 3, 1000])

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import itertools
+import math
 import os
 from pathlib import Path
 import queue
@@ -35,6 +36,7 @@ from abdf1_ros.ports.descriptor import DescriptorPort, Port, READ_SIZE
 from abdf1_ros.ports.link_thread import _Attempt, LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.trace import PortOpener
 import pytest
 import serial
 from support.device_server import DeviceServer
@@ -235,7 +237,27 @@ def test_stop_before_start() -> None:
     LinkThread(Script().machine, lambda: pytest.fail('opened')).stop()
 
 
-class Paused:
+class _NoLine:
+    """A port on which nothing ever happens."""
+
+    has_more = is_terminal = False
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Return nothing."""
+        return b''
+
+    def write(self, data: bytes) -> None:
+        """Drop it."""
+
+    def unsent(self) -> int:
+        """Return 0: all has left."""
+        return 0
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class Paused(_NoLine):
     """A port whose first answer lies in the buffer while the process does not run for 6 s."""
 
     def __init__(self) -> None:
@@ -251,16 +273,6 @@ class Paused:
             raise OSError('the end')
         self.now = 6.0
         return ACK
-
-    def write(self, data: bytes) -> None:
-        """Drop it."""
-
-    def unsent(self) -> int:
-        """Return 0: all has left."""
-        return 0
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
@@ -307,7 +319,7 @@ def test_port_is_given_back_after_stop(pty: Pty, link: Link) -> None:
     open_port(PortSettings(str(pty.name))).close()
 
 
-class Diary:
+class Diary(_NoLine):
     """A port that notes what becomes of it, and is lost at the second wait."""
 
     def __init__(self) -> None:
@@ -323,10 +335,6 @@ class Diary:
     def write(self, data: bytes) -> None:
         """Note the bytes."""
         self.notes.append(data.decode('ascii'))
-
-    def unsent(self) -> int:
-        """Return 0: all has left."""
-        return 0
 
     def close(self) -> None:
         """Note the end."""
@@ -351,9 +359,14 @@ def _script_of_a_reply() -> tuple[Script, bytes]:
     return script, message_frame(packet.encode(), Checksum.CRC)
 
 
-def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(pty: Pty) -> None:
+@pytest.mark.parametrize('is_traced', [False, True])
+def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(
+        pty: Pty, is_traced: bool, tmp_path: Path) -> None:
     script, frame = _script_of_a_reply()
-    thread = Impatient(script.machine, lambda: open_port(PortSettings(str(pty.name))), 3)
+    opener = PortOpener(PortSettings(str(pty.name)))
+    if is_traced:
+        opener.trace(str(tmp_path / 'trace'), math.inf, {}, pytest.fail)
+    thread = Impatient(script.machine, opener.open, 3)
     thread.start()
     assert pty.read(5) == READY
     began = time.monotonic()
@@ -364,6 +377,7 @@ def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(pty: Pty) -
     assert isinstance(script.next(), Frame)
     assert thread.pauses[0] == pytest.approx(0.084)  # 16 of the 100 bytes are waited for
     thread.stop()
+    opener.close()
 
 
 @pytest.fixture
@@ -389,35 +403,18 @@ def test_bytes_of_a_connection_are_read_as_they_come(
     thread.stop()
 
 
-class _NoLine:
-    """A port on which nothing ever happens."""
-
-    def read(self, timeout: float | None, wake: int) -> bytes:
-        """Return nothing."""
-        return b''
-
-    def write(self, data: bytes) -> None:
-        """Drop it."""
-
-    def unsent(self) -> int:
-        """Return 0: all has left."""
-        return 0
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
 class Babbler(_NoLine):
-    """A connection with bytes at every read but the last; a look at the clock takes 1 ms."""
+    """A connection with bytes at every read but the last; what it costs is told to its clocks."""
 
-    def __init__(self, size: int, reads: int) -> None:
-        self.now = 0.0
-        self._size = size
+    def __init__(self, data: bytes, reads: int, *, has_more: bool = True) -> None:
+        self.now = 100.0
+        self.worked = 0.0
+        self.has_more = has_more
+        self._data = data
         self._reads = reads
 
     def clock(self) -> float:
         """Return the time."""
-        self.now += 0.001
         return self.now
 
     def read(self, timeout: float | None, wake: int) -> bytes:
@@ -425,37 +422,75 @@ class Babbler(_NoLine):
         self._reads -= 1
         if not self._reads:
             raise OSError('the end')
-        return bytes(self._size)
+        return self._data
 
 
 class Restful(Impatient):
-    """A link thread that tells for how long it leaves the port alone."""
+    """A link thread that tells how much it has taken, and how long it leaves the port alone."""
 
-    def __init__(self, machine: Machine, opener: Callable[[], Port], most: int,
+    def __init__(self, script: Script, port: Babbler, *, work: float = 0.0, host: float = 0.0,
                  **options: object) -> None:
-        super().__init__(machine, opener, most, **options)
+        super().__init__(script.machine, lambda: port, 1, clock=port.clock,
+                         processor_clock=lambda: port.worked, **options)
         self.rests: list[float] = []
+        self.taken: list[int] = []
+        self._babbler = port
+        receive = script.machine.receive_data
+
+        def take(data: bytes, now: float) -> None:
+            self.taken.append(len(data))
+            receive(data, now)
+            port.worked += work
+            port.now += work + host
+
+        script.machine.receive_data = take  # type: ignore[method-assign]
 
     def _rest(self, seconds: float) -> None:
         self.rests.append(seconds)
+        self._babbler.now += seconds
 
 
-def test_connection_that_babbles_leaves_time_to_others() -> None:
-    script, port = Script(Step(b'', None)), Babbler(READ_SIZE, 11)
-    taken: list[int] = []
-    receive = script.machine.receive_data
-    script.machine.receive_data = lambda data, now: (  # type: ignore[method-assign]
-        taken.append(len(data)), receive(data, now))[1]
-    thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
+@pytest.mark.parametrize(('work', 'host', 'rest'), [
+    (0.001, 0.0, 0.019),  # 19 times as long as it took
+    (0.001, 0.01, 0.019),  # of the processor, not of the clock
+    (0.004, 0.0, 0.060)])  # up to the 64 ms that these bytes take on the line
+def test_connection_that_babbles_leaves_time_to_others(
+        work: float, host: float, rest: float) -> None:
+    script = Script(Step(b'', None), timing=LineTiming(0.001))
+    thread = Restful(script, Babbler(bytes(READ_SIZE), 11), work=work, host=host)
     thread.run()
-    assert taken == [64] * 10 * 8
-    assert thread.rests == [pytest.approx(0.019)] * 10 * 8  # 19 times as long as it took
+    assert thread.taken == [64] * 10 * 8
+    assert thread.rests == [pytest.approx(rest)] * 10 * 8
+    thread.stop()
+
+
+def test_burst_beside_load_takes_the_time_of_the_line() -> None:
+    """Some portions wait long for the processor; the others make up for it."""
+    script = Script(Step(b'', None), timing=LineTiming(0.001))
+    port = Babbler(bytes(READ_SIZE), 11)
+    late = iter([0.3] * 10)
+    thread = Restful(script, port, work=0.01)
+    rest = thread._rest
+    thread._rest = lambda seconds: rest(seconds + next(late, 0.0))  # type: ignore[method-assign]
+    thread.run()
+    assert port.now - 100.0 == pytest.approx(10 * READ_SIZE * 0.001)
+    thread.stop()
+
+
+def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
+    script = Script(Step(b'', None), timing=LineTiming(0.001))
+    port = Babbler(b'', 11)
+    thread = Restful(script, port)
+    port.worked = 1.0
+    thread.run()
+    assert thread.taken == []
+    assert thread.rests[0] == pytest.approx(0.001 * READ_SIZE)
     thread.stop()
 
 
 def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:
-    script, port = Script(Step(None, None), Step(b'awake', None)), Babbler(READ_SIZE, 11)
-    thread = Restful(script.machine, lambda: port, 1, clock=port.clock,
+    script = Script(Step(None, None), Step(b'awake', None))
+    thread = Restful(script, Babbler(bytes(READ_SIZE), 11),
                      on_state=lambda state: thread.wake())  # as soon as the port is open
     thread.run()
     assert script.next() is None
@@ -463,8 +498,8 @@ def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> N
 
 
 def test_line_is_not_left_alone_after_a_frame() -> None:
-    script, port = Script(Step(b'', None)), Babbler(READ_SIZE - 1, 11)
-    thread = Restful(script.machine, lambda: port, 1, clock=port.clock)
+    script = Script(Step(b'', None))
+    thread = Restful(script, Babbler(bytes(READ_SIZE - 1), 11, has_more=False))
     thread.run()
     assert script.machine.counters.chars_received == 10 * (READ_SIZE - 1)
     assert not thread.rests
@@ -599,7 +634,7 @@ def test_state_is_closed_after_the_end(pty: Pty, link: Link) -> None:
     assert not thread.state.is_open
 
 
-class Stuck:
+class Stuck(_NoLine):
     """What opens a port when it is let go."""
 
     def __init__(self) -> None:
@@ -616,14 +651,6 @@ class Stuck:
     def read(self, timeout: float | None, wake: int) -> bytes:
         """Never be called."""
         raise AssertionError
-
-    def write(self, data: bytes) -> None:
-        """Never be called."""
-        raise AssertionError
-
-    def unsent(self) -> int:
-        """Return 0: all has left."""
-        return 0
 
     def close(self) -> None:
         """Note it."""

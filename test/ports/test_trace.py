@@ -28,6 +28,8 @@ from support.ptys import Pty
 class Loop:
     """A port that gives back what it is given."""
 
+    has_more = is_terminal = False
+
     def __init__(self) -> None:
         self.data = b''
         self.closed = False
