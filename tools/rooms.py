@@ -86,6 +86,8 @@ ROOMS = (
     Room(('simulator',), 'simulated PLCs and the commands that they take',
          (*_BASE, 'numbers', 'df1', 'pccc', 'settings')),
     Room(('conform',), 'cases of the manual, played against the other end of a line', ()),
+    Room(('client.py',), 'a blocking client for programs without ROS or files',
+         ('errors', 'counters', 'df1', 'pccc', 'driver.requests', 'ports'), is_pure=False),
     Room(('paths.py', 'signals.py'), 'where installed files lie; the end that a signal asks for',
          (), is_pure=False),
     Room(('ros',), 'the ROS node: parameters, messages, diagnostics, log', is_pure=False),

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every kind of link offers to the driver and to the diagnostics."""
+"""What every kind of link needs to know, and offers to the driver and to the diagnostics."""
 
 from __future__ import annotations
 
@@ -20,8 +20,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from abdf1_ros.df1.machine import Procedure
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming, Procedure
 from abdf1_ros.df1.tasks import TaskSource
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSettings:
+    """
+    What a link has to know of its line; times in seconds.
+
+    ``mode`` is Master, Slave or Peer, ``polling`` of a master Message or Standard. ``timeout`` is
+    for each answer of a station, ``cmd_timeout`` for a reply.
+    """
+
+    mode: str
+    station: int
+    checksum: Checksum
+    timing: LineTiming
+    nak_retries: int = 3
+    enq_retries: int = 3
+    timeout: float = 1.0
+    cmd_timeout: float = 1.0
+    polling: str = 'Message'
+
+    @property
+    def duplex(self) -> Duplex:
+        """Return the line discipline of the mode."""
+        return Duplex.FULL if self.mode == 'Peer' else Duplex.HALF
 
 
 @dataclass(slots=True)

@@ -32,13 +32,13 @@ import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Job, LineTime, Steps
-from abdf1_ros.driver.transactions import echo, identify
+from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import decode_counters
 from abdf1_ros.pccc.status import check_status
+from abdf1_ros.pccc.steps import echo, identify, Steps
 
 # A station gets an echo after so many seconds of silence, and the next one after as many.
 ECHO_PERIOD = 2.0

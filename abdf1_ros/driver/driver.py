@@ -89,7 +89,7 @@ class Driver:
             (mapping.station for mapping in mappings
              if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
             _routes(network, mappings), longest_probe(network))
-        self.machine = make_machine(network, self._run, self.counters)
+        self.machine = make_machine(network.line, self._run, self.counters)
         self.machine.background = self
         self.is_online = False
         self._is_ending = False
@@ -98,7 +98,7 @@ class Driver:
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._make_queues()
         self._served = self._make_served()
-        self.link = make_link(network, settings, self.machine, self.stations,
+        self.link = make_link(network.line, settings, self.machine, self.stations,
                               self._serve, listener.happened)
         self.expected_poll_cycle = poll_cycle(self.blocks)
 

@@ -22,7 +22,7 @@ the error is raised in it.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Generator
+from collections.abc import Callable, Container
 from inspect import GEN_CLOSED, getgeneratorstate
 import math
 from typing import Protocol, TypeVar
@@ -30,11 +30,7 @@ from typing import Protocol, TypeVar
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError
 from abdf1_ros.pccc.dialect import Request
-
-_Result = TypeVar('_Result')
-
-Steps = Generator[Request, Packet, _Result]
-"""What is done with a station: yields requests, is sent the replies, returns the result."""
+from abdf1_ros.pccc.steps import Steps
 
 _With = TypeVar('_With', Packet, LinkError)
 

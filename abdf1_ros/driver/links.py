@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.link import Link
+from abdf1_ros.df1.link import Link, LinkSettings
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MasterSettings
@@ -31,7 +31,6 @@ from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.messages import Event
-from abdf1_ros.settings.network import Network
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,35 +61,34 @@ class DriverSettings:
     first_tns: int = 0
 
 
-def make_machine(network: Network, run: Callable[[], Procedure], counters: Counters) -> Machine:
-    """Return the machine for the line of a net CSV, with ``run`` as its procedure."""
+def make_machine(line: LinkSettings, run: Callable[[], Procedure], counters: Counters) -> Machine:
+    """Return the machine for a line, with ``run`` as its procedure."""
     return Machine(
-        lambda machine: run(), checksum=network.checksum, duplex=network.duplex,
-        timing=network.timing, counters=counters, forget_on_send=network.mode == 'Master')
+        lambda machine: run(), checksum=line.checksum, duplex=line.duplex,
+        timing=line.timing, counters=counters, forget_on_send=line.mode == 'Master')
 
 
-def make_link(network: Network, settings: DriverSettings, machine: Machine,
+def make_link(line: LinkSettings, settings: DriverSettings, machine: Machine,
               stations: ActiveStationList, serve: Callable[[Packet], Packet],
               report: Callable[[Event], None]) -> Link:
-    """Return the link for the Mode (and Polling) of a net CSV."""
-    timeout, cmd_timeout = network.timeout / 1000, network.cmd_timeout / 1000
-    if network.mode == 'Peer':
+    """Return the link for the Mode (and Polling) of a line."""
+    if line.mode == 'Peer':
         peer_settings = PeerSettings(
-            network.checksum, network.nak_retries, network.enq_retries, timeout, cmd_timeout,
+            line.checksum, line.nak_retries, line.enq_retries, line.timeout, line.cmd_timeout,
             settings.max_outstanding, settings.duplicate_detection)
         return FullDuplexPeer(machine, peer_settings, stations, serve, report)
-    if network.mode == 'Slave':
+    if line.mode == 'Slave':
         slave_settings = SlaveSettings(
-            network.station, network.checksum, network.nak_retries,
+            line.station, line.checksum, line.nak_retries,
             eot_suppression=settings.eot_suppression,
             duplicate_detection=settings.duplicate_detection)
-        return SlaveLink(machine, slave_settings, stations, serve, cmd_timeout=cmd_timeout,
+        return SlaveLink(machine, slave_settings, stations, serve, cmd_timeout=line.cmd_timeout,
                          poll_timeout=settings.poll_timeout, report=report)
     master_settings = MasterSettings(
-        network.station, network.checksum, network.nak_retries, network.enq_retries, timeout,
-        cmd_timeout, settings.nak_on_command_timeout,
+        line.station, line.checksum, line.nak_retries, line.enq_retries, line.timeout,
+        line.cmd_timeout, settings.nak_on_command_timeout,
         accept_slave_messages=settings.accept_slave_messages)
-    if network.polling == 'Standard':
+    if line.polling == 'Standard':
         return StandardPollingMaster(
             machine, master_settings, _polling(settings, stations), stations, report, serve)
     return HalfDuplexMaster(machine, master_settings, stations, report, serve)

@@ -24,7 +24,8 @@ import math
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, Publish
@@ -253,12 +254,14 @@ class Write:
         self.is_probe = self.is_own = False
         self.value = show(values)
         self.raw = raw_values(mapping, values)
-        self.commands = _commands(mapping, self.raw, mapping.dialect)
+        self.commands = write_requests(
+            mapping.address, mapping.codec, self.raw, mapping.dialect)
 
     def speak(self, dialect: Dialect) -> None:
         """Keep to the packets of another dialect of the family, before anything has been sent."""
         if dialect is not self.mapping.dialect:
-            self.commands = _commands(self.mapping, self.raw, dialect)
+            self.commands = write_requests(
+                self.mapping.address, self.mapping.codec, self.raw, dialect)
 
     @property
     def may_rewrite(self) -> bool:
@@ -307,25 +310,3 @@ def show(values: Sequence[float] | str) -> str:
     text = ', '.join(map(value_text, values[:_SHOWN_VALUES]))
     rest = len(values) - _SHOWN_VALUES
     return f'[{text}, and {rest} more]' if rest > 0 else f'[{text}]'
-
-
-def _commands(mapping: Mapping, values: Sequence[float] | str,
-              dialect: Dialect) -> list[Request]:
-    address, codec = mapping.address, mapping.codec
-    if mapping.type is ValueType.BOOL:
-        assert not isinstance(values, str)
-        return [dialect.write_bits(*change) for change in codec.bit_changes(address, values)]
-    data = codec.encode(values)
-    whole = Transfer(address, len(data) // 2)
-    return [dialect.write(address.at_offset(address.offset + first),
-                          data[2 * first:2 * (first + count)], whole)
-            for first, count in _packets(mapping, whole.words, dialect)]
-
-
-def _packets(mapping: Mapping, words: int, dialect: Dialect) -> list[tuple[int, int]]:
-    """Return first word and number of words of each packet; none ends within a value."""
-    kind, value_words = mapping.address.file_type, mapping.codec.element_words
-    # Members of structures are written one by one: between them lie words not ours.
-    step = value_words if kind.is_structure else dialect.max_write(kind)
-    step -= step % value_words
-    return [(first, min(step, words - first)) for first in range(0, words, step)]

@@ -24,16 +24,18 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
+from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Job, JobTasks, Steps
+from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
-from abdf1_ros.driver.served import Served
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
+from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.network import Network
+from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.steps import Steps
 
 _Result = TypeVar('_Result')
 
@@ -61,27 +63,28 @@ class _RequestJob(Job):
 
 class Requests:
     """
-    Carry out requests over the line of ``network``; ``machine`` is to be run on its port.
+    Carry out requests over a line; ``machine`` is to be run on its port.
 
     Stations that are ``absent`` get one try each until they answer, all others every retry of
-    the network. ``routes`` gives the gateways of stations that are behind one. ``first_tns``
-    should be random, or a station may take our first command for a repetition. Commands that come
-    for us are refused, except an echo and the diagnostic status.
+    the line. ``routes`` gives the gateways of stations that are behind one. ``first_tns`` should
+    be random, or a station may take our first command for a repetition. Commands that come for us
+    are refused, except an echo and the diagnostic status, which is that of a ``plc_type``.
     """
 
-    def __init__(self, network: Network, absent: Sequence[int] = (), first_tns: int = 0,
-                 routes: Mapping[int, int] | None = None) -> None:
+    def __init__(self, line: LinkSettings, absent: Sequence[int] = (), first_tns: int = 0,
+                 routes: Mapping[int, int] | None = None,
+                 plc_type: PlcType = PlcType.PLC5) -> None:
         self.counters = Counters()
         self.stations = ActiveStationList(absent, routes=routes)
         for number in absent:
             self.stations.lost(number, 0.0)
-        self.machine = make_machine(network, self._run, self.counters)
-        self._tasks = JobTasks(network.station, first_tns)
+        self.machine = make_machine(line, self._run, self.counters)
+        self._tasks = JobTasks(line.station, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
-        served = Served(PlcType(network.plc_type), (), lambda mapping, words: None)
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
-        self._link = make_link(network, DriverSettings(nak_on_command_timeout=False),
-                               self.machine, self.stations, served.serve, lambda event: None)
+        self._link = make_link(line, DriverSettings(nak_on_command_timeout=False),
+                               self.machine, self.stations, Server(DataTable(plc_type)).serve,
+                               lambda event: None)
 
     def add(self, station: int, work: Steps[_Result], succeed: Callable[[_Result], None],
             fail: Callable[[Exception], None]) -> None:

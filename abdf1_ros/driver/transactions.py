@@ -19,15 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
-from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
-from abdf1_ros.pccc import diagnostics
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.families import decode_identity, family_of
 from abdf1_ros.pccc.fields import word
-from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.steps import data_of, Steps, words_in
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -43,22 +39,7 @@ def words_of(block: Block, number: int, reply: Packet) -> bytes:
     Raises RemoteError, or FormatError for a reply that cannot be used.
     """
     request = block.requests[number]
-    try:
-        data = _data_of(reply, request.start)
-    except RemoteError as error:
-        if error.sts == STS_ILLEGAL_COMMAND and \
-                request.words > block.dialect.sure_read(request.start.file_type):
-            raise RemoteError(error.sts, error.ext_sts, f'{error}, or too many words at once for '
-                              'this processor: name it in the column Processor') from None
-        raise
-    return block.dialect.read_data(request.start, request.words, data)
-
-
-def _data_of(reply: Packet, address: Address) -> bytes:
-    """Return the data of a good reply; RemoteError, in the words of the family, for any other."""
-    if reply.sts == 0:
-        return reply.data
-    return check_status(reply, family_of(address.plc_type).meanings)
+    return words_in(reply, request.start, request.words, block.dialect)
 
 
 def read_block(block: Block) -> Steps[bytes]:
@@ -90,7 +71,7 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
 def _send(write: Write, packet: int) -> Steps[str]:
     """Send one packet; return a remark for the result, empty for none."""
     try:
-        _data_of((yield write.commands[packet]), write.mapping.address)
+        data_of((yield write.commands[packet]), write.mapping.address)
     except RemoteError as error:
         if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
             raise
@@ -128,27 +109,3 @@ def read_values(mapping: Mapping, block: Block) -> Steps[Values]:
     """Read a block and return the raw values of one mapping; raises like ``read_block``."""
     words = yield from read_block(block)
     return mapping.codec.decode(words[block.slice_of(mapping)])
-
-
-def identify() -> Steps[Identity]:
-    """
-    Ask a station for its identity, and what its fault is where that takes a request more.
-
-    Raises LinkError, RemoteError, or FormatError for a reply too short to tell.
-    """
-    reply = yield diagnostics.CMD, diagnostics.STATUS_REQUEST
-    identity = decode_identity(check_status(reply))
-    inquiry = identity.inquiry
-    if inquiry is None:
-        return identity
-    try:
-        return inquiry.answered(check_status((yield inquiry.request)))
-    except (RemoteError, FormatError):
-        return identity  # an old PLC-5 without typed commands
-
-
-def echo(data: bytes) -> Steps[None]:
-    """Have a station send ``data`` back; FormatError when the reply differs."""
-    reply = check_status((yield diagnostics.CMD, diagnostics.Echo(data).encode()))
-    if reply != data:
-        raise FormatError(f'the echo of {data.hex(" ")} came back as {reply.hex(" ")}')

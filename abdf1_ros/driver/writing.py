@@ -19,12 +19,13 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.job_tasks import Job, LineTime, Steps
+from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.points import Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.readings import Readings
 from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.errors import CommandExpired, RemoteError
+from abdf1_ros.pccc.steps import Steps
 from abdf1_ros.plan.planner import Planner
 
 

@@ -17,8 +17,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from abdf1_ros.settings.network import Network
+if TYPE_CHECKING:
+    from abdf1_ros.settings.network import Network
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,3 +49,8 @@ class PortSettings:
         """Return the settings of a net CSV, with ``name`` in place of its Com_Port."""
         return cls(name or network.port, network.baud, network.data_bits, network.parity,
                    network.stop_bits, network.handshake == 'Yes', low_latency, rs485)
+
+    @property
+    def char_time(self) -> float:
+        """Return the seconds that a character takes."""
+        return (1 + self.data_bits + (self.parity != 'None') + self.stop_bits) / self.baud

@@ -25,6 +25,7 @@ from urllib.parse import urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import ConfigurationError, Place, Problem
@@ -167,9 +168,16 @@ class Network:
         return Checksum(self.error_code)
 
     @property
+    def line(self) -> LinkSettings:
+        """Return what a link has to know of it."""
+        return LinkSettings(
+            self.mode, self.station, self.checksum, self.timing, self.nak_retries,
+            self.enq_retries, self.timeout / 1000, self.cmd_timeout / 1000, self.polling)
+
+    @property
     def duplex(self) -> Duplex:
         """Return the line discipline of the mode."""
-        return Duplex.FULL if self.mode == 'Peer' else Duplex.HALF
+        return self.line.duplex
 
     @property
     def port(self) -> str:

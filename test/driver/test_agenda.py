@@ -27,7 +27,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.interlocks import Interlocks
-from abdf1_ros.driver.job_tasks import Job, JobTasks, Steps
+from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
 from abdf1_ros.driver.read_backs import ReadBacks
@@ -35,6 +35,7 @@ from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.readings import Readings
 from abdf1_ros.driver.writes import MessageJob, WriteQueue
 from abdf1_ros.driver.writing import WritesUnderWay
+from abdf1_ros.pccc.steps import Steps
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping

@@ -21,11 +21,10 @@ from typing import Any
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.steps import echo, identify, Steps
 from abdf1_ros.settings.network import Network
 from support.driver_bench import simulated_plc
 from support.virtual_line import VirtualLine
@@ -48,7 +47,7 @@ class Bench:
     """Requests at one end, an SLC that is station 1 at the other."""
 
     def __init__(self, absent: tuple[int, ...] = ()) -> None:
-        self.requests = Requests(NETWORK, absent, first_tns=7)
+        self.requests = Requests(NETWORK.line, absent, first_tns=7)
         self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
         self.far = Machine(multidrop([self.plc]), checksum=NETWORK.checksum)
         self.line = VirtualLine(self.requests.machine, self.far, baud=115200)
@@ -155,7 +154,7 @@ def test_nothing_is_due_by_itself() -> None:
 
 
 def test_other_modes_are_served_by_the_same_requests() -> None:
-    requests = Requests(Network(mode='Peer', baud=115200))
+    requests = Requests(Network(mode='Peer', baud=115200).line)
     ends = Ends()
     requests.add(1, identify(), ends.results.append, ends.errors.append)
     requests.machine.start(0.0)

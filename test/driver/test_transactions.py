@@ -19,12 +19,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.transactions import (
     carry_out,
-    echo,
-    identify,
     read_block,
     read_values,
     REWRITTEN,
@@ -32,6 +29,7 @@ from abdf1_ros.driver.transactions import (
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.steps import echo, identify, Steps
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.network import Network

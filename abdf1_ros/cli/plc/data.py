@@ -26,15 +26,15 @@ import time
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.driver.transactions import carry_out, identify, read_values
+from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
+from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Values, ValueType
-from abdf1_ros.plan.forecast import line_model
-from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
@@ -107,7 +107,7 @@ def ask_kind(session: Session, station: int) -> dict[str, str]:
 
     Raises LinkError, RemoteError, or FormatError where that cannot be told.
     """
-    identity = session.ask(station, identify())
+    identity = session.ask(station, steps.identify())
     if identity.plc_type is None:
         raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
     return {'PLC_Type': identity.plc_type.value, 'Processor': processor_of(identity)}
@@ -122,9 +122,8 @@ def processor_of(identity: Identity) -> str:
 
 def read(session: Session, mapping: Mapping) -> Values:
     """Return the values of a mapping; raises LinkError, RemoteError or FormatError."""
-    planner = Planner(line_model(session.network), 1.0)
-    block, = planner.plan([mapping])
-    return session.ask(mapping.station, read_values(mapping, block))
+    target = AddressedValues(mapping.address, mapping.codec, mapping.dialect)
+    return session.ask(mapping.station, steps.read(target))
 
 
 class Writing:

@@ -25,12 +25,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.driver.job_tasks import Steps
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import dialect_of, family_of, file_types_of, layout_of
 from abdf1_ros.pccc.file_types import DEFAULT_FILES, FileType, PlcType
 from abdf1_ros.pccc.status import check_status
+from abdf1_ros.pccc.steps import Steps
 from abdf1_ros.pccc.typed_data import BYTE_STRING, TypedData
 
 _USUAL = {number: kind for kind, number in DEFAULT_FILES.items()}

@@ -24,9 +24,9 @@ import time
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.echo import COMES_BACK
-from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
 
 _ECHO = bytes(range(1, 17))

@@ -23,9 +23,8 @@ import threading
 from abdf1_ros.cli.plc.session import opened, Session
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.driver.job_tasks import Steps
-from abdf1_ros.driver.transactions import echo, identify
 from abdf1_ros.errors import PortLost
+from abdf1_ros.pccc.steps import echo, identify, Steps
 from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import Pty

@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is done with a station, as steps: who it is, an echo, values read and written."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
+from abdf1_ros.pccc.families import decode_identity, dialect_of, family_of, parse_address
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.structures import type_fault, write_fault
+from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
+
+_Result = TypeVar('_Result')
+
+Steps = Generator[Request, Packet, _Result]
+"""What is done with a station: yields requests, is sent the replies, returns the result."""
+
+
+@dataclass(frozen=True, slots=True)
+class AddressedValues:
+    """Values in a PLC: where they begin, what they are, and the way to them."""
+
+    address: Address
+    codec: Codec
+    dialect: Dialect
+
+    @classmethod
+    def of(cls, text: str, plc_type: PlcType, length: int = 1, kind: ValueType | None = None, *,
+           word_order: WordOrder = WordOrder.LOW, access: Access | None = None,
+           processor: Processor | None = None) -> AddressedValues:
+        """
+        Return ``length`` values from the address ``text`` on, of the natural type for None.
+
+        Raises FormatError, saying what would be right.
+        """
+        address = parse_address(text, plc_type, access)
+        types = types_of(address)
+        kind = kind or types[0]
+        packed = kind is ValueType.STRING and address.file_type is not FileType.STRING
+        codec = Codec(kind, length, address.bit or 0, word_order, packed)
+        if kind not in types:
+            raise FormatError(f'{address} can be {", ".join(entry.value for entry in types)}')
+        if length < 1 or address.offset + codec.words > address.area_size:
+            last = address.at_offset(address.area_size - 1)
+            raise FormatError(f'{length} elements do not fit at {address}; the last word there '
+                              f'can be is {last}')
+        if fault := type_fault(address, kind, length):
+            raise FormatError(fault)
+        return cls(address, codec, dialect_of(plc_type, access, processor))
+
+
+def read(target: AddressedValues) -> Steps[Values]:
+    """Return the values of a target; raises RemoteError, LinkError or FormatError."""
+    address, words = target.address, target.codec.words
+    first, count = address.offset, words
+    if address.file_type.is_structure and not address.is_value(words):
+        size = address.layout.words  # only whole elements can be read
+        first -= first % size
+        count = -(-(address.offset + words - first) // size) * size
+    whole = Transfer(address.at_offset(first), count)
+    most = target.dialect.max_read(address.file_type)
+    data = b''
+    for at in range(first, first + count, most):
+        place, part = address.at_offset(at), min(most, first + count - at)
+        reply = yield target.dialect.read(place, part, whole)
+        data += words_in(reply, place, part, target.dialect)
+    skipped = 2 * (address.offset - first)
+    return target.codec.decode(data[skipped:skipped + 2 * words])
+
+
+def words_in(reply: Packet, start: Address, words: int, dialect: Dialect) -> bytes:
+    """Return the words in the reply to a read; raises RemoteError or FormatError."""
+    try:
+        data = data_of(reply, start)
+    except RemoteError as error:
+        if error.sts == STS_ILLEGAL_COMMAND and words > dialect.sure_read(start.file_type):
+            raise RemoteError(error.sts, error.ext_sts, f'{error}, or too many words at once for '
+                              'this processor: name it in the column Processor') from None
+        raise
+    return dialect.read_data(start, words, data)
+
+
+def data_of(reply: Packet, address: Address) -> bytes:
+    """Return the data of a good reply; RemoteError, in the words of the family, for any other."""
+    if reply.sts == 0:
+        return reply.data
+    return check_status(reply, family_of(address.plc_type).meanings)
+
+
+def write(target: AddressedValues, values: Sequence[float] | str) -> Steps[None]:
+    """
+    Return the steps that write values, packet by packet, as long as each is confirmed.
+
+    Raises FormatError at once where they cannot or must not be written. The steps raise
+    RemoteError where the PLC refuses them; LinkError tells in ``sent`` whether it may have them
+    all the same.
+    """
+    address, codec = target.address, target.codec
+    if fault := write_fault(address, codec.type, codec.length):
+        raise FormatError(fault)
+    codec.check(values)
+    return _confirmed(write_requests(address, codec, values, target.dialect), address)
+
+
+def _confirmed(requests: Sequence[Request], address: Address) -> Steps[None]:
+    for request in requests:
+        data_of((yield request), address)
+
+
+def write_requests(address: Address, codec: Codec, values: Sequence[float] | str,
+                   dialect: Dialect) -> list[Request]:
+    """Return the requests that write checked values."""
+    if codec.type is ValueType.BOOL:
+        assert not isinstance(values, str)
+        return [dialect.write_bits(*change) for change in codec.bit_changes(address, values)]
+    data = codec.encode(values)
+    whole = Transfer(address, len(data) // 2)
+    return [dialect.write(address.at_offset(address.offset + first),
+                          data[2 * first:2 * (first + count)], whole)
+            for first, count in _packets(address, codec, whole.words, dialect)]
+
+
+def _packets(address: Address, codec: Codec, words: int,
+             dialect: Dialect) -> list[tuple[int, int]]:
+    """Return first word and number of words of each packet; none ends within a value."""
+    kind, value_words = address.file_type, codec.element_words
+    # Members of structures are written one by one: between them lie words not ours.
+    step = value_words if kind.is_structure else dialect.max_write(kind)
+    step -= step % value_words
+    return [(first, min(step, words - first)) for first in range(0, words, step)]
+
+
+def identify() -> Steps[Identity]:
+    """
+    Ask a station for its identity, and what its fault is where that takes a request more.
+
+    Raises LinkError, RemoteError, or FormatError for a reply too short to tell.
+    """
+    reply = yield diagnostics.CMD, diagnostics.STATUS_REQUEST
+    identity = decode_identity(check_status(reply))
+    inquiry = identity.inquiry
+    if inquiry is None:
+        return identity
+    try:
+        return inquiry.answered(check_status((yield inquiry.request)))
+    except (RemoteError, FormatError):
+        return identity  # an old PLC-5 without typed commands
+
+
+def echo(data: bytes) -> Steps[None]:
+    """Have a station send ``data`` back; FormatError when the reply differs."""
+    reply = check_status((yield diagnostics.CMD, diagnostics.Echo(data).encode()))
+    if reply != data:
+        raise FormatError(f'the echo of {data.hex(" ")} came back as {reply.hex(" ")}')

@@ -1,0 +1,191 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The blocking client on a line with simulated PLCs, and what it does without."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+from abdf1_ros.client import Client
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.link import LinkSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+import pytest
+from support.driver_bench import simulated_plc, store, stored
+from support.plc_line import plc_line
+
+FILES = (('N7:0', 250), ('B3:0', 4), ('F8:0', 8), ('T4:0', 9), ('ST9:0', 42), ('A10:0', 4))
+
+
+@pytest.fixture
+def plcs() -> tuple[SimulatedPlc, SimulatedPlc]:
+    return (simulated_plc(1, 'SLC', time.monotonic, *FILES, ('I:1.0', 2)),
+            simulated_plc(2, 'PLC5', time.monotonic, *FILES))
+
+
+@pytest.fixture
+def port(tmp_path: Path, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> Iterator[str]:
+    with plc_line(tmp_path / 'line', *plcs) as name:
+        yield name
+
+
+def client(port: str, station: int = 1, plc_type: str | None = None) -> Client:
+    return Client(port, plc_type=plc_type, station=station, duplex='half', baud=115200,
+                  timeout=0.3, cmd_timeout=0.5)
+
+
+@pytest.mark.parametrize(('station', 'plc_type'), [(1, 'SLC'), (1, None), (2, 'plc5'), (2, None)])
+def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) -> None:
+    with client(port, station, plc_type) as plc:
+        plc.write('N7:0', [-1, 32767])
+        plc.write('N7:4', 70000, 'int32', word_order='High')
+        plc.write('B3:0/1', True)
+        plc.write('F8:1', 1.5)
+        plc.write('T4:1.PRE', 500)
+        plc.write('ST9:0', 'recipe 7')
+        plc.write('A10:0', 'wxyz', 'string')
+        assert plc.read('N7:0') == -1
+        assert plc.read('N7:0', 3) == [-1, 32767, 0]
+        assert plc.read('N7:0', 2, 'uint16') == [65535, 32767]
+        assert plc.read('N7:4', kind='int32', word_order='High') == 70000
+        assert plc.read('B3:0/1') is True
+        assert plc.read('B3:0/0', 3) == [False, True, False]
+        assert plc.read('F8:0', 2) == [0.0, 1.5]
+        assert plc.read('T4:1.PRE') == 500
+        assert plc.read('T4:0.ACC', 4) == [0, 0, 500, 0]  # to T4:1.ACC, past a control word
+        assert plc.read('ST9:0') == 'recipe 7'
+        assert plc.read('A10:0', 2, 'string') == 'wxyz'
+
+
+def test_several_packets(port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+    values = [*range(-125, 125)]
+    with client(port) as plc:
+        for station in (1, 2):
+            plc.write('N7:0', values, station=station)
+            assert plc.read('N7:0', 250, station=station) == values
+    assert stored(plcs[1], 'N7:249') == (124).to_bytes(2, 'little')
+
+
+def test_inputs_by_slot_and_flat(port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+    store(plcs[0], 'I:1.0', [7, 9])
+    with client(port) as plc:
+        assert plc.read('I:1.1') == 9
+    with Client(port, plc_type='SLC', access='Flat', duplex='half', baud=115200) as plc:
+        assert plc.read('I:0', 2) == [7, 9]
+
+
+def test_errors_are_those_of_the_bridge(port: str) -> None:
+    with client(port, plc_type='SLC') as plc:
+        with pytest.raises(RemoteError, match='^STS 50: address not there'):
+            plc.read('N7:250')
+        with pytest.raises(RemoteError, match='^STS 10: '):
+            plc.write('N30:0', 1)
+        with pytest.raises(LinkError) as error:
+            plc.read('N7:0', station=9)
+        assert str(error.value).startswith('2509')
+        with pytest.raises(LinkError):
+            plc.identify(station=9)
+
+
+@pytest.mark.parametrize(('address', 'arguments', 'text'), [
+    ('N7', {}, 'an element is missing, as in N7:0'),
+    ('N7:0', {'length': 300}, '300 elements do not fit at N7:0; .* N7:255'),
+    ('N7:0', {'length': 0}, '0 elements do not fit'),
+    ('F8:0', {'kind': 'int16'}, 'F8:0 can be float32'),
+    ('N7:0', {'kind': 'int'}, 'int should be one of bool, int16'),
+    ('T4:0.PRE', {'length': 2, 'kind': 'string'}, 'T4:0.PRE can be int16, uint16')])
+def test_what_is_wrong_in_a_call_is_told_before_anything_is_sent(
+        port: str, address: str, arguments: dict[str, int | str], text: str) -> None:
+    with client(port, plc_type='SLC') as plc:
+        with pytest.raises(FormatError, match=text):
+            plc.read(address, **arguments)  # type: ignore[call-overload]
+        assert plc.counters.chars_sent == 0
+
+
+@pytest.mark.parametrize(('address', 'values', 'text'), [
+    ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),
+    ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string')])
+def test_what_must_not_be_written(port: str, address: str, values: int, text: str) -> None:
+    with client(port, plc_type='SLC') as plc:
+        with pytest.raises(FormatError, match=text):
+            plc.write(address, values)
+        assert plc.counters.chars_sent == 0
+
+
+def test_arguments_of_the_line(tmp_path: Path) -> None:
+    port = str(tmp_path / 'none')
+    with pytest.raises(FormatError, match='plc_type s7 should be one of PLC2, PLC3, PLC5, SLC'):
+        Client(port, plc_type='s7')
+    with pytest.raises(FormatError, match='duplex both should be full or half'):
+        Client(port, duplex='both')
+    with pytest.raises(FormatError, match='CRC16 should be one of BCC, CRC'):
+        Client(port, check='CRC16')
+    with pytest.raises(OSError, match='none'):
+        Client(port)
+
+
+def test_full_duplex(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
+    plc.be_full_duplex()
+    line = PtyEndpoint(str(tmp_path / 'line'))
+    settings: LinkSettings = Network(mode='Peer', baud=115200, station=1).line
+    machine = make_machine(settings, lambda: link.run(Nothing()), Counters())
+    link = make_link(settings, DriverSettings(), machine, ActiveStationList(()), plc.serve,
+                     lambda event: None)
+    thread = LinkThread(machine, line.open)
+    thread.start()
+    try:
+        with Client(line.name, baud=115200) as here:
+            here.write('N7:0', [1, 2])
+            assert here.read('N7:0', 2) == [1, 2]
+            identity = here.identify()
+            assert (identity.model, identity.mode) == ('SLC 5/03', Mode.REMOTE_RUN)
+    finally:
+        thread.stop()
+        line.close()
+
+
+class Nothing:
+    """A node that has nothing to ask."""
+
+    def next_task(self, now: float, busy: object = ()) -> None:
+        """Return None."""
+
+    def next_due(self) -> None:
+        """Return None."""
+
+    def expire(self, now: float) -> None:
+        """Do nothing."""
+
+
+def test_library_has_neither_ros_nor_files() -> None:
+    program = 'import sys, abdf1_ros.client; print(*sys.modules)'
+    loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                            check=True, timeout=60).stdout.split()
+    assert 'abdf1_ros.driver.requests' in loaded
+    unwanted = ('abdf1_ros.settings', 'abdf1_ros.plan', 'abdf1_ros.ros', 'abdf1_ros.cli.',
+                'abdf1_ros.simulator', 'abdf1_ros.sniffer', 'yaml', 'rclpy', 'std_msgs')
+    assert [name for name in loaded if name.startswith(unwanted)] == []
