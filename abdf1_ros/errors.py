@@ -16,11 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from abdf1_ros.messages import Message
-from abdf1_ros.text import printable
 
 
 class Abdf1Error(Exception):
@@ -102,48 +98,3 @@ class RemoteError(Abdf1Error):
         super().__init__(text)
         self.sts = sts
         self.ext_sts = ext_sts
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """
-    Where in a file something stands; lines, and the cells of a line, are counted from 1.
-
-    ``file`` may also be the name of something else that a user gives: a parameter, an option.
-    """
-
-    file: str
-    line: int | None = None
-    cell: int | None = None
-    column: str | None = None
-
-    def __str__(self) -> str:
-        """Return "file:line:cell (column)", without what is not known."""
-        numbers = ''.join(f':{number}' for number in (self.line, self.cell) if number)
-        return f'{self.file}{numbers}' + (f' ({self.column})' if self.column else '')
-
-
-class Problem(Abdf1Error):
-    """
-    One fault in a file or parameter that a user wrote.
-
-    ``place`` is where it stands, ``text`` what is wrong and what would be right, ``message`` its
-    numbered entry, or None where the specification has none. What it shows is one visible line,
-    whatever stands in the file.
-    """
-
-    def __init__(self, where: Place | str, text: str, message: Message | None = None,
-                 args: tuple[Any, ...] = ()) -> None:
-        head = f'{message.entry(*args)}; ' if message else ''
-        super().__init__(printable(f'{where}: {head}{text}'))
-        self.place = where if isinstance(where, Place) else Place(where)
-        self.text = text
-        self.message = message
-
-
-class ConfigurationError(Abdf1Error):
-    """All faults that prevent the start of the driver."""
-
-    def __init__(self, problems: list[Problem]) -> None:
-        super().__init__('\n'.join(str(problem) for problem in problems))
-        self.problems = problems

@@ -19,17 +19,15 @@ from __future__ import annotations
 from abdf1_ros.errors import (
     Abdf1Error,
     CommandTimeout,
-    ConfigurationError,
     FormatError,
     LinkError,
-    Place,
     PortLost,
-    Problem,
     RemoteError,
     StationInactive,
     WrongCommandCode,
 )
 from abdf1_ros.messages import Message
+from abdf1_ros.problems import ConfigurationError, Place, Problem
 import pytest
 
 

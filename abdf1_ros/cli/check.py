@@ -41,13 +41,13 @@ from abdf1_ros.cli.terminal import (
     YELLOW,
 )
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.served import usable_rows
-from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.interlocks import Bound
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.plan.report import last_address, make_report, Remark, Report
+from abdf1_ros.plan.usable_rows import usable_rows
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping

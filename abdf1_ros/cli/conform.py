@@ -52,12 +52,12 @@ from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.paths import config_file, package_version
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import load_plcs
 

@@ -51,7 +51,6 @@ from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.data_table import NoSuchFile
@@ -59,6 +58,7 @@ from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute

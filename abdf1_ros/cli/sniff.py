@@ -49,11 +49,11 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.sniffer.capture import Chunk
 from abdf1_ros.sniffer.dumps import Recording

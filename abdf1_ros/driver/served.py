@@ -19,21 +19,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 
-from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.errors import Place, Problem
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
+from abdf1_ros.pccc.data_table import DataTable, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.server import Server
-from abdf1_ros.plan.forecast import line_model
-from abdf1_ros.plan.interlocks import guard_faults
-from abdf1_ros.plan.planner import Planner
-from abdf1_ros.settings.map_file import broken_links
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import Network
 
 
 class _MappedTable(DataTable):
@@ -147,69 +141,6 @@ class Served:
         """Store checked raw values where the other end reads them."""
         mapping.codec.store(self._table, _first_word(mapping), values)
         self._table.changed.clear()  # our own writes are not reported
-
-
-def line_problems(mappings: Sequence[Mapping], network: Network,
-                  path: str) -> list[tuple[Mapping, Problem]]:
-    """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
-    found: list[tuple[Mapping, Problem]] = []
-    table = _MappedTable(PlcType(network.plc_type))
-    for mapping in mappings:
-        text = None
-        if mapping.serves:
-            text = _fault(mapping, network, table)
-        elif mapping.station == BROADCAST and network.mode == 'Peer':
-            text = 'Station 255 is for a line with many stations, not for Mode Peer'
-        elif mapping.station == network.station and network.mode != 'Peer':
-            text = (f'Station {mapping.station} is our own in the net file; here belongs the '
-                    'station to read or write')
-        elif mapping.via == network.station and network.mode == 'Master':
-            text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
-        if text is not None:
-            where = Place(path, mapping.file_line)
-            found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
-    return found
-
-
-def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: float,
-                path: str) -> tuple[list[Mapping], list[Problem]]:
-    """
-    Return the rows that can be used on this line, and the faults of the others.
-
-    ``default_period`` (s) is for rows without Period. A row whose counter is not read often enough
-    for its Heartbeat_Timeout cannot be used, nor a row that depends on one that cannot
-    (docs/heartbeats.md, rules 14 and 15).
-    """
-    found = line_problems(mappings, network, path)
-    problems = [problem for _, problem in found]
-    left = [mapping for mapping in mappings if mapping not in dict(found)]
-    planner = Planner(line_model(network), default_period)
-    faults = [(mapping, 'Heartbeat_Timeout', text)
-              for mapping, text in guard_faults(left, planner)] or _broken(left)
-    while faults:
-        for mapping, column, text in faults:
-            where = Place(path, mapping.file_line, column=column)
-            problems.append(Problem(where, f'Item: {mapping.item}, {text}'))
-            left = [other for other in left if other is not mapping]
-        faults = _broken(left)
-    return left, problems
-
-
-def _broken(mappings: Sequence[Mapping]) -> list[tuple[Mapping, str, str]]:
-    return [(mapping, fault.column, fault.text) for mapping, fault in broken_links(mappings)]
-
-
-def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:
-    if mapping.plc_type.value != network.plc_type:
-        return (f'a Serve row has the PLC_Type we emulate, which is {network.plc_type} '
-                'in the net file')
-    if mapping.station != network.station:
-        return f'a Serve row has our own Station, which is {network.station} in the net file'
-    try:
-        table.create(_first_word(mapping), mapping.codec.words)
-    except NoSuchFile as error:
-        return f'{mapping.address} does not fit an earlier Serve row: {error}'
-    return None
 
 
 def _first_word(mapping: Mapping) -> Address:

@@ -25,12 +25,12 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, ReadPoint, WriteResult
-from abdf1_ros.errors import Problem
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import status_text
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
 from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.problems import Problem
 from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
 from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age

@@ -34,7 +34,7 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.errors import ConfigurationError, Place, Problem
+from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.graph import Graph
 from abdf1_ros.ros.interlocks import END_LIMIT
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD

@@ -34,7 +34,6 @@ from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.driver.writes import MAX_WAITING_WRITES
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import setting_remarks
@@ -42,6 +41,7 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.diagnostics import changed_text, deaf_text, Diagnostics
 from abdf1_ros.ros.graph import DuplicateNameWatch, Graph, TypeWatch
 from abdf1_ros.ros.interlocks import begin_end, END_LIMIT, InterlockWatch, wait_for_end

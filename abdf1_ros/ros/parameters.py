@@ -27,9 +27,9 @@ from typing import Any
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.served import usable_rows
-from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import config_file
+from abdf1_ros.plan.usable_rows import usable_rows
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.files import FileWatch
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.map_file import load_mappings

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.problems import ConfigurationError, Problem
 
 
 class PortOwners:

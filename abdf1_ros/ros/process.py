@@ -32,8 +32,8 @@ import time
 import traceback
 from typing import NamedTuple
 
-from abdf1_ros.errors import ConfigurationError, Problem
 from abdf1_ros.paths import ShowVersion
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy

@@ -35,7 +35,7 @@ import io
 from pathlib import Path
 import re
 
-from abdf1_ros.errors import ConfigurationError, Place, Problem
+from abdf1_ros.problems import ConfigurationError, Place, Problem
 
 _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'

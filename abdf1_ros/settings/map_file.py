@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.csv_table import read_good_rows, Row, shown
 from abdf1_ros.settings.heartbeats import counts

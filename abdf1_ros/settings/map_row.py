@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import FormatError, Problem
+from abdf1_ros.errors import FormatError
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access
@@ -33,6 +33,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row, shown
 from abdf1_ros.settings.heartbeats import (

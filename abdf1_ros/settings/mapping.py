@@ -22,7 +22,6 @@ from enum import Enum
 import math
 from typing import Any
 
-from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
@@ -31,6 +30,7 @@ from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, values_text
 from abdf1_ros.settings.scaling import Scaling
 

@@ -28,10 +28,10 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import ConfigurationError, Place, Problem
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.csv_table import read_rows, shown
 from abdf1_ros.settings.station_lists import octal_remarks
 

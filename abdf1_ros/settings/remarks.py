@@ -20,11 +20,11 @@ from collections.abc import Iterator
 import math
 
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
-from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

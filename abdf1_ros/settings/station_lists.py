@@ -20,8 +20,8 @@ from collections.abc import Iterator
 import re
 
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.csv_table import Row
 
 _LEADING_ZERO = re.compile(r'0[0-7]+')

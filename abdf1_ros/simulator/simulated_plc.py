@@ -33,7 +33,7 @@ from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import ConfigurationError, FormatError, LinkError, Problem, RemoteError
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
@@ -42,6 +42,7 @@ from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.values import Codec, types_of, ValueType
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import read_rows, Row
 from abdf1_ros.simulator.ladder import Ladder
 

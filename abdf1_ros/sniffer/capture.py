@@ -39,8 +39,8 @@ import math
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from abdf1_ros.errors import Problem
 from abdf1_ros.numbers import decimal_number
+from abdf1_ros.problems import Problem
 from abdf1_ros.text import printable
 
 VERSION = 1

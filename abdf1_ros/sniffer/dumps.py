@@ -25,7 +25,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 import re
 
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
 from abdf1_ros.sniffer.ethernet_ip import chunks_of
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 import struct
 from typing import BinaryIO, NamedTuple
 
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 
 _PCAPNG = b'\x0A\x0D\x0D\x0A'
 # Byte order and length of a tick, by the first four bytes of a pcap.

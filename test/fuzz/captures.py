@@ -27,7 +27,7 @@ from typing import Any
 from abdf1_ros.cli import sniff
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry

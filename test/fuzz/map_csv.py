@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import re
 
-from abdf1_ros.driver.served import line_problems
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.plan.usable_rows import line_problems
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

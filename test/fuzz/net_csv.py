@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import FIELDS, load_network
 from fuzz.files import path_of
 

@@ -20,9 +20,9 @@ import re
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.csv_table import read_rows
 from abdf1_ros.simulator.simulated_plc import COLUMNS, load_plcs
 from fuzz.files import path_of

@@ -24,7 +24,7 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros import process
 from abdf1_ros.ros.lines import chosen, LineName, main, parameter_files, sections

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.port_owners import PortOwners
 import pytest
 

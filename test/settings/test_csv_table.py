@@ -19,7 +19,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from abdf1_ros.errors import ConfigurationError, Place
+from abdf1_ros.problems import ConfigurationError, Place
 from abdf1_ros.settings.csv_table import read_good_rows, read_rows, Row
 from hypothesis import given
 from hypothesis import strategies as st

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 import pytest
 from support.mappings import fault, faults, load_rows, load_text, row, slc

@@ -19,8 +19,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.messages import Severity
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import (
     BAUD_RATES,
     FIELDS,

@@ -22,10 +22,10 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, Poll
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import ConfigurationError
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, InjectedFaults, load_plcs, SimulatedPlc

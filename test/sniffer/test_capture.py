@@ -20,7 +20,7 @@ import os
 from pathlib import Path
 import stat
 
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import (
     CaptureWriter,
     Chunk,

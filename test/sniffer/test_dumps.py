@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.dumps import read_hex, Recording
 from hypothesis import given, strategies

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import struct
 
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry, Kind

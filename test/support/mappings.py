@@ -20,12 +20,12 @@ from pathlib import Path
 import tempfile
 from typing import Any
 
-from abdf1_ros.errors import Problem
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish

@@ -48,19 +48,12 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.points import Outcome
-from abdf1_ros.errors import (
-    Abdf1Error,
-    ConfigurationError,
-    FormatError,
-    LinkError,
-    PortLost,
-    Problem,
-    RemoteError,
-)
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.listing import serial_ports
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import printable

@@ -27,7 +27,7 @@ import time
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.transactions import carry_out
-from abdf1_ros.errors import ConfigurationError, FormatError, PortLost, Problem
+from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.address import Address
@@ -35,6 +35,7 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping

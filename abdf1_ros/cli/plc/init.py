@@ -24,7 +24,7 @@ from abdf1_ros.cli.plc.data import processor_of
 from abdf1_ros.cli.plc.detect import Found
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.presence import Presence
-from abdf1_ros.errors import Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.network import Network
 
 _TIMEOUT = 300  # ms; the default of a net CSV is long for a person who waits

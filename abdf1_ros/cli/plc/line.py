@@ -22,7 +22,7 @@ from dataclasses import replace
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import ConfigurationError, Problem
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import load_network, make_network, Network
 
 # A Timeout of 1000 ms, the default of a net CSV, is long for a person who waits.

@@ -33,9 +33,10 @@ from abdf1_ros.cli.plc.data import (
 )
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.points import Outcome, WriteResult
-from abdf1_ros.errors import ConfigurationError, FormatError, PortLost
+from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from abdf1_ros.cli.plc.line import DEFAULTS, network_of
 from abdf1_ros.cli.plc.options import make_parser
-from abdf1_ros.errors import ConfigurationError
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 import pytest
 from support.ros import write_csv

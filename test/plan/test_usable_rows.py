@@ -1,0 +1,120 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rows that do not fit the line or each other."""
+
+from __future__ import annotations
+
+from abdf1_ros.plan.usable_rows import line_problems, usable_rows
+from abdf1_ros.settings.heartbeats import Heartbeat, PublishWhile
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+import pytest
+from support.mappings import make_mapping
+
+PEER = Network(mode='Peer')
+
+
+def row(text: str, plc: str = 'PLC5', length: int = 1) -> Mapping:
+    """Return a Serve row."""
+    return make_mapping(text, 'Serve', station=5, plc=plc, length=length)
+
+
+def texts(*mappings: Mapping, network: Network = PEER) -> list[str]:
+    """Return the text of every problem."""
+    return [str(problem) for _, problem in line_problems(mappings, network, 'map.csv')]
+
+
+def test_rows_that_fit() -> None:
+    assert texts(row('N7:50', length=4), row('N7:52', length=9), row('B3:5/0', length=8),
+                 make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', plc='SLC')) == []
+
+
+def test_other_commands_need_nothing_of_that() -> None:
+    assert texts(make_mapping('N7:0', plc='SLC', station=9), network=Network()) == []
+
+
+def test_serve_needs_our_plc_type() -> None:
+    assert texts(row('N7:50', 'SLC')) == [
+        'map.csv:2: Item: 1, a Serve row has the PLC_Type we emulate, which is PLC5 in the net '
+        'file']
+    assert texts(row('N7:50', 'SLC'), network=Network(mode='Peer', plc_type='SLC')) == []
+
+
+def test_serve_needs_our_station() -> None:
+    assert texts(make_mapping('N7:50', 'Serve', station=1, item=7)) == [
+        'map.csv:8: Item: 7, a Serve row has our own Station, which is 5 in the net file']
+
+
+def test_serve_rows_of_one_file_have_one_type() -> None:
+    assert texts(row('N9:0'), row('B9:0'), row('N9:1')) == [
+        'map.csv:2: Item: 1, B9:0 does not fit an earlier Serve row: file 9 is of type N already']
+
+
+@pytest.mark.parametrize(('plc', 'text'), [('PLC2', '020'), ('PLC3', 'N7:0')])
+def test_every_plc_type_can_be_emulated(plc: str, text: str) -> None:
+    network = Network(mode='Peer', plc_type=plc)
+    assert texts(row(text, plc), network=network) == []
+    assert len(texts(row('N7:0'), network=network)) == 1
+
+
+def test_files_of_a_plc3_are_numbered_in_each_section() -> None:
+    network = Network(mode='Peer', plc_type='PLC3')
+    assert texts(row('N9:0', 'PLC3'), row('B9:0', 'PLC3'), network=network) == []
+
+
+def test_full_duplex_line_has_no_broadcast() -> None:
+    everybody = make_mapping('N7:0', 'Write', station=255)
+    assert texts(everybody) == [
+        'map.csv:2: Item: 1, Station 255 is for a line with many stations, not for Mode Peer']
+    assert texts(everybody, network=Network()) == []
+
+
+@pytest.mark.parametrize('network, is_wrong', [
+    (Network(station=1), True), (Network(station=1, polling='Standard'), True),
+    (Network(station=1, mode='Slave'), True), (Network(station=1, mode='Peer'), False),
+    (Network(station=2), False)])
+def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> None:
+    ours = [make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', station=1)]
+    assert texts(*ours, network=network) == [
+        'map.csv:2: Item: 1, Station 1 is our own in the net file; here belongs the '
+        'station to read or write'] * 2 * is_wrong
+
+
+def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
+    counter = make_mapping('N11:3', tag='alive', item=1)
+    guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 250))
+    good, (problem,) = usable_rows([counter, guarded], Network(baud=19200), 0.1, 'map.csv')
+    assert good == [counter]
+    assert str(problem) == (
+        'map.csv:3 (Heartbeat_Timeout): Item: 2, Heartbeat_Timeout 250 ms is shorter than 3 reads '
+        'of alive on this line; 300 ms would do')
+
+
+def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it() -> None:
+    own = Network(station=1)
+    counter = make_mapping('N11:3', tag='alive', period=100, item=1)
+    guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 900))
+    word = make_mapping('N7:5', 'Write', tag='speed', topic='speed', item=3)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500, station=2, item=4,
+                        heartbeat=Heartbeat(('speed',), 500))
+    good, problems = usable_rows([counter, guarded, word, beat], own, 0.1, 'map.csv')
+    assert good == []
+    assert [problem.text.partition(',')[0] for problem in problems] == [
+        'Item: 1', 'Item: 2', 'Item: 3', 'Item: 4']
+
+
+def test_problems_go_with_their_rows() -> None:
+    good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
+    assert [mapping for mapping, _ in line_problems([good, bad], PEER, 'm')] == [bad]
