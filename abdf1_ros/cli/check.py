@@ -47,6 +47,7 @@ from abdf1_ros.plan.interlocks import Bound
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.plan.usable_rows import usable_rows
+from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
@@ -153,8 +154,14 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     contents: dict[str, Any] = {}
     texts = []
     is_good = True
+    owners: dict[str, str] = {}
     for name, net, map_file in pairs(Path(options.net)):
         found = examine(str(net), str(map_file), options.default_period / 1000)
+        if found.network is not None and found.network.com_port != Network().com_port:
+            port = found.network.port  # without one a parameter gives it
+            owner = owners.setdefault(line_of(port), name)
+            if owner != name:
+                found.problems.append(Problem(str(net), f'{port} is the port of {owner} too'))
         report = _report(found, options)
         is_good = is_good and not found.problems
         contents[name] = _content(found, report)

@@ -28,9 +28,11 @@ import math
 import socket
 import struct
 import time
+from typing import Any
 from urllib.parse import urlsplit
 
 from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.ownership import OwnedConnection
 from abdf1_ros.ports.settings import PortSettings
 
 _CONNECT_TIMEOUT = 5.0
@@ -106,18 +108,34 @@ def open_rfc2217(settings: PortSettings) -> DescriptorPort:
 def _connect(url: str) -> socket.socket:
     parts = urlsplit(url)
     try:
-        connection = socket.create_connection(
-            (parts.hostname or '', parts.port or 0), timeout=_CONNECT_TIMEOUT)
+        found = socket.getaddrinfo(parts.hostname, parts.port, type=socket.SOCK_STREAM)
     except UnicodeError:
         raise OSError(f'{parts.hostname} is not the name of a host') from None
-    # Without the first option a short frame waits until the one before it has been acknowledged
-    # by TCP. The last one is for bytes that we send, the others are for a line on which we only
-    # listen.
-    for option, value in (
-            (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
-            (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
-        connection.setsockopt(socket.IPPROTO_TCP, option, value)
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    errors = []
+    for family, _, _, _, address in found:
+        try:
+            return _connected(family, address)
+        except OSError as error:
+            errors.append(error)
+    raise errors[-1]
+
+
+def _connected(family: int, address: tuple[Any, ...]) -> socket.socket:
+    connection = OwnedConnection(family, address)
+    try:
+        connection.settimeout(_CONNECT_TIMEOUT)
+        connection.connect(address)
+        # Without the first option a short frame waits until the one before it has been
+        # acknowledged by TCP. The last one is for bytes that we send, the others are for a line
+        # on which we only listen.
+        for option, value in (
+                (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
+                (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    except OSError:
+        connection.close()
+        raise
     return connection
 
 

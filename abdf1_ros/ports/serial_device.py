@@ -33,13 +33,13 @@ from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.ownership import BUSY
 from abdf1_ros.ports.settings import PortSettings
 import serial
 import serial.rs485
 
 # Our own words, where those of the operating system tell too little.
-_BUSY = 'another program has it open'
-_REASONS = {errno.EAGAIN: _BUSY, errno.EBUSY: _BUSY, errno.ENOTTY: 'this is not a serial port'}
+_REASONS = {errno.EAGAIN: BUSY, errno.EBUSY: BUSY, errno.ENOTTY: 'this is not a serial port'}
 
 _PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
 

@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-import os
-
+from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.problems import ConfigurationError, Problem
 
 
@@ -38,7 +37,7 @@ class PortOwners:
 
         Raises ConfigurationError, and leaves all as it was, where another line has one of them.
         """
-        before, wanted = self._devices.get(owner, {}), {_device(port): port for port in ports}
+        before, wanted = self._devices.get(owner, {}), {line_of(port): port for port in ports}
         # Ours are entered first, so that of two lines that want a port at once none or one has it.
         self._devices[owner] = wanted
         for other, held in [*self._devices.items()]:
@@ -46,8 +45,3 @@ class PortOwners:
                 self._devices[owner] = before
                 raise ConfigurationError([
                     Problem('port', f'{wanted[taken.pop()]} is the port of {other}')])
-
-
-def _device(port: str) -> str:
-    """Return the same text for all names of a device."""
-    return port.lower() if '://' in port else os.path.realpath(port)

@@ -308,6 +308,18 @@ def test_error_of_one_pair_is_named_and_the_others_are_told(
     assert '\npress: 1 rows, ' in out
 
 
+def test_two_lines_of_a_folder_on_one_port_are_an_error(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, port in (('glue', '/dev/ttyUSB0'), ('paint', 'socket://localhost:4001'),
+                       ('press', 'rfc2217://127.1:4001')):
+        write_csv(tmp_path / f'{name}_net.csv', NET_HEADER + ',Com_Port', [f'{GOOD_NET},{port}'])
+        write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW])
+    assert main([str(tmp_path)]) == 2
+    errors = [line for line in capsys.readouterr().out.splitlines() if 'error' in line]
+    assert errors == [f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port '
+                      'of paint too']
+
+
 def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, BAD_ROWS[0]))
     assert main(['--json', str(tmp_path)]) == 2

@@ -1,0 +1,93 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One line, one owner: which port a name means, and whether a program of this host has it.
+
+The system keeps a device for the program that has it open. The port of a device server is kept by
+a name in the abstract namespace of Unix sockets: it needs no file, holds between users, and ends
+with its process.
+"""
+
+from __future__ import annotations
+
+import errno
+from ipaddress import ip_address, IPv6Address
+import os
+import socket
+import stat
+from typing import Any
+from urllib.parse import urlsplit
+
+BUSY = 'another program has it open'
+
+_LOCK = '\0abdf1_ros.port.'
+_LOOPBACK = '127.0.0.1'
+
+
+def line_of(port: str) -> str:
+    """
+    Return the same text for all names of one port, as far as no name server has to be asked.
+
+    A device is known by its number, a device server by address and port, whatever the scheme.
+    """
+    if '://' in port:
+        url = urlsplit(port)
+        return address_of(_number_of(url.hostname or ''), url.port or 0)
+    try:
+        status = os.stat(port)
+    except OSError:
+        return os.path.realpath(port)
+    if not stat.S_ISCHR(status.st_mode):
+        return os.path.realpath(port)
+    return f'device {os.major(status.st_rdev)}:{os.minor(status.st_rdev)}'
+
+
+def _number_of(host: str) -> str:
+    """Return the address that a host has by its name alone, otherwise the name."""
+    try:
+        found = socket.getaddrinfo(host, None, flags=socket.AI_NUMERICHOST)
+    except OSError:
+        return _LOOPBACK if host == 'localhost' else host
+    return str(found[0][4][0])
+
+
+def address_of(host: str, port: int) -> str:
+    """Return the same text for all ways to write a host's address, and its port."""
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return f'{host.lower()}:{port}'
+    if isinstance(address, IPv6Address) and address.ipv4_mapped:
+        address = address.ipv4_mapped
+    is_here = address.is_loopback and host in ('::1', _LOOPBACK)
+    return f'{_LOOPBACK if is_here or address.is_unspecified else address}:{port}'
+
+
+class OwnedConnection(socket.socket):
+    """A TCP connection to a device server's port, which is ours until it is closed."""
+
+    def __init__(self, family: int, address: tuple[Any, ...]) -> None:
+        """Take the port; OSError where another program of this host has it."""
+        super().__init__(family, socket.SOCK_STREAM)
+        self._lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            self._lock.bind(_LOCK + address_of(*address[:2]))
+        except OSError:
+            self.close()
+            raise OSError(errno.EBUSY, BUSY) from None
+
+    def close(self) -> None:
+        super().close()
+        self._lock.close()
