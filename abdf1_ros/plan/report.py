@@ -161,33 +161,50 @@ def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[R
         for problem in mapping.remarks:
             yield Remark(RemarkKind.SETTING, str(problem), mapping.station)
     yield from _overlap_remarks(mappings)
+    yield from _case_remarks(mappings)
 
 
 def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
-    """Find Write rows over what Read rows map: a message sets what the PLC is to tell."""
-    read: defaultdict[tuple[object, ...], list[Mapping]] = defaultdict(list)
+    """Find Write rows over what Read rows map, and words that several rows write."""
+    here: defaultdict[tuple[object, ...], list[Mapping]] = defaultdict(list)
     for mapping in mappings:
-        if mapping.command is Command.READ:
-            for place in _places(mapping):
-                read[place].append(mapping)
+        for place in _places(mapping):
+            here[place].append(mapping)
     for mapping in mappings:
-        if mapping.command is not Command.WRITE:
+        if not mapping.writes:
             continue
-        others = {id(other): other for place in _places(mapping) for other in read[place]
-                  if mapping.shares_words(other)}
-        if others:
+        others = {id(other): other for place in _places(mapping) for other in here[place]
+                  if mapping.shares_words(other)}.values()
+        read = [other for other in others if other.command is Command.READ]
+        written = [other for other in others if other.writes and other.item < mapping.item]
+        about = f'line {mapping.file_line} of the map: {mapping.tag} writes {mapping.address}'
+        if read and mapping.command is Command.WRITE:
             yield Remark(RemarkKind.SETTING, (
-                f'line {mapping.file_line} of the map: {mapping.tag} writes {mapping.address}, '
-                f'which {_tags(tuple(others.values()))} reads, so a message sets what the PLC is '
+                f'{about}, which {_tags(read)} reads, so a message sets what the PLC is '
                 'to tell; ReadWrite in one row if that is meant, otherwise another address'),
                 mapping.station)
+        if written:
+            yield Remark(RemarkKind.SETTING, (
+                f'{about}, of which {_tags(written)} writes a part or all too: each undoes what '
+                'the other has written'), mapping.station)
+
+
+def _case_remarks(mappings: Iterable[Mapping]) -> Iterator[Remark]:
+    """Find tags that differ only in capital and small letters."""
+    names: defaultdict[str, list[Mapping]] = defaultdict(list)
+    for mapping in mappings:
+        names[mapping.name.lower()].append(mapping)
+    for group in names.values():
+        if len({mapping.name for mapping in group}) > 1:
+            yield Remark(RemarkKind.SETTING, (
+                f'tags that differ only in capital and small letters: {_tags(group)}'))
 
 
 def _places(mapping: Mapping) -> Iterator[tuple[object, ...]]:
     """Yield the words of a mapping, each with station and area."""
     address = mapping.address
     for number in range(mapping.codec.words):
-        yield mapping.station, address.area, address.offset + number
+        yield mapping.serves, mapping.station, address.area, address.offset + number
 
 
 def _row_order(block: Block) -> tuple[int, int]:

@@ -85,3 +85,5 @@ MAP_COLUMNS = (
 )
 
 COLUMNS = tuple(column.name for column in MAP_COLUMNS)
+
+NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)

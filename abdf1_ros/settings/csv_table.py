@@ -27,7 +27,7 @@ would hide all rows up to the next quote, without an error.
 from __future__ import annotations
 
 import codecs
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 import csv
 from dataclasses import dataclass, replace
 import difflib
@@ -36,6 +36,7 @@ from pathlib import Path
 import re
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
+from abdf1_ros.settings.hints import hint, is_spreadsheet_error
 
 _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'
@@ -77,6 +78,24 @@ class Row:
         return self.cells.get(column, '')
 
 
+@dataclass(frozen=True, slots=True)
+class Table:
+    """
+    The rows whose cells fit the columns, and the faults of the file.
+
+    ``faults`` are of the file as a whole, ``row_faults`` of single rows, which ``rows`` has not.
+    """
+
+    rows: list[Row]
+    faults: list[Problem]
+    row_faults: list[Problem]
+
+    @property
+    def is_usable(self) -> bool:
+        """Tell whether its rows can be trusted; where most are bad the others may be shifted."""
+        return not self.faults and len(self.row_faults) <= len(self.rows)
+
+
 def shown(cell: str) -> str:
     """Return a cell as errors show it, a long one without its end."""
     return cell if len(cell) <= _SHOWN else f'{cell[:_SHOWN]}...'
@@ -88,27 +107,28 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
 
     Raises ConfigurationError with every fault of the file.
     """
-    rows, problems = read_good_rows(path, known)
-    if problems:
+    table = read_table(path, known)
+    if problems := table.faults + table.row_faults:
         raise ConfigurationError(problems)
-    return rows
+    return table.rows
 
 
-def read_good_rows(path: str, known: Sequence[str]) -> tuple[list[Row], list[Problem]]:
+def read_table(path: str, known: Sequence[str], needed: Collection[str] = ()) -> Table:
     """
-    Read the data rows whose cells fit the columns, and return the faults of the others.
+    Read a file whose header uses ``known`` column names, the ``needed`` ones among them.
 
-    Raises ConfigurationError with every fault of the file as a whole. So it does when fewer
-    rows are good than not: then the good ones may be shifted too.
+    Raises ConfigurationError where there is no header. Where a needed column is missing there are
+    no rows: each would lack the same.
     """
     try:
         (first, header), *others = _read_lines(path, known)
         _check_text(Place(path, first), header)
         delimiter = max(_DELIMITERS, key=header.count)
         names = _cells(Place(path, first), header, delimiter)
+        _check_direction(Place(path, first), names, others, known)
     except Problem as problem:
         raise ConfigurationError([problem]) from None
-    columns = _columns(Place(path, first), names, known)
+    columns, faults = _columns(Place(path, first), names, known, needed)
     rows: list[Row] = []
     problems: list[Problem] = []
     item = 0
@@ -128,9 +148,7 @@ def read_good_rows(path: str, known: Sequence[str]) -> tuple[list[Row], list[Pro
             rows.append(Row(path, item, line, content, columns))
         else:
             item -= 1
-    if len(problems) > len(rows):
-        raise ConfigurationError(problems)
-    return rows, problems
+    return Table(rows if columns.keys() >= set(needed) else [], faults, problems)
 
 
 def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
@@ -138,12 +156,18 @@ def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
     # str.splitlines also divides at characters that are not line ends in CSV.
     lines = enumerate(io.StringIO(_read_text(path), newline=''), 1)
     found = [(number, line) for number, line in lines
-             if line.strip(_BLANK) and not line.lstrip().startswith('#')
+             if line.strip(_BLANK) and not _is_comment(line)
              and not (number == 1 and _SEPARATOR_LINE.fullmatch(line))]
     if not found:
         raise Problem(Place(path, 1), 'the file is empty; its first row names columns: '
                                       f'{", ".join(known)}')
     return found
+
+
+def _is_comment(line: str) -> bool:
+    """Tell whether a line is one; #N/A in its first cell comes from a spreadsheet."""
+    text = line.lstrip()
+    return text.startswith('#') and not is_spreadsheet_error(re.split('[,;\t]', text)[0].rstrip())
 
 
 def _read_text(path: str) -> str:
@@ -189,15 +213,31 @@ def _cells(place: Place, line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, int]:
-    """Return the cell number of each column; ConfigurationError for unknown and repeated names."""
+def _check_direction(place: Place, names: list[str], others: list[tuple[int, str]],
+                     known: Sequence[str]) -> None:
+    """Raise Problem where the names of the columns stand below each other."""
+    spellings = {name.lower() for name in known}
+    below = [re.split('[,;\t]', line)[0].strip().lower() in spellings for _, line in others]
+    if sum(name.lower() in spellings for name in names) < 2 and len(names) > 1 \
+            and len(below) > 1 and all(below):
+        raise Problem(place, 'the names of the columns stand below each other here; they belong '
+                             'side by side into one row, and the values into the row below it')
+
+
+def _columns(place: Place, names: list[str], known: Sequence[str],
+             needed: Collection[str]) -> tuple[dict[str, int], list[Problem]]:
+    """
+    Return the cell number of each column, and the faults of the header.
+
+    ConfigurationError where it is none.
+    """
     spelling = {name.lower(): name for name in known}
     meant = [spelling.get(name.lower()) for name in names]
     if not any(meant):
         raise ConfigurationError([Problem(
             place, f'no column is named here{_kind(names)}; the first row names them, with '
                    f'comma, semicolon or tab between: {", ".join(known)}')])
-    free = [name.lower() for name in known if name not in meant]
+    free = [name for name in known if name not in meant]
     listing = f'; known: {", ".join(known)}'
     columns: dict[str, int] = {}
     problems: list[Problem] = []
@@ -207,24 +247,38 @@ def _columns(place: Place, names: list[str], known: Sequence[str]) -> dict[str, 
         if not name:
             continue
         if column is None:
-            close = difflib.get_close_matches(name.lower(), free, 1, _ALIKE)
-            hint = f'; did you mean {spelling[close[0]]}?' if close else listing
-            problems.append(Problem(where, f'unknown column "{shown(name)}"{hint}'))
-            if not close:
-                strange.append(name)
+            close = _close(name, free)
+            advice = hint(name) or (f'; did you mean {close}?' if close else listing)
+            problems.append(Problem(where, f'unknown column "{shown(name)}"{advice}'))
+            if close:
+                free.remove(close)
+            elif advice == listing:
                 listing = ''  # once is enough
+            strange += [] if close else [name]
         elif column in columns:
             problems.append(Problem(
                 where, f'column {column} stands twice, first in cell {columns[column]}'))
         else:
             columns[column] = number
     if len(strange) > len(names) / 2:
-        problems = [Problem(place, (
+        raise ConfigurationError([Problem(place, (
             f'{len(strange)} of {len(names)} columns are not known here, such as '
-            f'"{shown(strange[0])}": is this the right file? Known: {", ".join(known)}'))]
-    if problems:
-        raise ConfigurationError(problems)
-    return columns
+            f'"{shown(strange[0])}": is this the right file? Known: {", ".join(known)}'))])
+    problems += [Problem(place, f'column {column} is missing, and each row needs it')
+                 for column in needed if column in free]
+    return columns, problems
+
+
+def _close(name: str, free: Sequence[str]) -> str | None:
+    """Return the column that is most likely meant by another name."""
+    name, known = _squeezed(name), {_squeezed(column): column for column in free}
+    close = difflib.get_close_matches(name, known, 1, _ALIKE) or [
+        column for column in known if len(column) > 2 and name.startswith(column)]
+    return known[close[0]] if close else None
+
+
+def _squeezed(name: str) -> str:
+    return re.sub(r'[\W_]', '', name).lower()
 
 
 def _kind(names: list[str]) -> str:
@@ -248,6 +302,9 @@ def _check_cells(place: Place, cells: list[str], names: list[str], columns: dict
         raise Problem(place, 'this row is one cell; its cells need a '
                              f'{_DELIMITERS[delimiter]} between them, outside of quotes')
     for number, cell in enumerate(cells, 1):
-        if cell and number not in columns.values():
-            raise Problem(replace(place, cell=number), f'"{shown(cell)}" has no column; '
-                                                       'quote a cell that contains the delimiter')
+        where = replace(place, cell=number)
+        if cell and not ''.join(names[number - 1:number]):
+            raise Problem(where, f'"{shown(cell)}" has no column; quote a cell that contains the '
+                                 'delimiter')
+        if is_spreadsheet_error(cell):
+            raise Problem(where, f'"{cell}" is what a spreadsheet writes where it has no value')

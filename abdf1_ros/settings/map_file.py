@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+import re
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.processor import Processor, USUAL
-from abdf1_ros.problems import Problem
-from abdf1_ros.settings.columns import COLUMNS
-from abdf1_ros.settings.csv_table import read_good_rows, Row, shown
+from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.columns import COLUMNS, NEEDED
+from abdf1_ros.settings.csv_table import read_table, Row, shown
 from abdf1_ros.settings.heartbeats import counts
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
@@ -42,10 +43,11 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
     Raises ConfigurationError when the file as a whole cannot be used.
     """
     mappings: list[Mapping] = []
-    rows, problems = read_good_rows(path, COLUMNS)
+    table = read_table(path, COLUMNS, NEEDED)
+    problems = table.faults + table.row_faults
     clashes = _Clashes()
     kept: dict[int, Row] = {}
-    for row in rows:
+    for row in table.rows:
         reader = RowReader(row)
         mapping = reader.read()
         faults = reader.faults if mapping is None else clashes.add(mapping)
@@ -58,6 +60,8 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
             if mapping in mappings:
                 mappings.remove(mapping)
             problems.append(fault.in_file(kept[mapping.item]))
+    if not table.is_usable:
+        raise ConfigurationError(problems)
     return mappings, problems
 
 
@@ -72,9 +76,7 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFau
     for mapping in mappings:
         for topic in mapping.heartbeat.requires if mapping.heartbeat else ():
             if topic not in topics:
-                yield mapping, CellFault(
-                    'Requires', 'no good Write, ReadWrite or Serve row has the '
-                    f'topic "{shown(topic)}"')
+                yield mapping, CellFault('Requires', _no_topic(topic, mappings))
         condition = mapping.publish_while
         if condition is None or condition.tag is None:
             continue
@@ -90,6 +92,18 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFau
             yield mapping, CellFault(
                 'Heartbeat_Timeout', f'Heartbeat_Timeout {condition.timeout} is less than '
                 f'{_LEAST_PERIODS} x {counter.period} ms, the Period of {shown(counter.tag)}')
+
+
+def _no_topic(topic: str, mappings: Sequence[Mapping]) -> str:
+    """Return why a heartbeat cannot require messages on ``topic``."""
+    text = f'no good Write, ReadWrite or Serve row has the topic "{shown(topic)}"'
+    if re.search('[,;|]', topic):
+        return f'{text}; put spaces between topics'
+    if any(mapping.topic == topic for mapping in mappings):
+        return f'{text}: it is one that we publish; name topics whose messages we get'
+    other = next((mapping for mapping in mappings if mapping.writes and topic in (
+        mapping.tag, f'/{mapping.topic}', f'~/write/{mapping.topic}')), None)
+    return f'{text}; did you mean {other.topic}?' if other else text
 
 
 def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping]) -> str:

@@ -34,7 +34,7 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Problem
-from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import Row, shown
 from abdf1_ros.settings.heartbeats import (
     DEFAULT_PERIOD,
@@ -43,13 +43,13 @@ from abdf1_ros.settings.heartbeats import (
     read_heartbeat,
     read_publish_while,
 )
+from abdf1_ros.settings.hints import hint
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
 
-_NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)
 MAX_PERIOD = 86_400_000  # ms
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
 
@@ -95,7 +95,7 @@ class RowReader:
 
     def read(self) -> Mapping | None:
         """Return the mapping, or None when the row has faults."""
-        for column in _NEEDED:
+        for column in NEEDED:
             if not self._row.get(column):
                 self._fault(column, f'{column} is missing')
         if self.faults:
@@ -116,7 +116,7 @@ class RowReader:
         return {
             'tag': self._row.get('Tag'),
             'length': self._number('Length', 1, 65535, 1),
-            'period': self._number('Period', 0, MAX_PERIOD, None),
+            'period': self._number('Period', 0, MAX_PERIOD, None, unit=' ms'),
             'publish': self._choice('Publish', Publish, Publish.ALWAYS),
             'minimum': self._decimal('Min', -math.inf),
             'maximum': self._decimal('Max', math.inf),
@@ -185,7 +185,8 @@ class RowReader:
 
     def _bad_value(self, column: str, text: str, message: Message | None = None,
                    *args: object) -> None:
-        self.faults.append(CellFault(column, text, message, args, value=self._row.get(column)))
+        value = self._row.get(column)
+        self.faults.append(CellFault(column, text + hint(value), message, args, value=value))
 
     def _name(self, column: str, text: str) -> str:
         name = sanitise(text)
@@ -208,14 +209,14 @@ class RowReader:
         return None
 
     def _number(self, column: str, low: int, high: int, default: int | None,
-                message: Message | None = None, *args: object) -> int | None:
+                message: Message | None = None, *args: object, unit: str = '') -> int | None:
         text = self._row.get(column)
         if not text:
             return default
         value = whole_number(text)
         if value is not None and low <= value <= high:
             return value
-        self._bad_value(column, f'should be a whole number from {low} to {high}', message,
+        self._bad_value(column, f'should be a whole number from {low} to {high}{unit}', message,
                         shown(text), *args)
         return None
 
@@ -254,7 +255,7 @@ class RowReader:
         text = self._row.get('PLC_Type')
         kind = next((entry for entry in FAMILIES if entry.value == text.upper()), None)
         if kind is None:
-            self._fault('PLC_Type', 'a MicroLogix is SLC', Message.ERR_BAD_PLC_TYPE,
+            self._fault('PLC_Type', f'a MicroLogix is SLC{hint(text)}', Message.ERR_BAD_PLC_TYPE,
                         shown(text), *_PLC_TYPE_NAMES)
         return kind
 
@@ -295,7 +296,7 @@ class RowReader:
         try:
             return parse_address(text, plc_type, access)
         except AddressSyntaxError as error:
-            self._fault('Address', str(error), Message.ERR_ADDRESS_SYNTAX, shown(text))
+            self._fault('Address', f'{error}{hint(text)}', Message.ERR_ADDRESS_SYNTAX, shown(text))
         except AddressRangeError as error:
             self._fault('Address', str(error), Message.ERR_ADDRESS_RANGE, shown(text),
                         shown(self._row.get('Length')) or 1)
@@ -345,8 +346,11 @@ class RowReader:
             self._fault('Length', 'bits of a structure end with their word',
                         Message.ERR_ADDRESS_RANGE, *details)
         elif address.offset + words > address.area_size:
-            last = address.at_offset(address.area_size - 1)
-            self._fault('Length', f'the last word there can be is {last}',
+            step = 1 if address.file_type.is_structure else address.layout.words
+            last = address.at_offset(address.area_size - step)
+            size = '' if mapping.codec.element_words <= address.layout.words else (
+                f'{mapping.length} {mapping.type.value} from {address} on take {words} words; ')
+            self._fault('Length', f'{size}the last word there can be is {last}',
                         Message.ERR_ADDRESS_RANGE, *details)
         elif fault := type_fault(address, mapping.type, mapping.length):
             self._fault('Length', fault)

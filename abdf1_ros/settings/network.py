@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import re
@@ -32,7 +33,8 @@ from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.settings.csv_table import read_rows, shown
+from abdf1_ros.settings.csv_table import read_table, Row, shown
+from abdf1_ros.settings.hints import hint
 from abdf1_ros.settings.station_lists import octal_remarks
 
 MODES = ('Master', 'Slave', 'Peer')
@@ -87,10 +89,11 @@ class NetField:
         if self.choices:
             right = f'one of {", ".join(map(str, self.choices))}'
         else:
-            right = f'a whole number from {self.low} to {self.high}'
+            unit = ' ms' * self.description.startswith('ms ')
+            right = f'a whole number from {self.low} to {self.high}{unit}'
         meant = self.other_words.get(re.sub(r'[\W_]', '', text).lower())
-        hint = f'; "{shown(text)}" is {meant}' if meant else ''
-        return f'{self.column} = "{shown(text)}" should be {right}{hint}'
+        advice = f'; "{shown(text)}" is {meant}' if meant else hint(text)
+        return f'{self.column} = "{shown(text)}" should be {right}{advice}'
 
     def _number(self, text: str) -> int | None:
         value = whole_number(text)
@@ -204,15 +207,36 @@ def load_network(path: str) -> Network:
 
     Raises ConfigurationError with every fault found; any fault is critical (S0).
     """
-    rows = read_rows(path, [entry.column for entry in FIELDS.values()])
-    if len(rows) != 1:
-        where = Place(path, rows[1].line if rows else None)
-        raise ConfigurationError([Problem(
-            where, f'a net file has one data row, this one has {len(rows)}')])
-    row = rows[0]
-    cells = {name: (row.get(entry.column), row.where(entry.column))
-             for name, entry in FIELDS.items() if row.get(entry.column)}
-    return replace(make_network(cells), remarks=tuple(octal_remarks(row)))
+    table = read_table(path, [entry.column for entry in FIELDS.values()])
+    problems = table.faults + table.row_faults
+    if len(table.rows) != 1 and not table.row_faults:
+        where = Place(path, table.rows[1].line if table.rows else None)
+        problems.append(Problem(
+            where, f'a net file has one data row, this one has {len(table.rows)}'))
+    network = Network()
+    for row in table.rows:
+        cells = {name: (row.get(entry.column), row.where(entry.column))
+                 for name, entry in FIELDS.items() if row.get(entry.column)}
+        try:
+            network = make_network(cells)
+        except ConfigurationError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigurationError(problems)
+    return replace(network, remarks=tuple(_row_remarks(table.rows[0])))
+
+
+def _row_remarks(row: Row) -> Iterator[Problem]:
+    """Yield what is odd about the way the data row is written."""
+    yield from octal_remarks(row)
+    absent = [column for column in row.columns if column not in row.cells]
+    if absent:
+        yield Problem(Place(row.file, row.line), (
+            f'the row ends before {", ".join(absent)}: the defaults are taken'))
+    if not row.get('Com_Port'):
+        yield Problem(row.where('Com_Port'), (
+            f'Com_Port is empty, so the port is {Network().port}, unless the parameter port or '
+            'net.com_port names another'))
 
 
 def make_network(values: MappingType[str, tuple[str, Place | str]],
@@ -233,6 +257,9 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
             problems.append(problem)
     if problems:
         raise ConfigurationError(problems)
+    given = {FIELDS[name].column for name in values}
+    checked['remarks'] = tuple(
+        remark for remark in base.remarks if remark.place.column not in given)
     return Network(**checked)
 
 
@@ -242,7 +269,7 @@ def _check_port(name: str, value: int | str, where: Place | str) -> None:
             text.isdigit() and (whole_number(text) or 0) >= 1)):
         raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
                              'path such as /dev/ttyUSB0, socket://host:port, or '
-                             'rfc2217://host:port; "plc ports" lists the devices')
+                             f'rfc2217://host:port; "plc ports" lists the devices{hint(text)}')
 
 
 def _is_url(text: str) -> bool:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import math
+import re
 
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.address import Address
@@ -26,11 +27,12 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.csv_table import Row
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.station_lists import octal_remarks
 
 _ACK_SIZE = 2
+_SHORT_PERIOD = 10  # ms; what is less was meant as seconds
 
 
 def network_remarks(network: Network) -> Iterator[str]:
@@ -60,6 +62,7 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     """Yield what is odd about a row of the map, each with its place."""
     yield from octal_remarks(row)
     yield from _name_remarks(row, mapping)
+    yield from _useless_cells(row, mapping)
     address = mapping.address
     if mapping.plc_type is PlcType.SLC and not mapping.serves and mapping.processor is None \
             and not USUAL.has_file(address.file, address.file_type):
@@ -95,8 +98,29 @@ def having(address: Address) -> str:
 def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     column = 'Topic' if row.get('Topic') else 'Tag'
     text = row.get(column)
-    if text.strip('/') != mapping.topic:
-        yield _at(row, column, f'{column} "{text}" becomes the topic {mapping.topic}')
+    if text != mapping.topic:
+        below = ', below ~/read/ and ~/write/' if text.startswith('/') else ''
+        yield _at(row, column, f'{column} "{text}" becomes the topic {mapping.topic}{below}')
+
+
+def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
+    """Yield cells that have no effect, or another one than a newcomer expects."""
+    for column, has_effect in (('Period', mapping.command is not Command.WRITE),
+                               ('Publish', mapping.reads or mapping.publish is Publish.ALWAYS),
+                               ('Min', mapping.writes), ('Max', mapping.writes)):
+        if row.get(column) and not has_effect:
+            yield _at(row, column, f'{column} has no effect in a {mapping.command.value} row')
+    period = mapping.period or 0
+    if 0 < period < _SHORT_PERIOD:
+        yield _at(row, 'Period', f'Period {period} is in ms; {period} s would be {period * 1000}')
+    address = mapping.address
+    values = [f'{address.file_type.value}{address.file}:{address.element}.{name}'
+              for name, member in address.layout.members.items()
+              if member.word and member.bit is None]
+    if address.file_type.is_structure and mapping.length == 1 and address.bit is None \
+            and not re.search('[./]', row.get('Address')):
+        yield _at(row, 'Address', f'{row.get("Address")} is the control word of the element; its '
+                                  f'values are {", ".join(values)}')
 
 
 def _at(row: Row, column: str, text: str) -> Problem:

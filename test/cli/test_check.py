@@ -28,9 +28,9 @@ from abdf1_ros.paths import config_file
 import pytest
 from support.ros import write_csv
 
-NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout,Timeout'
+NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout,Timeout,Com_Port'
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
-GOOD_NET = '5,Master,9600,500,300'
+GOOD_NET = '5,Master,9600,500,300,1'
 GOOD_ROW = 'speed,Read,N7:0,1,PLC5,2,1000'
 BAD_ROWS = ('a,Read,N7,1,PLC5,,', 'b,Rad,N7:1,256,PLC5,,', 'c,Serve,N7:0,6,PLC5,,',
             'a,Read,N7:9999,1,PLC5,,')

@@ -221,7 +221,7 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
      'Peer; Mode = "Client" should be one of Master, Slave, Peer'),
     ('net.cmd_timeout', 5001,
      '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (5001) should be in range [500, 5000]; '
-     'Cmd_Timeout = "5001" should be a whole number from 500 to 5000'),
+     'Cmd_Timeout = "5001" should be a whole number from 500 to 5000 ms'),
     ('net.baud', 9601, 'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, '
                        '57600, 115200'),
     ('net.com_port', 0, 'Com_Port = "0" should be a number from 1, a device path such as '

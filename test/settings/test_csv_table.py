@@ -20,7 +20,7 @@ import os
 from pathlib import Path
 
 from abdf1_ros.problems import ConfigurationError, Place
-from abdf1_ros.settings.csv_table import read_good_rows, read_rows, Row
+from abdf1_ros.settings.csv_table import read_rows, read_table, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -194,17 +194,18 @@ def test_header_that_stands_there_twice(path: Path) -> None:
 
 def test_row_that_cannot_be_read_leaves_the_others_as_they_are(path: Path) -> None:
     path.write_bytes(b'# f\xfcr alle\nTag,Address\na,1\nb\xe4,2\nc,"3\nd,4,5\ne,5\nf,6\n')
-    rows, problems = read_good_rows(str(path), KNOWN)
-    assert [(row.item, row.get('Tag')) for row in rows] == [(1, 'a'), (5, 'e'), (6, 'f')]
-    assert [str(problem).removeprefix(f'{path}:').partition(': ')[0] for problem in problems] == [
-        '4', '5:2', '6:3']
+    table = read_table(str(path), KNOWN)
+    assert [(row.item, row.get('Tag')) for row in table.rows] == [(1, 'a'), (5, 'e'), (6, 'f')]
+    assert [str(problem).removeprefix(f'{path}:').partition(': ')[0]
+            for problem in table.row_faults] == ['4', '5:2', '6:3']
 
 
-def test_file_of_which_most_rows_are_shifted_is_refused_as_a_whole(path: Path) -> None:
+def test_file_of_which_most_rows_are_shifted_cannot_be_used(path: Path) -> None:
     path.write_text('Tag,Address\na,1\nb,2,5\nc,3,5\n', encoding='utf-8')
-    with pytest.raises(ConfigurationError) as caught:
-        read_good_rows(str(path), KNOWN)
-    assert len(caught.value.problems) == 2
+    table = read_table(str(path), KNOWN)
+    assert (len(table.faults), len(table.row_faults), table.is_usable) == (0, 2, False)
+    path.write_text('Tag,Address\na,1\nb,2,5\n', encoding='utf-8')
+    assert read_table(str(path), KNOWN).is_usable
 
 
 @pytest.mark.parametrize('content, places', [

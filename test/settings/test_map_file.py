@@ -26,9 +26,10 @@ from support.mappings import fault, faults, load_rows, load_text, row, slc
 
 
 def test_needed_column_that_the_file_does_not_have() -> None:
-    mappings, problems = load_text('Tag,Command,Address,Station\na,Read,N7:0,1\n')
-    assert mappings == []
-    assert str(problems[0]).endswith('map.csv:2 (PLC_Type): Item: 1, PLC_Type is missing')
+    with pytest.raises(ConfigurationError) as caught:
+        load_text('Tag,Command,Address,Station\na,Read,N7:0,1\nb,Read,N7:1,1\n')
+    problem, = caught.value.problems
+    assert str(problem).endswith('map.csv:1: column PLC_Type is missing, and each row needs it')
 
 
 def test_bad_row_is_left_out_and_the_rest_stays() -> None:

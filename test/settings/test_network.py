@@ -153,7 +153,7 @@ def test_choice_that_is_none(
      'ENQ_Retries = "-1" should be a whole number from 0 to 10'),
     ('Cmd_Timeout', '499',
      '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (499) should be in range [500, 5000]; '
-     'Cmd_Timeout = "499" should be a whole number from 500 to 5000'),
+     'Cmd_Timeout = "499" should be a whole number from 500 to 5000 ms'),
     ('Baud', '9601',
      'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200'),
     ('Data_Bits', '9', 'Data_Bits = "9" should be a whole number from 5 to 8'),

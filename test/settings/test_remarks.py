@@ -58,7 +58,7 @@ def test_times_that_leave_no_room(network: Network, expected: list[str]) -> None
 def test_station_with_a_leading_zero_in_either_file(
         tmp_path: Path, station: str, octal: int) -> None:
     net = tmp_path / 'net.csv'
-    net.write_text(f'Timeout,Station\n300,{station}\n', encoding='utf-8')
+    net.write_text(f'Com_Port,Station\n1,{station}\n', encoding='utf-8')
     network = load_network(str(net))
     text = (f'Station = "{station}" is {int(station)}, decimal; an octal {station} would be '
             f'{octal}')
@@ -95,10 +95,12 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     ('level,Write,N7:0,1,SLC,uint16,,0,40000,', []),
     ('level,Write,N7:0,1,SLC,,,,4000,0.1', [
         ':2:9 (Max): Max 4000 is above 3276.7, the most that int16 can hold here']),
-    ('level,Read,N7:0,1,SLC,,,,40000,', []),
+    ('level,Read,N7:0,1,SLC,,,,40000,', [':2:9 (Max): Max has no effect in a Read row']),
     ('N7:0,Read,N7:0,1,SLC,,,,,', [':2:1 (Tag): Tag "N7:0" becomes the topic N7_0']),
     ('N7:0,Read,N7:0,1,SLC,,a b,,,', [':2:7 (Topic): Topic "a b" becomes the topic a_b']),
-    ('N7:0,Read,N7:0,1,SLC,,/cell/speed,,,', []),
+    ('N7:0,Read,N7:0,1,SLC,,/cell/speed,,,', [
+        ':2:7 (Topic): Topic "/cell/speed" becomes the topic cell/speed, below ~/read/ and '
+        '~/write/']),
     ('speed,Read,N7:0,07,SLC,,,,,', []),
     ('speed,Read,N7:0,018,SLC,,,,,', [])])
 def test_row_that_is_valid_and_odd(tmp_path: Path, row: str, expected: list[str]) -> None:

@@ -1,0 +1,57 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What may be wrong with a cell that cannot be used: look-alikes, and what spreadsheets do."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+# Letters of other scripts, dashes and quotes that look like a character of ASCII.
+_ALIKE = str.maketrans(
+    'АВЕКМНОРСТХІЅаеорсухіѕΑΒΕΖΗΙΚΜΝΟΡΤΥΧο‐‑‒–—−‘’“”⁄∕',
+    'ABEKMHOPCTXISaeopcyxisABEZHIKMNOPTYXo------\'\'""//')
+_MONTH = '(?:jan|feb|mar|mär|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|dez)[a-zä]*'
+_TIME = re.compile(
+    rf'\d{{1,2}}:\d\d(?::\d\d)?(?: ?[ap]m)?|\d{{1,4}}[./-]\d{{1,2}}[./-]\d{{1,4}}|'
+    rf'\d{{1,2}}\.?[ -]{_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+', re.IGNORECASE)
+_WRAPPED = re.compile(r'="?(?P<formula>[^"]+)"?|\'(?P<text>.+)')
+_ERROR = re.compile(r'#(?:N/A|NV|DIV/0!|[A-Z]+[!?])')
+
+
+def is_spreadsheet_error(text: str) -> bool:
+    """Tell whether a cell is what a spreadsheet writes where it has no value, such as #N/A."""
+    return _ERROR.fullmatch(text) is not None
+
+
+def hint(text: str) -> str:
+    """Return what to put after the fault of a cell with this content, empty for no hint."""
+    for number, character in enumerate(text, 1):
+        if not ' ' <= character <= '~':
+            return f'; character {number} is {_name(character)}'
+    if match := _WRAPPED.fullmatch(text):
+        return f'; signs that only a spreadsheet needs: write {match["formula"] or match["text"]}'
+    if _TIME.fullmatch(text):
+        return ('; a spreadsheet may have made a date or time of it: give the column the format '
+                '"text", and write the cell again')
+    return ''
+
+
+def _name(character: str) -> str:
+    if character == '\t':
+        return 'a tab, which divides no cells here'
+    name = f'U+{ord(character):04X} {unicodedata.name(character, "")}'.rstrip()
+    plain = unicodedata.normalize('NFKC', character).translate(_ALIKE)
+    return f'{name}, not "{plain}"' if plain.isascii() and plain.isprintable() else name

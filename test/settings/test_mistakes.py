@@ -1,0 +1,214 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Mistakes of people and spreadsheets in both files, and what is told of each with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.plan.report import make_report, setting_remarks
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.network import load_network, Network
+from support.cases import for_all
+
+HEAD = 'Tag,Command,Address,Station,PLC_Type'
+
+
+def told_of_map(folder: Path, text: str) -> list[str]:
+    """Return all that is told of a map, faults first; what begins with "!" is a fault."""
+    path = folder / 'map.csv'
+    path.write_text(text, encoding='utf-8')
+    try:
+        mappings, problems = load_mappings(str(path))
+    except ConfigurationError as error:
+        mappings, problems = [], error.problems
+    report = make_report(Network(com_port='1'), mappings, 1.0)
+    remarks = [remark.text for remark in report.remarks()] if mappings else []
+    return [text.replace(f'{path}:', '') for text in [
+        *(f'!{problem}' for problem in problems), *remarks]]
+
+
+def told_of_net(folder: Path, text: str) -> list[str]:
+    """Return all that is told of a net file."""
+    path = folder / 'net.csv'
+    path.write_text(text, encoding='utf-8')
+    try:
+        told = [remark.text for remark in setting_remarks(load_network(str(path)), ())]
+    except ConfigurationError as error:
+        told = [f'!{problem}' for problem in error.problems]
+    return [text.replace(f'{path}:', '') for text in told]
+
+
+ADDRESS = '!2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax '
+FORM = 'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'
+SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the column the format '
+               '"text", and write the cell again')
+
+
+@for_all(('address', 'expected'), [
+    ('07:00:00', FORM + SPREADSHEET), ('7:00 PM', FORM + SPREADSHEET),
+    ('03. May', FORM + SPREADSHEET), ('3-May', FORM + SPREADSHEET),
+    ('Mrz 05', FORM), ('05.03.2026', FORM + SPREADSHEET),
+    ('"=""N7:0"""', FORM + '; signs that only a spreadsheet needs: write N7:0'),
+    ("'N7:0", FORM + '; signs that only a spreadsheet needs: write N7:0'),
+    ('N7:0 - N7:9', 'write N7:0, and Length 10'), ('N7:0..9', 'write N7:0, and Length 10'),
+    ('N7:0...N7:9', 'write N7:0, and Length 10'), ('N7:0 to N7:9', 'write N7:0, and Length 10'),
+    ('N7:0 L10', 'write N7:0, and Length 10'), ('N7:10 [10]', 'write N7:10, and Length 10'),
+    ('Ν7:0', FORM + '; character 1 is U+039D GREEK CAPITAL LETTER NU, not "N"'),
+    ('В3:0', FORM + '; character 1 is U+0412 CYRILLIC CAPITAL LETTER VE, not "B"'),
+    ('N７:0', FORM + '; character 2 is U+FF17 FULLWIDTH DIGIT SEVEN, not "7"'),
+    ('N7：0', FORM + '; character 3 is U+FF1A FULLWIDTH COLON, not ":"'),
+    ('N7:0–9', FORM + '; character 5 is U+2013 EN DASH, not "-"'),
+    ('N7:\u200b0', FORM + '; character 4 is U+200B ZERO WIDTH SPACE'),
+    ('N7:\u00a00', FORM + '; character 4 is U+00A0 NO-BREAK SPACE, not " "')])
+def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str) -> None:
+    told, = told_of_map(tmp_path, f'{HEAD}\na,Read,{address},1,SLC\n')
+    assert told.startswith(ADDRESS)
+    assert told.endswith(f'); {expected}')
+
+
+@for_all(('text', 'expected'), [
+    (f'{HEAD}\n#N/A,Read,N7:0,1,SLC\n', [
+        '!2:1: "#N/A" is what a spreadsheet writes where it has no value']),
+    (f'{HEAD}\n#REF!;x\na,Read,N7:0,1,SLC\n', [
+        '!2: this row is one cell; its cells need a comma between them, outside of quotes']),
+    (f'{HEAD}\n# N/A stays a comment\na,Read,N7:0,1,SLC\n', []),
+    (f'{HEAD}\na,Read,#NAME?,1,SLC\nb,Read,N7:1,1,SLC\n', [
+        '!2:3: "#NAME?" is what a spreadsheet writes where it has no value']),
+    (f'{HEAD}\na,Read\tN7:0,N7:0,1,SLC\n', [
+        r'!2:2 (Command): Item: 1, Command = "Read\tN7:0" should be one of Read, Write, ReadWrite,'
+        ' Serve, Heartbeat; character 5 is a tab, which divides no cells here']),
+    (f'{HEAD}\na,Reаd,N7:0,1,SLC\n', [
+        '!2:2 (Command): Item: 1, Command = "Reаd" should be one of Read, Write, ReadWrite, '
+        'Serve, Heartbeat; character 3 is U+0430 CYRILLIC SMALL LETTER A, not "a"']),
+    (f'{HEAD}\na,Read,N7:0,１,SLC\n', [
+        '!2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (１) must be less '
+        'than 255; Station = "１" should be a whole number from 0 to 254; character 1 is U+FF11 '
+        'FULLWIDTH DIGIT ONE, not "1"']),
+    ('Tag,Command,Address,PLC_Type\na,Read,N7:0,SLC\nb,Read,N7:1,SLC\nc,Rad,N7:2,SLC\n', [
+        '!1: column Station is missing, and each row needs it']),
+    ('Tag,Command,Address,Statoin,PLC_Type\na,Read,N7:0,1,SLC\n', [
+        '!1:4: unknown column "Statoin"; did you mean Station?']),
+    (f'{HEAD},Тype\na,Read,N7:0,1,SLC,\n', [
+        '!1:6: unknown column "Тype"; character 1 is U+0422 CYRILLIC CAPITAL LETTER TE, not "T"']),
+    (f'{HEAD},Lenght\na,Rad,N7:0,1,SLC,2\nb,Read,N7:0,256,SLC,\n', [
+        '!1:6: unknown column "Lenght"; did you mean Length?',
+        '!2:2 (Command): Item: 1, Command = "Rad" should be one of Read, Write, ReadWrite, Serve, '
+        'Heartbeat',
+        '!3:4 (Station): 2501 ERR_BAD_STATION: Item: 2, Invalid station number (256) must be less '
+        'than 255; Station = "256" should be a whole number from 0 to 254']),
+    (f'{HEAD},Type\na,Read,N7:255,1,SLC,int32\n', [
+        '!2 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:255, len=1); '
+        '1 int32 from N7:255 on take 2 words; the last word there can be is N7:255']),
+    (f'{HEAD},Period\na,Read,N7:0,1,SLC,0.5\n', [
+        '!2:6 (Period): Item: 1, Period = "0.5" should be a whole number from 0 to 86400000 ms']),
+])
+def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -> None:
+    assert told_of_map(tmp_path, text) == expected
+
+
+@for_all(('text', 'expected'), [
+    (f'{HEAD}\na,Write,N7:0,1,SLC\nb,Write,N7:0,1,SLC\n', [
+        'line 3 of the map: b writes N7:0, of which a writes a part or all too: each undoes what '
+        'the other has written']),
+    (f'{HEAD},Length\na,Write,N7:0,1,SLC,5\nb,ReadWrite,N7:4,1,SLC,\nc,Write,N7:5,1,SLC,\n', [
+        'line 3 of the map: b writes N7:4, of which a writes a part or all too: each undoes what '
+        'the other has written']),
+    (f'{HEAD}\nword,Write,B3:0,1,SLC\nbit,Write,B3:0/5,1,SLC\nsame,Write,B3:1/5,1,SLC\n'
+     'next,Write,B3:1/6,1,SLC\n', [
+        'line 3 of the map: bit writes B3:0/5, of which word writes a part or all too: each '
+        'undoes what the other has written']),
+    (f'{HEAD},Min,Max\na,Read,N7:0,1,SLC,1,5\n', [
+        '2:6 (Min): Min has no effect in a Read row', '2:7 (Max): Max has no effect in a Read row',
+    ]),
+    (f'{HEAD},Period,Publish\na,Write,N7:0,1,SLC,100,Change\n', [
+        '2:6 (Period): Period has no effect in a Write row',
+        '2:7 (Publish): Publish has no effect in a Write row']),
+    (f'{HEAD},Topic\na,Read,N7:0,1,SLC,/cell/x\n', [
+        '2:6 (Topic): Topic "/cell/x" becomes the topic cell/x, below ~/read/ and ~/write/']),
+    (f'{HEAD}\na,Read,T4:0,1,SLC\nb,Read,T4:0.ACC,1,SLC\nc,Read,T4:0/DN,1,SLC\n', [
+        '2:3 (Address): T4:0 is the control word of the element; its values are T4:0.PRE, '
+        'T4:0.ACC']),
+    (f'{HEAD},Length\na,Read,C5:0,1,PLC5,3\n', []),
+    (f'{HEAD}\nSpeed,Read,N7:0,1,SLC\nspeed,Read,N7:1,1,SLC\nspeeds,Read,N7:2,1,SLC\n', [
+        'tags that differ only in capital and small letters: Speed, speed']),
+    (f'{HEAD}\na,Read,L9:0,1,SLC\n', [
+        '2:3 (Address): L9:0: a 5/03, for which an empty Processor stands, has no such file; '
+        'ML1100, ML1200, ML1400, ML1500 may have it']),
+])
+def test_what_is_odd_in_a_map(tmp_path: Path, text: str, expected: list[str]) -> None:
+    assert told_of_map(tmp_path, text) == expected
+
+
+def test_period_that_was_meant_as_seconds(tmp_path: Path) -> None:
+    told = told_of_map(tmp_path, f'{HEAD},Period\na,Read,N7:0,1,SLC,1\nb,Read,N7:1,1,SLC,100\n')
+    assert told[0] == '2:6 (Period): Period 1 is in ms; 1 s would be 1000'
+    assert '3:6 (Period)' not in ' '.join(told)
+
+
+BEAT = f'{HEAD},Topic,Requires,Requires_Timeout\n'
+NO_TOPIC = '!2:7 (Requires): Item: 1, no good Write, ReadWrite or Serve row has the topic '
+
+
+@for_all(('requires', 'expected'), [
+    ('"speed,lamp"', '"speed,lamp"; put spaces between topics'),
+    ('speed;lamp', '"speed;lamp"; put spaces between topics'),
+    ('level', '"level": it is one that we publish; name topics whose messages we get'),
+    ('~/write/lamp', '"~/write/lamp"; did you mean lamp?'),
+    ('lamp_1', '"lamp_1"; did you mean lamp?'), ('door', '"door"')])
+def test_requires_that_names_no_write_topic(tmp_path: Path, requires: str, expected: str) -> None:
+    told = told_of_map(tmp_path, (
+        f'{BEAT}beat,Heartbeat,N10:0,1,SLC,,{requires},1000\nspeed,Write,N7:0,1,SLC,,,\n'
+        'lamp_1,Write,B3:0/1,1,SLC,lamp,,\nlevel,Read,N7:1,1,SLC,,,\n'))
+    assert [text for text in told if text.startswith('!')] == [NO_TOPIC + expected]
+
+
+@for_all(('text', 'expected'), [
+    ('Com_Port,BaudRate\n1,9600\n', ['!1:2: unknown column "BaudRate"; did you mean Baud?']),
+    ('Com_Port,Station No\n1,5\n', ['!1:2: unknown column "Station No"; did you mean Station?']),
+    ('Com_Port,Cmd Timeout\n1,5\n', [
+        '!1:2: unknown column "Cmd Timeout"; did you mean Cmd_Timeout?']),
+    ('Station,5\nMode,Peer\nBaud,19200\n', [
+        '!1: the names of the columns stand below each other here; they belong side by side into '
+        'one row, and the values into the row below it']),
+    ('Name;Value\nStation;5\nMode;Peer\n', [
+        '!1: the names of the columns stand below each other here; they belong side by side into '
+        'one row, and the values into the row below it']),
+    ('Station\n5\n', [
+        '2 (Com_Port): Com_Port is empty, so the port is /dev/ttyS0, unless the parameter port or '
+        'net.com_port names another']),
+    ('Station,Com_Port\n5,\n', [
+        '2:2 (Com_Port): Com_Port is empty, so the port is /dev/ttyS0, unless the parameter port '
+        'or net.com_port names another']),
+    ('Com_Port,Station,Baud,Mode\n/dev/ttyUSB0,5\n', [
+        '2: the row ends before Baud, Mode: the defaults are taken']),
+    ('Com_Port,Timeout\n1,1 s\n', [
+        '!2:2 (Timeout): Timeout = "1 s" should be a whole number from 0 to 360000 ms']),
+    ('Com_Port,Mode\n1,Peеr\n', [
+        '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Peеr), should be one of '
+        'Master, Slave, or Peer; Mode = "Peеr" should be one of Master, Slave, Peer; character 3 '
+        'is U+0435 CYRILLIC SMALL LETTER IE, not "e"']),
+])
+def test_what_is_told_of_a_net_file(tmp_path: Path, text: str, expected: list[str]) -> None:
+    assert told_of_net(tmp_path, text) == expected
+
+
+def test_every_fault_of_a_net_file_is_told_whatever_else_is_wrong(tmp_path: Path) -> None:
+    text = ('Station,Colour,Mode,Baud,Parity,Baud\n999,red,Boss,1,x,5\n6,red,Slave,2,None,5\n'
+            '7,red,Slave,9600,None,5,6\n')
+    assert [told.partition(': ')[0] for told in told_of_net(tmp_path, text)] == [
+        '!1:2', '!1:6', '!4:7', '!2:1 (Station)', '!2:3 (Mode)', '!2:4 (Baud)', '!2:5 (Parity)',
+        '!3:4 (Baud)']
