@@ -320,7 +320,7 @@ def _times_text(report: Report) -> str:
             f'{response:g} ms for each answer of a PLC\n'
             f'load of the line: {report.load:.0%} of the time is needed to keep the periods\n'
             f'longest transaction: {report.longest_transaction * 1000:.0f} ms with all repetitions'
-            + ''.join(f'\n{printable(str(bound))}' for bound in report.bounds))
+            + ''.join(f'\n{printable(str(line))}' for line in (*report.bounds, *report.advice)))
 
 
 def _json(found: Findings, report: Report | None) -> str:
@@ -358,7 +358,9 @@ def _problem(problem: Problem) -> dict[str, Any]:
 
 def _bound(bound: Bound) -> dict[str, Any]:
     return {'tag': bound.mapping.tag, 'command': bound.mapping.command.value,
-            'ms': None if bound.seconds is None else _ms(bound.seconds)}
+            'ms': None if bound.seconds is None else _ms(bound.seconds),
+            'usual_ms': None if bound.usual is None else _ms(bound.usual),
+            'presets': bound.presets}
 
 
 def _remark(remark: Remark) -> dict[str, Any]:

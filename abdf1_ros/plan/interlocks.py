@@ -22,12 +22,13 @@ settings allow, with all repetitions. Times are in seconds.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+import math
 
+from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
-from abdf1_ros.plan.line_model import LineModel
-from abdf1_ros.plan.planner import Planner
+from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
@@ -41,8 +42,26 @@ ANSWERS_IN_TIME = 3
 # A counter has to be read so often within its Heartbeat_Timeout (rule 14).
 _READS_IN_TIME = 3
 
+# After so many heartbeats and fallbacks in a row a read has its turn (rule 11).
+OWN_IN_A_ROW = 7
+
+# The time base (s) of the PLC's timers; so many units of it rung 5 is longer than rung 3.
+TIME_BASE = 0.01
+STABLE = 100
+
 # A poll, and DLE EOT as the answer.
 _POLL_CHARACTERS = 6
+
+# After so many characters of silence a message has broken off; the pauses of a peer (s).
+_QUIET_CHARACTERS = 10
+_LATE_RESPONSE = 0.1
+_NAK_PAUSE = 0.25
+
+# A heartbeat with a shorter Period (ms) may be quicker than a PLC's scan.
+_SHORT_PERIOD = 200
+
+# What is worth mentioning to be so much shorter.
+_WORTH_IT = 0.9
 
 _STATUS_BYTES = 1, 26  # of the command after TNS, and of the longest usual reply
 
@@ -50,63 +69,171 @@ _STATUS_BYTES = 1, 26  # of the command after TNS, and of the longest usual repl
 @dataclass(frozen=True, slots=True)
 class Bound:
     """
-    The bound of a row (rule 16), in seconds.
+    The times of a row (rule 16), in seconds.
 
-    For a row with Fallback: how long its outputs keep their value at most without a message; None
-    where a master of the line decides that. For a heartbeat: the preset for the timer in the PLC.
+    For a row with Fallback ``seconds`` is how long its outputs keep their value at most without a
+    message, and ``usual`` how long where no frame gets lost; None where a master of the line
+    decides that. For a heartbeat ``seconds`` is the preset for the watchdog in the PLC.
     """
 
     mapping: Mapping
     seconds: float | None
+    usual: float | None = None
+
+    @property
+    def presets(self) -> tuple[int, int] | None:
+        """Return the presets of rungs 3 and 5 in units of 10 ms, None where there are none."""
+        if self.mapping.heartbeat is None or self.seconds is None:
+            return None
+        watchdog = math.ceil(round(self.seconds / TIME_BASE, 6))
+        return watchdog, watchdog + STABLE
 
     def __str__(self) -> str:
         """Return it in words, with times in ms."""
         tag, station = self.mapping.tag, self.mapping.station
-        if self.mapping.heartbeat is not None:
-            return f'heartbeat {tag}, station {station}: PLC timer preset {_ms(self.seconds)}'
+        if self.presets is not None:
+            watchdog, stable = self.presets
+            return (f'heartbeat {tag}, station {station}: PLC timer presets {watchdog} (watchdog, '
+                    f'rung 3) and {stable} (rung 5), time base 0.01 s')
+        kind = 'heartbeat' if self.mapping.heartbeat else 'fallback of'
         if self.seconds is None:
-            return f'fallback of {tag}, station {station}: no bound, its master decides'
-        return f'fallback of {tag}, station {station}: written after {_ms(self.seconds)} at most'
+            return f'{kind} {tag}, station {station}: no bound, its master decides'
+        usual = '' if self.usual is None else f', {_ms(self.usual)} where no frame gets lost'
+        return f'{kind} {tag}, station {station}: written after {_ms(self.seconds)} at most{usual}'
 
 
-def _ms(seconds: float | None) -> str:
-    return 'has no bound' if seconds is None else f'{seconds * 1000:.0f} ms'
+def _ms(seconds: float) -> str:
+    return f'{seconds * 1000:.0f} ms'
 
 
-def bounds(network: Network, mappings: Sequence[Mapping],
-           response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[Bound]:
-    """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
-    longest = longest_transaction(network, mappings, response_time)
-    fallbacks = sum(write_time(network, mapping, response_time)
-                    for mapping in mappings if mapping.fallback and not mapping.serves)
-    beats = sum(write_time(network, mapping, response_time)
-                for mapping in mappings if mapping.heartbeat)
-    for mapping in mappings:
-        if mapping.fallback is not None:
-            after = mapping.fallback.after / 1000
-            if mapping.serves:
-                yield Bound(mapping, after)
-            elif network.mode == 'Slave':
-                yield Bound(mapping, None)
-            else:
-                scan = _poll_scan(network, mappings, response_time)
-                yield Bound(mapping, after + longest + fallbacks + scan)
-        elif mapping.heartbeat is not None and mapping.period is not None:
-            period = mapping.period / 1000
-            # The response time stands for the scan of the PLC.
-            preset = max(3 * period, period + 2 * longest + beats + response_time)
-            yield Bound(mapping, None if network.mode == 'Slave' else preset)
+class Times:
+    """
+    What heartbeats and fallbacks of a line can promise.
+
+    ``blocks`` is what is read, ``response_time`` the seconds that a station usually takes for an
+    answer. ``longest`` is T (s).
+    """
+
+    def __init__(self, network: Network, mappings: Sequence[Mapping], blocks: Sequence[Block] = (),
+                 response_time: float = forecast.USUAL_RESPONSE_TIME) -> None:
+        self._network = network
+        self._mappings = mappings
+        self._own = [mapping for mapping in mappings
+                     if (mapping.heartbeat or mapping.fallback) and not mapping.serves]
+        self._blocks = blocks
+        self._response_time = response_time
+        self._is_standard = network.mode == 'Master' and network.polling == 'Standard'
+        own = max((max(_packets(network, mapping)) for mapping in self._own), default=0.0)
+        read = max((forecast.longest_wait([block], 0.0) for block in blocks), default=0.0)
+        written = max((max(_packets(network, mapping)) for mapping in mappings
+                       if mapping.writes and not mapping.serves), default=0.0)
+        self._frames = own
+        self._any_frames = max(own, read, written, _question_time(network, 0.0))
+        self.longest = forecast.longest_transaction(network) + own
+
+    def bounds(self) -> Iterator[Bound]:
+        """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
+        return (self._bound(mapping) for mapping in self._mappings
+                if mapping.fallback is not None or mapping.heartbeat is not None)
+
+    def _bound(self, mapping: Mapping) -> Bound:
+        if mapping.fallback is None:
+            return Bound(mapping, None if self._network.mode == 'Slave' else self._preset(mapping))
+        after = mapping.fallback.after / 1000
+        if mapping.serves:
+            return Bound(mapping, after)
+        if self._network.mode == 'Slave':
+            return Bound(mapping, None)
+        return Bound(mapping, after + self._wait(mapping), after + self._usual_wait(mapping))
+
+    def _preset(self, mapping: Mapping) -> float:
+        assert mapping.period is not None
+        period = mapping.period / 1000
+        beats = sum(write_time(self._network, other, self._response_time)
+                    for other in self._own if other.heartbeat)
+        # The response time stands for the scan of the PLC.
+        return max(3 * period, period + 2 * self.longest + beats + self._response_time)
+
+    def _wait(self, mapping: Mapping) -> float:
+        """Return how long a fallback that is due may have to wait, and take, at most (s)."""
+        # In standard polling the others have the line meanwhile; that is in each scan.
+        own = [other for other in self._own
+               if not self._is_standard or other.station == mapping.station]
+        writes = sum(len(_packets(self._network, other)) for other in own)
+        reads = 1 + (writes - 1) // OWN_IN_A_ROW
+        if self._is_standard and len(own) < len(self._own):
+            reads = writes  # others may have had the writes between two reads
+        # What is under way, the reads that have a turn in between, and all of ours.
+        return (1 + reads) * self._at_most(self._any_frames) + writes * self._at_most(self._frames)
+
+    def _usual_wait(self, mapping: Mapping) -> float:
+        zeros = [other for other in self._own
+                 if other.heartbeat and other.station == mapping.station]
+        return forecast.longest_wait(self._blocks, self._response_time) + sum(
+            write_time(self._network, other, self._response_time) for other in [*zeros, mapping]
+        ) + (1 + len(zeros)) * self._poll_scan()
+
+    def _at_most(self, frames: float) -> float:
+        """Return the seconds of a transaction whose ``frames`` take so long (s) on the line."""
+        network, char_time = self._network, self._network.timing.char_time
+        longest = max(network.nak_retries, network.enq_retries) + 1
+        # A frame that breaks off is over after a pause, and a peer pauses after NAKs and retries.
+        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time
+        total = forecast.longest_transaction(network) + longest * (frames + quiet)
+        if network.mode == 'Peer':
+            total += _LATE_RESPONSE + _NAK_PAUSE * sum(range(network.nak_retries))
+        timeout = network.timeout / 1000
+        deliver = (network.nak_retries + 1) * (timeout + frames)
+        if any(mapping.serves for mapping in self._mappings):
+            total += deliver  # of a reply of ours, which takes turns with our commands
+        if not self._is_standard:
+            return total
+        stations = {mapping.station for mapping in self._mappings if not mapping.serves}
+        poll = (network.enq_retries + 1) * (timeout + self._any_frames + quiet)
+        # It leaves within a scan, and is polled for until Cmd_Timeout and for one scan more.
+        return total + 2 * len(stations) * (poll + deliver)
+
+    def _poll_scan(self) -> float:
+        """Return the seconds of one poll of every station, where these are polled in turns."""
+        if not self._is_standard:
+            return 0.0
+        stations = {mapping.station for mapping in self._mappings if not mapping.serves}
+        timing = self._network.timing
+        return len(stations) * (
+            _POLL_CHARACTERS * timing.char_time + timing.tx_delay + self._response_time)
+
+    def advice(self) -> Iterator[str]:
+        """Yield which setting would shorten bounds and presets most, if that is worth it."""
+        network = self._network
+        ways = {'Timeout 100': replace(network, timeout=100),
+                'Cmd_Timeout 500': replace(network, cmd_timeout=500),
+                'NAK_Retries 1': replace(network, nak_retries=1),
+                'ENQ_Retries 1': replace(network, enq_retries=1),
+                'Baud 19200': replace(network, baud=19200),
+                'Polling Message': replace(network, polling='Message')}
+        least, way = min((Times(other, self._mappings, self._blocks)._worst, way)
+                         for way, other in ways.items())
+        if least < _WORTH_IT * self._worst:
+            yield (f'{way} would shorten the longest of these times most, from '
+                   f'{_ms(self._worst)} to {_ms(least)}')
+
+    @property
+    def _worst(self) -> float:
+        return max((self._bound(mapping).seconds or 0.0 for mapping in self._own), default=0.0)
 
 
 def remarks(network: Network, mappings: Sequence[Mapping],
             response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
-    """Yield remarks on the times of heartbeats and fallbacks (rule 16)."""
-    longest = longest_transaction(network, mappings, response_time)
+    """Yield remarks on the times of heartbeats and fallbacks (rules 2 and 16)."""
+    longest = Times(network, mappings, (), response_time).longest
     for mapping in mappings:
-        if mapping.heartbeat is not None and mapping.period is not None \
-                and longest > mapping.period / 1000:
-            yield (f'{mapping.tag}: one transaction may take {_ms(longest)}, its Period is '
-                   f'{mapping.period} ms; shorten Timeout, Cmd_Timeout or the retries')
+        if mapping.heartbeat is not None and mapping.period is not None:
+            if longest > mapping.period / 1000:
+                yield (f'{mapping.tag}: one transaction may take {_ms(longest)}, its Period is '
+                       f'{mapping.period} ms; shorten Timeout, Cmd_Timeout or the retries')
+            if mapping.period < _SHORT_PERIOD:
+                yield (f'{mapping.tag}: a Period of {mapping.period} ms may be shorter than a '
+                       'scan of the PLC, which then misses values')
         if mapping.fallback is not None and not mapping.serves \
                 and mapping.fallback.after / 1000 < 2 * longest:
             yield (f'{mapping.tag}: Fallback_After {mapping.fallback.after} ms is shorter than '
@@ -116,22 +243,23 @@ def remarks(network: Network, mappings: Sequence[Mapping],
 def write_time(network: Network, mapping: Mapping,
                response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
     """Return the seconds that a write of a row takes, answers included."""
+    packets = _packets(network, mapping)
+    return sum(packets) + len(packets) * forecast.ANSWERS * response_time
+
+
+def _packets(network: Network, mapping: Mapping) -> list[float]:
+    """Return the line time (s) of each transaction of a write of a row."""
     model, dialect = forecast.line_model(network), mapping.dialect
     address, words = mapping.address, mapping.codec.words
-    bodies: list[bytes] = []
     if mapping.type is ValueType.BOOL:
-        bodies += [dialect.write_bits(address.at_offset(address.offset + number), 0, 0)[1]
-                   for number in range(words)]
+        bodies = [dialect.write_bits(address.at_offset(address.offset + number), 0, 0)[1]
+                  for number in range(words)]
     else:
         step = dialect.max_write(address.file_type)
-        bodies += [dialect.write(address.at_offset(address.offset + first),
-                                 bytes(2 * min(step, words - first)))[1]
-                   for first in range(0, words, step)]
-    return sum(_time(model, len(body), 0, response_time) for body in bodies)
-
-
-def _time(model: LineModel, command: int, reply: int, response_time: float) -> float:
-    return model.transaction_time(command, reply) + forecast.ANSWERS * response_time
+        bodies = [dialect.write(address.at_offset(address.offset + first),
+                                bytes(2 * min(step, words - first)))[1]
+                  for first in range(0, words, step)]
+    return [model.transaction_time(len(body), 0) for body in bodies]
 
 
 def own_load(network: Network, mappings: Iterable[Mapping], default_period: float,
@@ -161,7 +289,8 @@ def _asked(mappings: Iterable[Mapping], default_period: float) -> dict[int, floa
 
 def _question_time(network: Network, response_time: float) -> float:
     """Return the seconds that it takes to ask a station for its mode."""
-    return _time(forecast.line_model(network), *_STATUS_BYTES, response_time)
+    return forecast.line_model(network).transaction_time(*_STATUS_BYTES) \
+        + forecast.ANSWERS * response_time
 
 
 def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
@@ -173,23 +302,6 @@ def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
             part = _question_time(network, response_time) / period
             yield (f'Publish_While RUN: asking station {station} for its mode about every '
                    f'{_ms(period)} takes {part:.0%} of the time')
-
-
-def longest_transaction(network: Network, mappings: Iterable[Mapping],
-                        response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
-    """Return T: the longest transaction of the settings plus the time of our longest write."""
-    return forecast.longest_transaction(network) + max(
-        (write_time(network, mapping, response_time) for mapping in mappings
-         if mapping.heartbeat or mapping.fallback), default=0.0)
-
-
-def _poll_scan(network: Network, mappings: Iterable[Mapping], response_time: float) -> float:
-    """Return the seconds of one poll of every station, where these are polled in turns."""
-    if network.mode != 'Master' or network.polling != 'Standard':
-        return 0.0
-    stations = {mapping.station for mapping in mappings if not mapping.serves}
-    poll = _POLL_CHARACTERS * network.timing.char_time + network.timing.tx_delay + response_time
-    return len(stations) * poll
 
 
 def guard_faults(mappings: Sequence[Mapping], planner: Planner,

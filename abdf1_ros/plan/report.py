@@ -93,12 +93,21 @@ class Report:
     @property
     def longest_transaction(self) -> float:
         """Return T: the seconds of the longest transaction, with every repetition."""
-        return interlocks.longest_transaction(self.network, self.mappings, self.response_time)
+        return self._times.longest
 
     @property
     def bounds(self) -> list[interlocks.Bound]:
         """Return the bounds of heartbeats and fallbacks."""
-        return list(interlocks.bounds(self.network, self.mappings, self.response_time))
+        return list(self._times.bounds())
+
+    @property
+    def _times(self) -> interlocks.Times:
+        return interlocks.Times(self.network, self.mappings, self.blocks, self.response_time)
+
+    @property
+    def advice(self) -> list[str]:
+        """Return what would shorten the bounds, empty for nothing."""
+        return list(self._times.advice())
 
     def promises(self, stale_after: float) -> dict[Mapping, float]:
         """Return the stale time (s) of each row that we read and that promises to publish."""

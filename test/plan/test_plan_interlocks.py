@@ -16,8 +16,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+import math
+
 from abdf1_ros.plan.forecast import line_model, longest_transaction
-from abdf1_ros.plan.interlocks import bounds, guard_faults, own_load, remarks, write_time
+from abdf1_ros.plan.interlocks import guard_faults, own_load, remarks, Times, write_time
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -55,43 +58,86 @@ def test_write_of_a_word_is_counted_by_its_frames() -> None:
     assert write_time(QUICK, mapping, 0.01) == pytest.approx(characters * 10 / 19200 + 0.02)
 
 
-def test_rule_16_bound_of_a_fallback() -> None:
-    rows = [speed(), beat()]
-    own = write_time(QUICK, rows[0])
-    longest = 1.3 + max(own, write_time(QUICK, rows[1]))
-    first, _ = bounds(QUICK, rows)
-    assert first.seconds == pytest.approx(3.0 + longest + own)
-    assert str(first).startswith('fallback of speed, station 1: written after 4')
+def at_most(line_time: float) -> float:
+    """Return the seconds of a transaction on QUICK: twice the frames, and what breaks off."""
+    return 1.3 + 2 * (line_time + 0.02 + 10 * 10 / 19200)
 
 
-def test_rule_16_standard_polling_adds_a_poll_scan_and_slave_has_no_bound() -> None:
+@pytest.mark.parametrize('others, reads', [(0, 1), (5, 1), (6, 2)])
+def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, reads: int) -> None:
+    more = [make_mapping(f'N7:{number}', 'Write', fallback=Fallback((0,), 500), station=2)
+            for number in range(1, others + 1)]
+    rows = [speed(), beat(), *more]
+    question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
+    first = next(Times(QUICK, rows).bounds())
+    own = at_most(write_time(QUICK, rows[0], 0.0))
+    # What is under way, reads that have a turn, and our own writes, heartbeat 0 among them.
+    assert first.seconds == pytest.approx(
+        3.0 + (1 + reads) * at_most(question) + (2 + others) * own)
+    assert first.usual == pytest.approx(3.0 + write_time(QUICK, rows[0]) + write_time(
+        QUICK, rows[1]))
+    assert str(first) == (f'fallback of speed, station 1: written after '
+                          f'{first.seconds * 1000:.0f} ms at most, {first.usual * 1000:.0f} ms '
+                          'where no frame gets lost')
+
+
+def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> None:
     rows = [speed(), *(make_mapping('N7:9', station=station) for station in range(2, 12))]
-    message, = bounds(QUICK, rows)
-    standard, = bounds(Network(timeout=200, cmd_timeout=500, nak_retries=1, enq_retries=1,
-                               baud=19200, polling='Standard'), rows)
-    assert message.seconds and standard.seconds
-    assert standard.seconds - message.seconds == pytest.approx(11 * (60 / 19200 + 0.01))
-    slave, = bounds(Network(mode='Slave'), rows[:1])
+    message, = Times(QUICK, rows).bounds()
+    standard, = Times(replace(QUICK, polling='Standard'), rows).bounds()
+    assert message.seconds and standard.seconds and message.usual and standard.usual
+    assert standard.usual - message.usual == pytest.approx(11 * (60 / 19200 + 0.01))
+    # Of each station a poll and a command with all their retries, in two scans a transaction;
+    # three transactions: what is under way, a read and the fallback.
+    assert standard.seconds - message.seconds > 3 * 2 * 11 * 4 * 0.2
+    slave, = Times(Network(mode='Slave'), rows[:1]).bounds()
     assert (slave.seconds, str(slave)) == (
         None, 'fallback of speed, station 1: no bound, its master decides')
 
 
+def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
+    served = make_mapping('N7:50', 'Serve', station=5, tag='served')
+    alone, = Times(QUICK, [speed()]).bounds()
+    beside, = Times(QUICK, [speed(), served]).bounds()
+    assert alone.seconds and beside.seconds
+    assert beside.seconds - alone.seconds > 3 * 2 * 0.2
+
+
 def test_rule_16_fallback_of_our_own_table_needs_no_line() -> None:
-    bound, = bounds(Network(), [speed(500, 'Serve', station=5)])
+    bound, = Times(Network(), [speed(500, 'Serve', station=5)]).bounds()
     assert bound.seconds == 0.5
 
 
 @pytest.mark.parametrize('period, factor', [(100, None), (60_000, 3)])
 def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
     mapping = beat(period)
-    bound, = bounds(QUICK, [mapping], 0.01)
+    bound, = Times(QUICK, [mapping], (), 0.01).bounds()
     own = write_time(QUICK, mapping, 0.01)
-    longer = period / 1000 + 2 * (1.3 + own) + own + 0.01
+    longer = period / 1000 + 2 * (1.3 + write_time(QUICK, mapping, 0.0)) + own + 0.01
     assert bound.seconds == pytest.approx(factor * period / 1000 if factor else longer)
-    assert str(bound).startswith('heartbeat beat, station 1: PLC timer preset ')
+    watchdog = 18_000 if factor else math.ceil(longer * 100)
+    assert bound.presets == (watchdog, watchdog + 100)
+    assert str(bound) == (f'heartbeat beat, station 1: PLC timer presets {watchdog} (watchdog, '
+                          f'rung 3) and {watchdog + 100} (rung 5), time base 0.01 s')
+
+
+@pytest.mark.parametrize('network, way', [
+    (Network(baud=19200), 'Timeout 100'), (replace(QUICK, cmd_timeout=5000), 'Cmd_Timeout 500'),
+    (replace(QUICK, timeout=100, nak_retries=9), 'NAK_Retries 1'),
+    (replace(QUICK, timeout=100, enq_retries=9), 'ENQ_Retries 1'),
+    (replace(QUICK, timeout=100, baud=1200), 'Baud 19200'),
+    (replace(QUICK, timeout=100, polling='Standard'), 'Polling Message'),
+    (replace(QUICK, timeout=100), '')])
+def test_rule_16_says_which_setting_shortens_the_times_most(network: Network, way: str) -> None:
+    rows = [speed(200), beat(100)]
+    advice = list(Times(network, rows).advice())
+    assert len(advice) == bool(way)
+    assert all(text.startswith(f'{way} would shorten the longest of these times most, from ')
+               for text in advice)
 
 
 def test_rule_16_warnings() -> None:
+    assert [text for text in remarks(QUICK, [beat(150)]) if 'shorter than a scan' in text]
     slow = list(remarks(Network(), [beat(), speed()]))
     assert len(slow) == 2
     assert 'one transaction may take 90' in slow[0]
