@@ -39,10 +39,12 @@ _HERE = Path(__file__).parent
 # and let them spin for 0.1 s.
 os.environ['OPENBLAS_NUM_THREADS'] = '1'
 
-settings.register_profile(
-    'abdf1_ros', derandomize=True, max_examples=150, deadline=None, database=None,
-    suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile('abdf1_ros')
+# The same examples each time, but for "make long", which is after new ones and keeps what fails.
+_EXAMPLES = {'max_examples': 150, 'deadline': None,
+             'suppress_health_check': [HealthCheck.too_slow]}
+settings.register_profile('same', derandomize=True, database=None, **_EXAMPLES)
+settings.register_profile('new', **_EXAMPLES)
+settings.load_profile(os.environ.get('ABDF1_ROS_EXAMPLES', 'same'))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

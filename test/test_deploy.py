@@ -102,9 +102,10 @@ def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(
     install, etc = tmp_path / 'install', tmp_path / 'etc'
     executable = install / 'lib' / 'abdf1_ros' / command
     executable.parent.mkdir(parents=True)
-    executable.write_text(f'#!/bin/sh\nexec {sys.executable} -m abdf1_ros {command} "$@"\n')
+    executable.write_text(
+        f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m abdf1_ros {command} "$@"\n')
     executable.chmod(0o755)
-    (install / 'setup.bash').write_text(f'cd {SOURCE}\n')
+    (install / 'setup.bash').write_text(f'cd {shlex.quote(str(SOURCE))}\n')
     etc.mkdir()
     files = ', '.join(f'{name}_file: {SOURCE}/config/{name}.csv' for name in ('net', 'map'))
     (etc / file).write_text(

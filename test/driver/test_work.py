@@ -18,7 +18,7 @@ from __future__ import annotations
 from abdf1_ros.settings.heartbeats import PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from support.counting import instructions
+from support.counting import lines_run
 from support.driver_bench import DriverBench, store
 from support.mappings import make_mapping
 
@@ -32,7 +32,7 @@ def read_rows(condition: PublishWhile | None, rows: int) -> list[Mapping]:
 
 
 def work_of_reads(condition: PublishWhile | None, rows: int) -> int:
-    """Return the instructions of reading all rows while their condition ends and comes back."""
+    """Return the lines run for reading all rows while their condition ends and comes back."""
     counter = make_mapping('N7:0', tag='alive', period=100)
     bench = DriverBench([counter, *read_rows(condition, rows)],
                         network=Network(baud=115200, timeout=200))
@@ -44,7 +44,7 @@ def work_of_reads(condition: PublishWhile | None, rows: int) -> int:
         bench.at(7.0 + 0.15 * beat,
                  lambda beat=beat: store(plc, 'N7:0', [beat]))  # type: ignore[misc]
     bench.run(2.5)
-    work = instructions(lambda: bench.run(6.5), 'driver')
+    work = lines_run(lambda: bench.run(6.5), 'driver')
     if condition is not None:
         assert [reason for _, reason in bench.listener.reasons] == [
             'withheld: alive has not changed twice within 0.5 s; '
@@ -56,4 +56,4 @@ def work_of_reads(condition: PublishWhile | None, rows: int) -> int:
 def test_guarded_rows_cost_little_more_than_others() -> None:
     plain = work_of_reads(None, ROWS)
     guarded = work_of_reads(PublishWhile('alive', 500), ROWS)
-    assert guarded < 1.5 * plain
+    assert guarded < 1.6 * plain  # lines; of the time less

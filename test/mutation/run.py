@@ -18,8 +18,9 @@ Make one small mistake at a time in the package, and tell which ones no test fin
 
 A sample of all single mistakes (``mutants.py``) is taken with a fixed seed. Each is made in a copy
 of this directory; then the tests of the module run, and where they find nothing, all tests of its
-room. What hangs counts as found. Some survivors change nothing that anybody could see; the others
-are missing tests. With --everywhere all other tests run against what the room has not found.
+room; which ones these are is told. What hangs counts as found. Some survivors change nothing that
+anybody could see; the others are missing tests. With --everywhere all other tests run against what
+the room has not found.
 """
 
 from __future__ import annotations
@@ -40,12 +41,20 @@ import tempfile
 import time
 
 _ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path.insert(0, str(_ROOT / 'test'))
+sys.path[:0] = [str(_ROOT), str(_ROOT / 'test')]
 
 from mutation.mutants import Mutant, mutants, mutated  # noqa: E402
 
-ROOMS = ('df1', 'pccc', 'settings', 'plan', 'driver', 'ports', 'ros')
+from tools import rooms  # noqa: E402
 
+# Every room with a folder; the modules beside the folders are one more.
+_TOP = 'top'
+ROOMS = (*(room.paths[0] for room in rooms.ROOMS if '.' not in room.paths[0]), _TOP)
+
+# What uses the modules beside the folders that have no tests of their own.
+_USERS = ('settings', 'cli', 'test_reference.py')
+
+_SURVIVES = 'SURVIVES'
 _LIMIT = 120  # s for a test; what takes longer hangs
 _MOST = 1800  # s for all tests of a mistake
 
@@ -68,8 +77,9 @@ def main() -> int:
         for number in range(arguments.jobs):
             copies.put(_copy(Path(folder) / str(number)))
         copy = copies.get()
-        rooms = sorted({_room(mutant) for mutant in sample})
-        if not _passes(copy, [f'test/{room}' for room in rooms], is_told=True):
+        tests = sorted({test for mutant in sample for test in _tests_of_room(copy, mutant)})
+        print(f'without any mistake: {" ".join(tests)}', flush=True)
+        if not _passes(copy, tests, is_told=True):
             print('these tests fail without any mistake', file=sys.stderr)
             return 1
         copies.put(copy)
@@ -86,22 +96,36 @@ def main() -> int:
             found = []
             for mutant, by in zip(sample, pool.map(tell, sample), strict=True):
                 found.append(by)
-                print(f'{len(found):>4} {by or "SURVIVES":<10} {mutant}', flush=True)
+                print(f'{len(found):>4} {mutant}\n     {by}', flush=True)
     _report(sample, found, time.monotonic() - began)
     return 0
 
 
 def _sample(rooms: list[str], count: int, seed: int) -> list[Mutant]:
     every = []
+    package = _ROOT / 'abdf1_ros'
     for room in rooms:
-        for path in sorted((_ROOT / 'abdf1_ros' / room).rglob('*.py')):
+        found = package.glob('*.py') if room == _TOP else (package / room).rglob('*.py')
+        for path in sorted(found):
             every += mutants(path.relative_to(_ROOT), path.read_text(encoding='utf-8'))
     print(f'{len(every):,} mistakes can be made; {count} of them, seed {seed}')
     return Random(seed).sample(every, min(count, len(every)))
 
 
 def _room(mutant: Mutant) -> str:
-    return mutant.module.parts[1]
+    return _TOP if len(mutant.module.parts) == 2 else mutant.module.parts[1]
+
+
+def _tests_of_module(copy: Path, mutant: Mutant) -> list[str]:
+    folder = copy.joinpath('test', *mutant.module.parts[1:-1])
+    return sorted(str(test.relative_to(copy))
+                  for test in folder.glob(f'test_{mutant.module.stem}*.py'))
+
+
+def _tests_of_room(copy: Path, mutant: Mutant) -> list[str]:
+    if _room(mutant) != _TOP:
+        return [f'test/{_room(mutant)}']
+    return _tests_of_module(copy, mutant) or [f'test/{name}' for name in _USERS]
 
 
 def _copy(to: Path) -> Path:
@@ -118,19 +142,19 @@ def _copy(to: Path) -> Path:
 
 
 def _found_by(mutant: Mutant, copy: Path, everywhere: bool) -> str:
-    """Return which tests find a mistake: those of its module, its room, others, or none ('')."""
+    """Return which tests find a mistake: of its module, its room, others, or none (SURVIVES)."""
     path = copy / mutant.module
     source = path.read_text(encoding='utf-8')
     path.write_text(mutated(mutant, source), encoding='utf-8')
-    folder = Path('test', *mutant.module.parts[1:-1])
-    own = sorted(str(test.relative_to(copy))
-                 for test in (copy / folder).glob(f'test_{mutant.module.stem}*.py'))
-    stages = {'its tests': own, 'its room': [f'test/{_room(mutant)}']}
+    stages = {'its tests': _tests_of_module(copy, mutant),
+              'its room': _tests_of_room(copy, mutant)}
     if everywhere:
         stages['others'] = ['test', f'--ignore=test/{_room(mutant)}']
     try:
-        return next((name for name, tests in stages.items()
-                     if tests and not _passes(copy, tests)), '')
+        for name, tests in stages.items():
+            if tests and not _passes(copy, tests):
+                return f'{name}: {" ".join(tests)}'
+        return f'{_SURVIVES}: {" ".join(sum(stages.values(), []))}'
     finally:
         path.write_text(source, encoding='utf-8')
 
@@ -157,17 +181,19 @@ def _passes(copy: Path, tests: list[str], is_told: bool = False) -> bool:
 
 def _report(sample: list[Mutant], found: list[str], duration: float) -> None:
     made, caught = Counter(map(_room, sample)), Counter(
-        _room(mutant) for mutant, by in zip(sample, found, strict=True) if by)
+        _room(mutant) for mutant, by in zip(sample, found, strict=True)
+        if not by.startswith(_SURVIVES))
     print()
     for room in ROOMS:
         if made[room]:
             print(f'{room:<9} {caught[room]:>4} of {made[room]:>4} found')
+    own = sum(by.startswith('its tests') for by in found)
     print(f'all       {caught.total():>4} of {len(sample):>4} found: '
-          f'{caught.total() / len(sample):.0%}, {found.count("its tests")} of them by the tests '
+          f'{caught.total() / len(sample):.0%}, {own} of them by the tests '
           f'of the module itself; {duration / 60:.0f} minutes')
     print('\nnot found:')
     for mutant, by in zip(sample, found, strict=True):
-        if not by:
+        if by.startswith(_SURVIVES):
             print(f'  {mutant}')
 
 

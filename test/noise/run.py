@@ -108,6 +108,7 @@ def main() -> int:
     parser.add_argument('--kinds', action='store_true', help='each kind of error by itself')
     parser.add_argument('--hours', type=float, default=1.0, help='of line time a round (1)')
     parser.add_argument('--rounds', type=int, default=1, help='with another seed each (1)')
+    parser.add_argument('--seed', type=int, default=1, help='of the first round (1)')
     arguments = parser.parse_args()
     if unknown := set(arguments.modes) - set(MODES):
         parser.error(f'there is no mode {", ".join(sorted(unknown))}')
@@ -115,10 +116,10 @@ def main() -> int:
     cases = [Case(mode, check, kind, rate) for check, mode, kind, rate in product(
         arguments.check or ('CRC', 'BCC'), arguments.modes, kinds, arguments.rate or RATES)]
     wrong = 0
-    for seed in range(1, arguments.rounds + 1):
+    for seed in range(arguments.seed, arguments.seed + arguments.rounds):
         began = time.process_time()
         wrong += sum(case.run(seed, arguments.hours) for case in cases)
-        print(f'\nround {seed}, {time.process_time() - began:.0f} s of processor time')
+        print(f'\nseed {seed}, {time.process_time() - began:.0f} s of processor time')
         _print([_HEAD, *(case.row() for case in cases)])
     return int(wrong > 0)
 

@@ -21,19 +21,18 @@ from types import FrameType
 from typing import Any
 
 
-def instructions(work: Callable[[], object], within: str = 'abdf1_ros') -> int:
-    """Return how many are carried out in files of the folder ``within`` while ``work`` runs."""
+def lines_run(work: Callable[[], object], within: str = 'abdf1_ros') -> int:
+    """Return how many lines of files in the folder ``within`` are run by ``work``."""
     count = 0
 
     def trace(frame: FrameType, event: str, argument: object) -> Any:
         if f'/{within}/' not in frame.f_code.co_filename:
             return None
-        frame.f_trace_opcodes, frame.f_trace_lines = True, False
         return take
 
     def take(frame: FrameType, event: str, argument: object) -> Any:
         nonlocal count
-        count += event == 'opcode'
+        count += event == 'line'
         return take
 
     before = sys.gettrace()
