@@ -76,14 +76,12 @@ class Diagnostics:
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
     faults of the rows that the map was read without, ``map_name`` is what the file is called.
-    ``writes`` counts the results of writes. ``changed_files`` are the names of files that have
-    changed since they were read. ``crowded`` are topics with a Fallback and more than one
-    publisher.
+    ``changed_files`` are the names of files that have changed since they were read. ``crowded``
+    are topics with a Fallback and more than one publisher.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
-                 left_out: Sequence[Problem] = (), map_name: str = 'map',
-                 writes: WriteLog | None = None) -> None:
+                 left_out: Sequence[Problem] = (), map_name: str = 'map') -> None:
         self.has_duplicate_name = False
         self._left_out = left_out
         self._map_name = map_name
@@ -94,7 +92,7 @@ class Diagnostics:
         self._opener: PortOpener | None = None
         self._last_error: Moment | None = None
         self._last_events: dict[int | None, Moment] = {}
-        self.writes = writes or WriteLog()
+        self._writes = WriteLog()
         self.changed_files: list[str] = []
         self.crowded: tuple[str, ...] = ()
         self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
@@ -110,7 +108,7 @@ class Diagnostics:
 
     def _judge_writes(self, now: float) -> Judgement:
         """Return the level of writes; a heartbeat that does not count is a WARN."""
-        level, text = self.writes.judge(now)
+        level, text = self._writes.judge(now)
         interlocks = self._driver.interlocks
         at_rest = [row.mapping.tag for row in interlocks.heartbeats if row.why_not(now)]
         due = [row.mapping.tag for row in interlocks.fallbacks if row.cause is not None]
@@ -121,7 +119,7 @@ class Diagnostics:
 
     def _write_values(self, now: float) -> dict[str, str]:
         """Return counts, and the state of each heartbeat and fallback."""
-        values = self.writes.values(now)
+        values = self._writes.values(now)
         for beat in self._driver.interlocks.heartbeats:
             age = '' if beat.confirmed is None else f', {now - beat.confirmed:.1f} s ago'
             reason = beat.why_not(now)
@@ -152,11 +150,11 @@ class Diagnostics:
 
     def written(self, result: WriteResult, now: float) -> None:
         """Count a write."""
-        self.writes.add(result, now)
+        self._writes.add(result, now)
 
     def lost(self, topic: str, count: int, now: float) -> None:
         """Count messages to a write topic that never came."""
-        self.writes.lost(topic, count, now)
+        self._writes.lost(topic, count, now)
 
     def reset_counters(self) -> None:
         """Show every counter from zero again."""

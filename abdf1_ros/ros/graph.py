@@ -102,26 +102,20 @@ class DuplicateNameWatch:
 
 class TypeWatch:
     """
-    Watches the topics of a map for ends that DDS connects to nothing; ``use`` names its rows.
+    Watches the topics of a map for ends that DDS connects to nothing.
 
     ``resolve`` makes the full name of a topic.
     """
 
-    def __init__(self, graph: Graph, resolve: Callable[[str], str]) -> None:
+    def __init__(self, graph: Graph, resolve: Callable[[str], str],
+                 mappings: Iterable[Mapping]) -> None:
         self._graph = graph
-        self._resolve = resolve
-        self._own: dict[str, str] = {}
-        self._seen: MappingType[str, list[str]] = {}
-        self._told: set[tuple[str, str]] = set()
-
-    def use(self, mappings: Iterable[Mapping]) -> None:
-        """Watch the topics of these rows from now on."""
         self._own = {
-            self._resolve(f'~/{what}/{mapping.topic}'):
-            f'std_msgs/msg/{mapping.message_type.message}'
+            resolve(f'~/{what}/{mapping.topic}'): f'std_msgs/msg/{mapping.message_type.message}'
             for mapping in mappings for what, is_there in (
                 ('read', mapping.reads), ('write', mapping.writes)) if is_there}
-        self._seen, self._told = {}, set()
+        self._seen: MappingType[str, list[str]] = {}
+        self._told: set[tuple[str, str]] = set()
 
     def look(self, now: float) -> list[str]:
         """Return what is new at the clock value ``now`` (s), each once."""

@@ -27,6 +27,7 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.timer import Timer
 
 END_LIMIT = 2.0
 """How long (s) an orderly end may take until all is confirmed (rule 5)."""
@@ -42,51 +43,44 @@ _GLANCE = 0.005
 
 class InterlockWatch:
     """
-    Watches over the heartbeats and fallbacks of ``node``; ``use`` names the driver.
+    Watches over the heartbeats and fallbacks of a driver.
 
     The timer by which the link knows of the executor exists only while there are heartbeats.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, driver: Driver) -> None:
         self._node = node
-        self._driver: Driver | None = None
-        self._timer: object | None = None
+        self._interlocks = driver.interlocks
         self._next_look = 0.0
-        self.crowded: tuple[str, ...] = ()
-
-    def use(self, driver: Driver) -> None:
-        """Watch over another driver; called in the thread of the executor, or before it runs."""
-        self._driver = driver
+        self._crowded: tuple[str, ...] = ()
+        self._timer: Timer | None = None
         self._tell()
-        if driver.interlocks.heartbeats and self._timer is None:
+        if self._interlocks.heartbeats:
             # Not the node's clock, which may be a simulated one that stands still.
-            self._timer = self._node.create_timer(
+            self._timer = node.create_timer(
                 _LIFE_SIGN, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def end(self) -> None:
+        """End the timer."""
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
 
     def _tell(self) -> None:
         """Tell the driver that the executor runs (rule 3 c)."""
-        if self._driver is not None:
-            self._driver.interlocks.executor_ran(line_time())
+        self._interlocks.executor_ran(line_time())
 
-    def look(self, now: float) -> bool:
+    def look(self, now: float) -> tuple[str, ...]:
         """
-        Count publishers every now and then; tell whether ``crowded`` is another than before.
+        Return the topics of Fallback rows that two or more publishers feed (rule 17).
 
-        ``crowded`` are the topics of Fallback rows that two or more feed (rule 17).
+        They are counted every now and then.
         """
-        if self._driver is None or now < self._next_look:
-            return False
-        self._next_look = now + _LOOK
-        topics = dict.fromkeys(row.mapping.topic for row in self._driver.interlocks.fallbacks)
-        before, self.crowded = self.crowded, tuple(
-            topic for topic in topics if self._node.count_publishers(f'~/write/{topic}') > 1)
-        return self.crowded != before
-
-
-def begin_end(driver: Driver, link: LinkThread) -> None:
-    """Have heartbeats set to 0 and fallbacks written; ``wait_for_end`` waits for it (rule 5)."""
-    driver.wind_down()
-    link.wake()
+        if now >= self._next_look:
+            self._next_look = now + _LOOK
+            topics = dict.fromkeys(row.mapping.topic for row in self._interlocks.fallbacks)
+            self._crowded = tuple(
+                topic for topic in topics if self._node.count_publishers(f'~/write/{topic}') > 1)
+        return self._crowded
 
 
 def wait_for_end(driver: Driver, link: LinkThread, give_up: float) -> list[str]:

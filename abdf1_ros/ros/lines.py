@@ -194,7 +194,7 @@ class Line:
             if self._again is not None and time.monotonic() >= self._again and not is_closing:
                 self._again = None
                 self.start()
-        elif node.link.has_failed:
+        elif node.has_failed:
             self._begin_again(node.link.state.text)
         elif self._callbacks is not None and self._callbacks.error is not None:
             self._begin_again(self._callbacks.error)

@@ -123,11 +123,6 @@ class EventLog:
         else:
             self._logger.info(text)
 
-    def forget_all(self) -> None:
-        """Log all causes again: the files have been read again."""
-        for cause in self._causes.values():
-            cause.is_news = True
-
     def forget(self, station: int) -> None:
         """Log the next events of a station again: its state has changed."""
         for (_, number), cause in self._causes.items():

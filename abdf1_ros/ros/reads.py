@@ -40,7 +40,7 @@ _MARGIN = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class _ReadTopic:
+class ReadTopic:
     """
     A publisher, and what it was made for.
 
@@ -62,36 +62,41 @@ class ReadTopics:
     """
     Publish values in the link thread; made and ended in the thread of the executor.
 
-    ``open`` has to come before the driver runs; what ``before`` has is used again where it fits.
-    ``end`` closes the rest of that, then ``complete`` makes what was waiting for it.
+    ``open`` has to come before the driver runs; what is ``published`` before is used again where
+    it fits. ``take_over`` comes when the driver of before does not run any more.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, published: dict[str, ReadTopic]) -> None:
         self._node = node
+        self._published = published
         self._at_once = _VALUES_AT_ONCE
         self._later: deque[tuple[Any, Any]] = deque()
-        self._topics: dict[str, _ReadTopic] = {}
+        self._topics: dict[str, ReadTopic] = {}
         self._to_come: dict[str, tuple[Mapping, ReadPoint]] = {}
         self._kept_back: dict[str, Values] = {}
 
-    def open(self, points: MappingType[Mapping, ReadPoint],  # noqa: A003
-             before: ReadTopics | None = None) -> None:
+    def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
         """Have a publisher for each mapping that is read."""
-        old = {} if before is None else before._topics
         for mapping, point in points.items():
-            earlier = old.get(mapping.topic)
+            earlier = self._published.get(mapping.topic)
             # DDS has one type for a topic, so a publisher of another one has to end first.
             if earlier is not None and earlier.shape[0] is not mapping.message_type:
                 self._to_come[mapping.topic] = mapping, point
             else:
                 self._topics[mapping.topic] = self._topic(mapping, point, earlier)
 
-    def complete(self) -> None:
-        """Make the publishers whose topics had another message type before."""
+    def take_over(self) -> None:
+        """Close the publishers that are not used any more, and make those that wait for it."""
+        kept = {id(topic) for topic in self._topics.values()}
+        for topic in self._published.values():
+            if id(topic) not in kept:
+                self._node.destroy_publisher(topic.publisher)
         for name, (mapping, point) in [*self._to_come.items()]:
             self._topics[name] = self._topic(mapping, point, None)
             del self._to_come[name]
             self._publish_kept_back(name)
+        self._published.clear()
+        self._published.update(self._topics)
 
     def _publish_kept_back(self, name: str) -> None:
         values = self._kept_back.pop(name, None)
@@ -99,7 +104,7 @@ class ReadTopics:
             topic = self._topics[name]
             topic.publisher.publish(topic.encode(values))
 
-    def _topic(self, mapping: Mapping, point: ReadPoint, old: _ReadTopic | None) -> _ReadTopic:
+    def _topic(self, mapping: Mapping, point: ReadPoint, old: ReadTopic | None) -> ReadTopic:
         shape = mapping.message_type, str(mapping.address), mapping.length
         promise = point.stale_time if mapping.publish is Publish.ALWAYS else math.inf
         if old is not None and old.is_fit_for(shape, promise):
@@ -109,7 +114,7 @@ class ReadTopics:
         publisher = self._node.create_publisher(
             MESSAGES[mapping.message_type], f'~/read/{mapping.topic}',
             read_qos(mapping, point.stale_time), event_callbacks=quiet)
-        return _ReadTopic(publisher, encoder(mapping), shape, promise)
+        return ReadTopic(publisher, encoder(mapping), shape, promise)
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""
@@ -132,10 +137,3 @@ class ReadTopics:
         while self._later:
             publisher, values = self._later.popleft()
             publisher.publish(values)
-
-    def end(self, after: ReadTopics) -> None:
-        """Close what ``after`` does not use; nothing is read for these any more."""
-        kept = {id(topic) for topic in after._topics.values()}
-        for topic in self._topics.values():
-            if id(topic) not in kept:
-                self._node.destroy_publisher(topic.publisher)

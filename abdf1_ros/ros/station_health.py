@@ -23,7 +23,6 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.task import Future
 from std_srvs.srv import Trigger
@@ -87,18 +86,14 @@ class LinkCounterService:
     ``check`` may be called by another thread; it calls ``wake_executor`` then.
     """
 
-    def __init__(self, driver: Driver, link: LinkThread,
+    def __init__(self, driver: Driver, wake_link: Callable[[], None],
                  wake_executor: Callable[[], None] = lambda: None) -> None:
         self._driver = driver
-        self._link = link
+        self._wake_link = wake_link
         self._wake_executor = wake_executor
         self._asked: list[int] = []
         self._give_up = 0.0
         self._done: Future | None = None
-
-    def use(self, driver: Driver) -> None:
-        """Ask the stations of another driver from now on."""
-        self._driver = driver
 
     async def answer(self, request: Trigger.Request,
                      response: Trigger.Response) -> Trigger.Response:
@@ -110,7 +105,7 @@ class LinkCounterService:
             return response
         for station in self._asked:
             self._driver.request_counters(station)
-        self._link.wake()
+        self._wake_link()
         self._give_up = line_time() + _PATIENCE
         self._done = Future()
         await self._done
@@ -120,9 +115,12 @@ class LinkCounterService:
 
     def check(self, now: float) -> None:
         """End the waiting when there is nothing more to wait for."""
-        if self._done is None or self._done.done():
-            return
         if now >= self._give_up or not any(map(self._is_waited_for, self._asked)):
+            self.end()
+
+    def end(self) -> None:
+        """End the waiting."""
+        if self._done is not None and not self._done.done():
             self._done.set_result(None)
             self._wake_executor()
 

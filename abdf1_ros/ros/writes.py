@@ -107,10 +107,6 @@ class WriteTopic:
         self._on_loss = on_loss
         self._wake = wake
 
-    def use(self, mappings: Sequence[Mapping], driver: Driver) -> None:
-        """Write to these mappings of this driver from now on."""
-        self._mappings, self._driver = mappings, driver
-
     def take(self, message: Any, info: Any) -> None:
         """Write a message to every mapping of the topic."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
@@ -139,48 +135,46 @@ class WriteTopic:
 
 class WriteTopics:
     """
-    The write topics of a node; ``use`` may be called again, in the thread of the executor.
+    The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
 
-    ``on_loss``, ``wake`` and ``patience`` are those of ``WriteTopic``. ``taken`` counts messages.
+    ``take`` is called with the topic and what came; ``taken`` counts that.
     """
 
-    def __init__(self, node: Node, patience: float, on_loss: Callable[[str, int], None],
-                 wake: Callable[[], None]) -> None:
+    def __init__(self, node: Node, take: Callable[[str, Any, Any], None]) -> None:
         self._node = node
-        self._patience = patience
-        self._on_loss = on_loss
-        self._wake = wake
-        self._topics: dict[str, tuple[Any, WriteTopic, Any]] = {}
+        self._take = take
+        self._subscriptions: dict[str, tuple[Any, Any]] = {}
         self.taken = 0
 
-    def use(self, driver: Driver) -> None:
-        """Have a subscription for each topic of a driver; those that there are stay."""
+    def open(self, driver: Driver, patience: float, on_loss: Callable[[str, int], None],  # noqa: A003
+             wake: Callable[[], None]) -> dict[str, WriteTopic]:
+        """Subscribe to each topic of a driver; subscriptions that there are stay."""
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:
             if mapping.writes:
                 wanted[mapping.topic].append(mapping)
         kinds = {topic: MESSAGES[mappings[0].message_type]
                  for topic, mappings in wanted.items()}
-        for topic, (kind, _, subscription) in [*self._topics.items()]:
+        for topic, (kind, subscription) in [*self._subscriptions.items()]:
             if kinds.get(topic) is not kind:
                 self._node.destroy_subscription(subscription)
-                del self._topics[topic]
-        for topic, mappings in wanted.items():
-            if topic in self._topics:
-                self._topics[topic][1].use(mappings, driver)
-            else:
-                self._topics[topic] = self._create(topic, kinds[topic], mappings, driver)
+                del self._subscriptions[topic]
+        for topic, kind in kinds.items():
+            if topic not in self._subscriptions:
+                self._subscriptions[topic] = kind, self._subscription(topic, kind)
+        return {topic: WriteTopic(
+            topic, mappings, driver, patience, on_loss=on_loss, wake=wake,
+            losses=LossCounter(partial(self._node.count_publishers, _name(topic))))
+            for topic, mappings in wanted.items()}
 
-    def _create(self, topic: str, kind: Any, mappings: Sequence[Mapping],
-                driver: Driver) -> tuple[Any, WriteTopic, Any]:
-        name = f'~/write/{topic}'
-        writer = WriteTopic(
-            topic, mappings, driver, self._patience, on_loss=self._on_loss, wake=self._wake,
-            losses=LossCounter(partial(self._node.count_publishers, name)))
-
+    def _subscription(self, topic: str, kind: Any) -> Any:
         def take(message: Any, info: Any) -> None:
             self.taken += 1
-            writer.take(message, info)
+            self._take(topic, message, info)
 
         callback: Any = take
-        return kind, writer, self._node.create_subscription(kind, name, callback, write_qos())
+        return self._node.create_subscription(kind, _name(topic), callback, write_qos())
+
+
+def _name(topic: str) -> str:
+    return f'~/write/{topic}'

@@ -54,9 +54,8 @@ def graph(domain: Domain) -> Graph:
 
 
 def watch_of(graph: Graph) -> TypeWatch:
-    watch = TypeWatch(graph, lambda topic: topic.replace('~', '/cell/abdf1'))
-    watch.use([make_mapping('B3:0/0', 'ReadWrite', topic='door'), make_mapping('N7:0', topic='n')])
-    return watch
+    return TypeWatch(graph, lambda topic: topic.replace('~', '/cell/abdf1'), [
+        make_mapping('B3:0/0', 'ReadWrite', topic='door'), make_mapping('N7:0', topic='n')])
 
 
 def test_other_type_is_told_once_and_again_when_it_comes_back(

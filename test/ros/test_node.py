@@ -35,6 +35,7 @@ from abdf1_ros.ros.node import BridgeNode, main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import (  # noqa: I101
@@ -286,7 +287,7 @@ def begin_writing(bench: Bench) -> Callable[..., None]:
 
 
 def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benches) -> None:
-    assert make_bench(PULSES).node._results.qos_profile.depth == MAX_WAITING_WRITES
+    assert make_bench(PULSES).node._surroundings.results.qos_profile.depth == MAX_WAITING_WRITES
 
 
 def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
@@ -312,9 +313,9 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
     bench = make_bench(SPEED)
     left_over = Event(Message.ERR_WRONG_MESSAGE, (1, 0, 7), 1)
     bench.node.link.stop()  # nothing else comes, which would show that the station answers us
-    bench.node._may_have_left_over = {1}
+    bench.node._session._may_have_left_over = {1}
     for _ in range(2):
-        bench.node.happened(left_over)
+        bench.node._session.happened(left_over)
     lines = [line.partition('[abdf1]: ')[2]
              for line in ''.join(capfd.readouterr()).splitlines()]
     assert 'station 1: a reply to a command from before the port was opened is dropped' in lines
@@ -460,7 +461,7 @@ def test_every_value_of_a_long_block_is_published(
     for number, inbox in enumerate(inboxes):
         inbox.values([0x202 * number + 0x100])
     bench.node.link.stop()
-    assert not bench.node._reads._later
+    assert not bench.node._session.reads._later
 
 
 # Ends
@@ -486,7 +487,7 @@ def test_stop_ends_all_threads_and_gives_the_port_back(
 def test_internal_errors_are_told_and_the_third_is_the_end(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench(SPEED)
-    bench.node._reads._topics = {}  # a bug
+    bench.node._session.reads._topics = {}  # a bug
     bench.observer.until(lambda: bench.node.link.has_failed, 'the third fault')
     bench.node.link.join()
     status = until_status(bench.diagnostics, 'link', ERROR)
@@ -568,7 +569,7 @@ def test_line_that_is_faster_than_baud_says_so_once_unless_it_has_no_speed(
     bench.diagnostics.clear()
     link = until_status(bench.diagnostics, 'link', OK)
     assert details(link)['speed seen'].startswith('at least' if has_speed else 'a pseudo-terminal')
-    bench.node._tell_speed(3.0)  # another figure, and no news
+    bench.node._session._tell_speed(3.0)  # another figure, and no news
     told = ''.join(capfd.readouterr())
     assert told.count(', but the line shows at least ') == has_speed
 
@@ -665,7 +666,7 @@ def test_unusable_arguments_are_told_in_one_line(
 def test_what_may_pass_at_the_start_has_the_status_of_a_fault(
         refusal: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(**named: object) -> None:
-        raise RuntimeError('error creating participant:\n  no network')
+        raise rclpy_implementation.RCLError('error creating participant:\n  no network')
 
     monkeypatch.setattr('rclpy.init', refuse)
     assert refusal(status=1) == [

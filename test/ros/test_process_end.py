@@ -21,10 +21,11 @@ import signal
 import time
 
 import pytest
-from support.ros import EXAMPLE_FILES, here, Process, ros_args
+from support.ros import EXAMPLE_FILES, PATIENCE, Process, ros_args
 
-# After SIGTERM all is over within so many seconds.
-LIMIT = 5.0
+# After SIGTERM all is over within so many seconds, and some for a busy host to see it; systemd
+# waits for 10.
+LIMIT, BUSY = 5.0, 2.0
 
 # Before the program sets its own handlers a signal ends it like this.
 PROGRAM = """
@@ -64,7 +65,7 @@ def test_stream_of_signals_ends_it_as_one_does(
         process.wait_for('begins' if delay is not None else RUNS[name])
         time.sleep(delay or 0.0)
         begun = time.monotonic()
-        while process.is_running and time.monotonic() - begun < here(LIMIT):
+        while process.is_running and time.monotonic() - begun < PATIENCE:
             process.send(signal.SIGINT, signal.SIGTERM)
         assert process.result() == 0, process.text
         assert 'Traceback' not in process.text
@@ -92,7 +93,7 @@ HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 @pytest.mark.parametrize(('where', 'how', 'status'), [
     ('destroy_node', 'slow', 0),  # PLCs and writes are done
     ('destroy_node', 'held', 1),  # with the interpreter lock: no code of ours runs any more
-    ('stop', 'slow', 1), ('check', 'slow', 1)])
+    ('check', 'slow', 1)])
 @pytest.mark.parametrize('name', ['node', 'lines'])
 def test_clock_ends_what_does_not_come_back(
         tmp_path: Path, name: str, where: str, how: str, status: int) -> None:
@@ -104,5 +105,5 @@ def test_clock_ends_what_does_not_come_back(
         process.send(signal.SIGTERM)
         begun = time.monotonic()
         assert process.result() == status, process.text
-        assert time.monotonic() - begun < here(LIMIT + 0.5)
+        assert time.monotonic() - begun < LIMIT + BUSY
         assert ('in hang' in process.text) is bool(status)  # it says where

@@ -21,10 +21,13 @@ import os
 from pathlib import Path
 from typing import Any
 
+from abdf1_ros.df1.line_rate import LineRate
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ros.diagnostics import Diagnostics
 from abdf1_ros.ros.files import FileWatch
+from abdf1_ros.ros.graph import Graph
 from abdf1_ros.ros.node import BridgeNode
 import pytest
 from rcl_interfaces.srv import GetParameters
@@ -34,6 +37,7 @@ from std_srvs.srv import SetBool, Trigger
 from support.ros import (
     details,
     EVERYTHING,
+    find_status,
     Observer,
     OK,
     Plcs,
@@ -102,7 +106,7 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr('abdf1_ros.ros.node._FILE_PERIOD', 0.3)
+    monkeypatch.setattr('abdf1_ros.ros.session._FILE_PERIOD', 0.3)
     rows = ['1,PLC5,N7:0,16,7 8', '1,PLC5,F8:0,4,1.5']
     data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
     with Observer() as observer, Plcs(data) as plcs:
@@ -114,13 +118,13 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) -> None:
     speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     speeds.values([7, 8])
-    publisher = bench.node._reads._topics['speed'].publisher
+    publisher = bench.node._session.reads._topics['speed'].publisher
     bench.write_map(SPEED, LEVEL)
-    assert bench.reload() == (True, str(bench.node._configuration))
+    assert bench.reload() == (True, str(bench.node._session.configuration))
     levels = bench.observer.listen(Float32MultiArray, '/abdf1/read/level')
     assert values_in(levels.first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
-    assert bench.node._reads._topics['speed'].publisher is publisher
+    assert bench.node._session.reads._topics['speed'].publisher is publisher
     topics = dict(bench.node.get_publisher_names_and_types_by_node('abdf1', '/'))
     assert '/abdf1/read/level' in topics
     written = dict(bench.node.get_subscriber_names_and_types_by_node('abdf1', '/'))
@@ -145,8 +149,8 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
     result = results.next()
     assert (result.message, details(result)['address']) == ('written', 'N7:8')
     writes = until_status(bench.diagnostics, 'writes', OK,
-                          lambda status: details(status)['confirmed'] == '2')
-    assert writes.message == 'OK: 2 of 2 writes confirmed'  # of both maps
+                          lambda status: details(status)['confirmed'] == '1')
+    assert writes.message == 'OK: 1 of 1 writes confirmed'
 
 
 def test_row_of_another_message_type_has_a_new_topic(bench: Bench) -> None:
@@ -191,25 +195,79 @@ def test_fault_in_one_row_changes_nothing(bench: Bench) -> None:
     assert values_in(speeds.first()) == [7, 8]
 
 
-def test_link_that_does_not_take_the_files_goes_on_as_before(
+def test_link_that_does_not_take_the_files_is_the_end(
         bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments: False)
-    bench.write_net(250, 19200)
     bench.write_map(SPEED, RECIPE, LEVEL)
-    assert bench.reload() == (
-        False, 'goes on as before: the link does not take the new files')
-    assert bench.parameter('net.timeout') == 100
-    assert bench.parameter('map.level.address') is None
-    assert bench.node._opener._settings.baud == 115200
-    assert '/abdf1/read/level' not in dict(
-        bench.node.get_publisher_names_and_types_by_node('abdf1', '/'))
-    results = bench.observer.results()
-    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
-    publisher.publish(Int16MultiArray(data=[1, 2]))
-    assert results.next().message == 'written'
-    monkeypatch.undo()
+    assert bench.reload() == (False, 'ends: its link does not take the new files')
+    assert bench.node.has_failed
+
+
+# What a reload leaves: what is found and told then is what a fresh start would find and tell
+
+
+CROWD = '~/write/recipe has more than one publisher'
+
+
+def test_second_publisher_is_found_again(
+        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+    write_csv(bench.map, f'{HEADER},Fallback,Fallback_After', [f'{RECIPE},0 0,60000'])
+    publishers = []
+    for _ in range(2):
+        assert bench.reload()[0]
+        bench.diagnostics.clear()
+        while len(publishers) < 2:
+            publishers.append(
+                bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe'))
+        until_status(bench.diagnostics, 'writes', WARN,
+                     lambda status: 'recipe: more than one publisher' in status.message)
+    assert capfd.readouterr().err.count(CROWD) == 2
+
+
+def test_station_that_took_no_commands_does_not_answer_by_new_files(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    asked: list[Diagnostics] = []
+
+    def deaf_stations(diagnostics: Diagnostics, now: float) -> list[int]:
+        asked.append(diagnostics)
+        return [1] if diagnostics is asked[0] else []  # not known yet
+
+    monkeypatch.setattr(Diagnostics, 'deaf_stations', deaf_stations)
+    said = ''
+    while 'station 1 answers polls, but no command' not in said:
+        bench.diagnostics.next()
+        said += capfd.readouterr().err
     assert bench.reload()[0]
-    assert bench.parameter('net.timeout') == 250
+    for _ in range(2):
+        bench.diagnostics.next()
+    assert 'answers commands' not in capfd.readouterr().err
+
+
+def test_second_wrong_baud_is_told_as_the_first(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    bench.node._opener.has_speed = True
+    monkeypatch.setattr(LineRate, 'seen', property(lambda rate: 0.5, lambda *arguments: None),
+                        raising=False)
+    bench.diagnostics.next()
+    bench.diagnostics.next()
+    assert bench.reload()[0]
+    bench.diagnostics.next()
+    bench.diagnostics.next()
+    assert capfd.readouterr().err.count('the line shows about') == 2
+
+
+def test_other_node_of_our_name_stays_known(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ros.graph._LOOKS_FOR_DUPLICATES', 1)
+    monkeypatch.setattr(Graph, 'nodes', lambda *arguments: 2)
+    text = 'another node is called abdf1 too'
+    until_status(bench.diagnostics, 'link', WARN, lambda status: text in status.message)
+    assert bench.reload()[0]
+    for _ in range(2):
+        bench.diagnostics.next()
+        assert text in find_status(bench.diagnostics[-1], 'link').message
 
 
 def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
@@ -252,13 +310,14 @@ def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) 
     client = bench.observer.node.create_client(Trigger, '/abdf1/read_link_counters')
     bench.observer.until(client.service_is_ready, 'the service')
     future = client.call_async(Trigger.Request())
-    bench.observer.until(lambda: bench.node._link_counters._done, 'the question')
+    bench.observer.until(lambda: bench.node._session.link_counters._done, 'the question')
     active = bench.observer.listen(UInt16MultiArray, '/abdf1/active_stations')
     bench.write_map('speed,Read,N7:0,2,PLC5,2')
     assert bench.reload()[0]
     bench.observer.until(future.done, 'an answer')
     assert active.values([1 << 2] + [0] * 15)
-    assert future.result() == Trigger.Response(success=False, message='station 1: no answer')
+    assert future.result() == Trigger.Response(
+        success=False, message='station 1: port lost: the files have been read again')
 
 
 def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> None:

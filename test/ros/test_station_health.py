@@ -124,7 +124,7 @@ class Desk:
         self.driver.is_online = True
         self.driver.health.begin(0.0)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
-        self.service = LinkCounterService(self.driver, self.link)
+        self.service = LinkCounterService(self.driver, self.link.wake)
         observer.node.create_service(Trigger, '~/read', self.service.answer,
                                      callback_group=MutuallyExclusiveCallbackGroup())
         client = observer.node.create_client(Trigger, '~/read')
