@@ -73,6 +73,10 @@ class LineEcho:
             self.is_heard = False
         self._expected.append((end, frame))
 
+    def withdrawn(self) -> None:
+        """Take note that the last frame does not go out after all."""
+        self._expected.pop()
+
     def forget(self) -> None:
         """Expect nothing to come back."""
         self.is_heard, self._at = False, 0

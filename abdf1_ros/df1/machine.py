@@ -174,8 +174,9 @@ class Machine:
     ``position`` counts the bytes given out so far. Once the other end ``embeds`` responses, a long
     message is given out in portions, and a response goes between two of them (M 4-3), as products
     do with Embedded Responses = Auto-detect. ``rate`` is what the line has shown of its speed.
-    ``late`` is the sum of the seconds by which it was called after a deadline of its procedure: so
-    long this process, or its host, has not run.
+    ``send_before`` is the clock value (s) after which ``withdraw`` is due in place of
+    ``data_to_send``. ``late`` is the sum of the seconds by which it was called after a deadline of
+    its procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -191,6 +192,8 @@ class Machine:
         self.late = 0.0
         self.position = 0
         self.embeds = False
+        self.send_before = math.inf
+        self._fresh = b''  # the last of what is to be sent, which must leave before that
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self._outgoing = Outgoing(checksum, self._timing.char_time)
@@ -281,7 +284,7 @@ class Machine:
         is left without a result.
         """
         procedure, self._procedure = self._procedure, None
-        self._out = b''
+        self._out, self.send_before = b'', math.inf
         self._outgoing.clear()
         self.embeds = False
         self.decoder.reset()
@@ -357,8 +360,21 @@ class Machine:
 
     def data_to_send(self) -> bytes:
         """Return, once, the bytes to put on the line now."""
-        data, self._out = self._out, b''
+        data, self._out, self.send_before = self._out, b'', math.inf
         return data
+
+    def withdraw(self, now: float) -> None:
+        """Take back a command that has become too old since it was looked at."""
+        self.now = now
+        size = len(self._fresh) + self._outgoing.size
+        self._out = self._out.removesuffix(self._fresh)
+        self._outgoing.clear()
+        self._echo.withdrawn()
+        self.counters.chars_sent -= size
+        self.position -= size
+        self._line_free, self.send_before = now, math.inf
+        self._resume(_NOTHING, CommandExpired())
+        self._deliver_symbols()
 
     def _next_symbol(self) -> Symbol | None:
         """
@@ -430,8 +446,11 @@ class Machine:
         free = max(self.now, self._line_free)
         if step.frame:
             size = len(step.frame)
-            is_divided = self.embeds or self._outgoing.size
-            self._out += self._given_out(step.frame, free) if is_divided else step.frame
+            is_alone = not self._outgoing.size
+            is_divided = self.embeds or not is_alone
+            self._fresh = self._given_out(step.frame, free) if is_divided else step.frame
+            self._out += self._fresh
+            self.send_before = step.expires if is_alone else math.inf
             self.counters.chars_sent += size
             self.position += size
             self._line_free = free = free + size * self._timing.char_time

@@ -320,6 +320,8 @@ class LinkThread(threading.Thread):
         machine.start(clock())
         left = b''
         while not (self._stopping or self.is_released or self._next):
+            while machine.send_before < math.inf and (now := clock()) > machine.send_before:
+                machine.withdraw(now)  # this process has not run for a while
             data = machine.data_to_send()
             if data:
                 port.write(data)

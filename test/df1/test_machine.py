@@ -667,6 +667,29 @@ def test_command_that_expires_while_it_waits_for_its_delay_does_not_leave() -> N
     assert (asked.told, asked.machine.data_to_send()) == (['expired'], b'')
 
 
+@pytest.mark.parametrize('embeds', [False, True])
+def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embeds: bool) -> None:
+    told: list[str] = []
+
+    def run(machine: Machine) -> Procedure:
+        machine.embeds = embeds
+        try:
+            yield Step(MESSAGE, 1.0, expires=5.5)
+        except CommandExpired:
+            told.append('expired')
+        yield Step(ACK, 1.0)
+
+    machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.001), duplex=Duplex.FULL)
+    machine.start(5.0)
+    assert machine.send_before == 5.5
+    machine.withdraw(9.0)
+    assert (told, machine.data_to_send(), machine.send_before) == (['expired'], ACK, math.inf)
+    assert (machine.counters.chars_sent, machine.position) == (len(ACK), len(ACK))
+    assert machine.next_call == pytest.approx(9.0 + 1.0 + 0.002)
+    machine.handle_timeout(9.01)
+    assert machine.data_to_send() == b''
+
+
 def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), Step(FRAME, 1.0), Step(None, None))
     bench.machine.start(0.0)

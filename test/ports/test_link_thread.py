@@ -283,6 +283,19 @@ def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
     thread.stop()
 
 
+def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None:
+    """The clock is looked at again after all that Python does, right before the write."""
+    script, written = Script(Step(b'command', 1.0, expires=2.0)), list[bytes]()
+    port = Paused()
+    port.write = written.append  # type: ignore[method-assign]
+    looks = iter([1.0])  # at the start; then the process does not run for a while
+    thread = Impatient(script.machine, lambda: port, 1, clock=lambda: next(looks, 60.0))
+    thread.run()
+    assert 'CommandExpired' in script.end()
+    assert written == [READY]
+    thread.stop()
+
+
 @pytest.mark.parametrize('step', [
     Step(None, None), Step(None, 3600.0), Step(b'', None), Step(b'x', 3600.0)])
 def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> None:
