@@ -31,7 +31,9 @@ counts.
 
 Needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done, with
 these tags. The request is published at a steady rate while the job runs, so the row may have a
-Fallback of 0: then the PLC also learns when this program dies.
+Fallback of 0: then the PLC also learns when this program dies. With ``--control TAG`` a Read row
+of one bit says whether the PLC uses what ROS writes (rung 7 of the tutorial on heartbeats):
+without it no job is asked for, and none is waited for.
 
 Exit status: 0 done, 1 not done and not begun, 3 unknown.
 """
@@ -51,7 +53,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from std_msgs.msg import Int16MultiArray
+from std_msgs.msg import Int16MultiArray, UInt8MultiArray
 
 DONE, NOT_BEGUN, UNKNOWN = 0, 1, 3
 
@@ -85,7 +87,7 @@ def step_of(number: int, busy: int, done: int) -> Step:
 class Handshake(Node):
     """Requests jobs over the bridge ``bridge``."""
 
-    def __init__(self, bridge: str) -> None:
+    def __init__(self, bridge: str, control: str = '') -> None:
         super().__init__('handshake')
         # The last value at once, but none that is older than the bridge's stale time.
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -96,6 +98,10 @@ class Handshake(Node):
         self.create_subscription(
             DiagnosticStatus, f'{bridge}/write_results', self._take_result, 100)
         self.create_subscription(Int16MultiArray, f'{bridge}/read/job_state', self._take, qos)
+        self._is_in_control = not control
+        if control:
+            self.create_subscription(
+                UInt8MultiArray, f'{bridge}/read/{control}', self._take_control, qos)
         self._requests = self.create_publisher(Int16MultiArray, f'{bridge}/write/job_request', 1)
 
     def run(self, begin_within: float, done_within: float) -> int:
@@ -105,6 +111,9 @@ class Handshake(Node):
             print('not begun: no job_state from the PLC, or nobody takes job_request')
             return NOT_BEGUN
         assert self._state is not None
+        if not self._spin(lambda: self._is_in_control, begin_within):
+            print('not begun: ROS is not in control of the PLC; a person has to press reset there')
+            return NOT_BEGUN
         if self._state[0] != self._state[1]:
             print(f'not begun: the PLC is busy with job {self._state[0]}')
             return NOT_BEGUN
@@ -130,7 +139,10 @@ class Handshake(Node):
             assert self._state is not None
             return step_of(number, *self._state)
 
-        self._publish_until(number, lambda: is_enough(step()), seconds)
+        self._publish_until(
+            number, lambda: is_enough(step()) or not self._is_in_control, seconds)
+        if not self._is_in_control:
+            print('ROS has lost control of the PLC', flush=True)
         return step()
 
     def _take_back(self, seconds: float) -> bool:
@@ -157,6 +169,9 @@ class Handshake(Node):
         self._state = busy, done
         self._states += 1
 
+    def _take_control(self, message: UInt8MultiArray) -> None:
+        self._is_in_control = bool(message.data[0])
+
     def _take_result(self, result: DiagnosticStatus) -> None:
         if result.name != 'job_request':
             return
@@ -181,11 +196,13 @@ def main() -> int:
                         help='s until the PLC has to begin (default: %(default)g)')
     parser.add_argument('--done-within', type=float, default=60.0, metavar='S',
                         help='s until the job has to be done (default: %(default)g)')
+    parser.add_argument('--control', default='', metavar='TAG',
+                        help='a Read row of one bit: whether ROS is in control of the PLC')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = Handshake(options.node)
+    node = Handshake(options.node, options.control)
     try:
         return node.run(options.begin_within, options.done_within)
     except KeyboardInterrupt:

@@ -370,11 +370,16 @@ class Demo:
                 break
         else:
             raise Missed('a reset of the PLC has not given ROS control')
+        self._wait('ROS to know it', self._is_in_control)
+        self._say('/abdf1/read/in_control is [1]: from now on the PLC uses what ROS writes')
         self._speed.value = 800
         self._wait('the speed in the PLC', lambda: self._used() == 800)
         self._say('800 is published to /abdf1/write/speed, and the program uses it: '
                   'used_speed is [800]')
         return self._speed
+
+    def _is_in_control(self) -> bool:
+        return bool(self._watcher.values['in_control'][0])
 
     def _used(self) -> int:
         return int(self._watcher.values['used_speed'][0])
@@ -386,9 +391,9 @@ class Demo:
         speed.die()
         self._say('it publishes nothing any more')
         self._wait('the fallback value',
-                   lambda: self._used() == 0 and _IN_CONTROL not in self._lamps)
+                   lambda: self._used() == 0 and not self._is_in_control())
         self._say(f'{time.monotonic() - died:.1f} s later the bridge has written the Fallback, '
-                  'and the program uses [0]')
+                  'the program uses [0], and in_control is [0]')
 
     def _show_death_of_program(self) -> None:
         self._title('The program of the PLC stands still, while its port goes on answering')

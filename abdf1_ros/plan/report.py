@@ -41,6 +41,7 @@ from abdf1_ros.settings.remarks import network_remarks
 _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
+_LONG_REQUIRES = 10_000  # ms
 
 
 class RemarkKind(Enum):
@@ -142,6 +143,8 @@ class Report:
         if free:
             found.append(f'bits without Publish_While: {_tags(free)}; their values go on when the '
                          'program of the PLC stops')
+        if gaps := '; '.join(_unprotected(self.mappings)):
+            found.append(f'nothing protects: {gaps}')
         return found
 
     def remarks(self) -> list[Remark]:
@@ -151,6 +154,31 @@ class Report:
             return [*found, Remark(RemarkKind.MAP, text)]
         return [*found, *_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
                 *_gap_remarks(self), *_interlock_remarks(self)]
+
+
+def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
+    """Find what goes on when its sender has died (rule 20 of docs/heartbeats.md)."""
+    written = [mapping for mapping in mappings if mapping.writes and not mapping.serves]
+    bare = [mapping for mapping in written if mapping.fallback is None]
+    if bare:
+        bare.sort(key=lambda mapping: (mapping.address.file_type is not FileType.OUTPUT,
+                                       mapping.type is not ValueType.BOOL))
+        yield f'{len(bare)} of {len(written)} written rows, without Fallback: {_tags(bare)}'
+    stations = {mapping.station for mapping in written}
+    beats = [mapping for mapping in mappings if mapping.heartbeat]
+    deaf = [mapping for mapping in beats if mapping.heartbeat and not mapping.heartbeat.requires
+            and mapping.station in stations]
+    if deaf:
+        yield f'heartbeats that count whoever publishes, without Requires: {_tags(deaf)}'
+    slow = [mapping for mapping in beats if mapping.heartbeat
+            and (mapping.heartbeat.requires_timeout or 0) > _LONG_REQUIRES]
+    if slow:
+        yield f'Requires_Timeout over {_LONG_REQUIRES // 1000} s: {_tags(slow)}'
+    pushed = [mapping for mapping in mappings
+              if mapping.serves and not mapping.is_read_only and not mapping.period]
+    if pushed:
+        yield ('topics of Serve rows without Period, which nobody misses when the PLC stops: '
+               f'{_tags(pushed)}')
 
 
 def make_report(network: Network, mappings: Iterable[Mapping], default_period: float,

@@ -312,7 +312,7 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, port in (('glue', '/dev/ttyUSB0'), ('paint', 'socket://localhost:4001'),
                        ('press', 'rfc2217://127.1:4001')):
-        write_csv(tmp_path / f'{name}_net.csv', NET_HEADER + ',Com_Port', [f'{GOOD_NET},{port}'])
+        write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW])
     assert main([str(tmp_path)]) == 2
     errors = [line for line in capsys.readouterr().out.splitlines() if 'error' in line]

@@ -23,7 +23,7 @@ import runpy
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Int16MultiArray
+from std_msgs.msg import Int16MultiArray, UInt8MultiArray
 from support.ros import Observer, Process
 
 EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'handshake.py'
@@ -33,24 +33,29 @@ Plc = Callable[[int, list[int]], None]
 """Is given a request and changes the words busy and done."""
 
 
-def run(plc: Plc, state: list[int], *args: str,
-        result: str = 'written') -> tuple[int, list[str], list[int]]:
+def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
+        control: list[int] | None = None) -> tuple[int, list[str], list[int]]:
     """
     Return exit status and lines of the example, and the requests that came.
 
-    ``result`` is that of each; what is not written does not come to the PLC.
+    ``result`` is that of each; what is not written does not come to the PLC. ``control`` is the
+    bit that says whether the PLC uses what is written.
     """
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     requests: list[int] = []
     with Observer() as observer:
         states = observer.node.create_publisher(Int16MultiArray, '/fake/read/job_state', latched)
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
+        controls = observer.node.create_publisher(UInt8MultiArray, '/fake/read/control', latched)
+        controls.publish(UInt8MultiArray(data=control or [1]))
         states.publish(Int16MultiArray(data=state))
         observer.node.create_timer(
             0.1, lambda: states.publish(Int16MultiArray(data=state)))
 
         def take(message: Int16MultiArray) -> None:
             requests.append(message.data[0])
+            if control == [1]:  # it is lost as soon as something is asked for
+                controls.publish(UInt8MultiArray(data=[0]))
             if result == 'written':
                 plc(message.data[0], state)
             results.publish(DiagnosticStatus(name='job_request', message=result, values=[
@@ -102,6 +107,23 @@ def test_request_that_nobody_confirms_leaves_it_unknown() -> None:
 def test_nothing_is_asked_for_while_another_job_is_under_way() -> None:
     status, lines, requests = run(lambda request, state: None, [5, 4])
     assert (status, lines, requests) == (1, ['not begun: the PLC is busy with job 5'], [])
+
+
+def test_nothing_is_asked_for_while_ros_is_not_in_control() -> None:
+    status, lines, requests = run(
+        lambda request, state: None, [4, 4], '--control', 'control', '--begin-within', '2',
+        control=[0])
+    assert (status, requests) == (1, [])
+    assert lines == ['not begun: ROS is not in control of the PLC; a person has to press reset '
+                     'there']
+
+
+def test_job_whose_control_is_lost_is_taken_back() -> None:
+    status, lines, requests = run(
+        lambda request, state: None, [4, 4], '--control', 'control', '--begin-within', '10',
+        control=[1])
+    assert (status, requests[0], requests[-1]) == (1, 5, 0)
+    assert lines[:2] == ['job 5 requested', 'ROS has lost control of the PLC']
 
 
 def test_job_that_is_not_done_in_time_is_unknown() -> None:
