@@ -214,7 +214,8 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
     port = network.port
     if parameters.port:
         try:
-            port = make_network({'com_port': (parameters.port, 'parameter port')}).port
+            other = make_network({'com_port': (parameters.port, 'parameter port')}, network)
+            port, network = other.port, replace(network, remarks=other.remarks)
         except ConfigurationError as error:
             problems += error.problems
     if problems:

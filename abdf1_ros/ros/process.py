@@ -131,6 +131,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
             status = EXIT_FAULT
         ended.set()
         _destroy(program, ended.when + _DESTRUCTION_LIMIT)
+        faulthandler.cancel_dump_traceback_later()
         return status
 
 
