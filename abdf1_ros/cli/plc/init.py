@@ -32,8 +32,10 @@ _TIMEOUT = 300  # ms; the default of a net CSV is long for a person who waits
 _HEAD = """\
 # One row a mapping: a PLC address that becomes a topic. A row that begins with # is not used:
 # take the # away, and write the address and tag that you need.
-# Command is Read, Write, ReadWrite or Serve.
-Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,Publish_While
+# Command is Read, Write, ReadWrite, Serve or Heartbeat. With Fallback or Heartbeat take shorter
+# times in net.csv, or it takes long until somebody notices: Timeout 100, Cmd_Timeout 500,
+# NAK_Retries 1, ENQ_Retries 1. "check" says how long, and what the timers of the PLC need.
+Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,Publish_While,Fallback,Fallback_After
 """
 
 
@@ -88,12 +90,13 @@ def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
         yield f'# station {number}: {presence}\n'
         if family is None or identity is None:
             yield f'# its family is not known: write PLC_Type yourself\n' \
-                  f'# words_{number},Read,N7:0,{number},SLC,,10,1000,\n'
+                  f'# words_{number},Read,N7:0,{number},SLC,,10,1000,,,\n'
             continue
         tail = f'{number},{family.value},{processor_of(identity)}'
         guard = 'RUN' if identity.mode is not None else ''  # docs/heartbeats.md, rule 13
         # Every processor of these families has the status file; N7 may be missing.
-        yield f'status_{number},Read,S:0,{tail},4,1000,\n'
-        yield f'# words_{number},Read,N7:0,{tail},10,1000,\n'
-        yield f'# interlocks_{number},Read,B3:0/0,{tail},8,250,{guard}\n'
-        yield f'# setpoint_{number},Write,N7:100,{tail},1,,\n'
+        yield f'status_{number},Read,S:0,{tail},4,1000,,,\n'
+        yield f'# words_{number},Read,N7:0,{tail},10,1000,,,\n'
+        yield f'# interlocks_{number},Read,B3:0/0,{tail},8,250,{guard},,\n'
+        yield f'# setpoint_{number},Write,N7:100,{tail},1,,,0,2000\n'
+        yield f'# ros_alive_{number},Heartbeat,N7:101,{tail},,1000,,,\n'
