@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 import os
 from pathlib import Path
 import random
@@ -45,14 +46,25 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.conform import asking, client, data, duplicates, master, peer, slave
 from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
-from abdf1_ros.conform.codec import BlockCheck
-from abdf1_ros.conform.ends import MasterEnd, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
+from abdf1_ros.conform.ends import (
+    AskingEnd,
+    MasterEnd,
+    PeerEnd,
+    ServerEnd,
+    SlaveEnd,
+    Words,
+)
 from abdf1_ros.conform.report import as_issue, as_json, as_junit, line_of, summary_of
-from abdf1_ros.conform.wire import Wire
+from abdf1_ros.conform.wire import Failed, Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.errors import FormatError
 from abdf1_ros.paths import config_file, package_version
+from abdf1_ros.pccc.families import decode_identity
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
@@ -164,12 +176,18 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
 def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], wire: Wire,
            network: Network) -> int:
     results: list[CaseResult] = []
-    for result in run_cases(cases, wire, _end(options, target, wire, network), _allowed(options)):
+    end = _end(options, target, wire, network)
+    identity = _identity(end) if isinstance(end, AskingEnd) else None
+    for result in run_cases(cases, wire, end, _allowed(options)):
         results.append(result)
         if not (options.json or options.report):
             print(line_of(result), flush=True)
-    facts = {'target': target.value, 'station': str(options.station), 'check': wire.check.value,
-             'port': options.tcp or options.pty or network.port, 'baud': str(network.baud),
+    # What can be published: the name of a port may be that of a host.
+    kind = 'TCP' if options.tcp else 'pty' if options.pty else (
+        network.port.partition('://')[0] if '://' in network.port else 'serial')
+    facts = {'target': target.value, 'processor': str(identity or 'not known'),
+             'station': str(options.station), 'check': wire.check.value, 'port': kind,
+             'baud': str(network.baud), 'parity': network.parity,
              'answer time': f'{options.answer_time:g} s', 'abdf1_ros': package_version()}
     if options.json:
         print(as_json(facts, results))
@@ -193,6 +211,18 @@ def _is_result(path: Path) -> bool:
     """Tell whether a file is a result of ``--junit``, so that a new one may replace it."""
     with path.open('rb') as file:
         return b'<testsuite name="conform ' in file.read(100)
+
+
+def _identity(end: AskingEnd) -> Identity | None:
+    """Ask the target what it is; the cases that read take its family where none is given."""
+    end.settle()
+    try:
+        identity = decode_identity(end.ask(0x06, b'\x03')[HEADER_SIZE:])
+    except (Failed, FormatError):  # the cases tell what is wrong
+        return None
+    if identity.plc_type in (PlcType.PLC5, PlcType.SLC) and not end.words.family:
+        end.words = replace(end.words, family=identity.plc_type.value)
+    return identity
 
 
 def _chosen(target: Target, names: Sequence[str]) -> list[Case]:
@@ -276,7 +306,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='s that an answer may take, and that silence has to last '
                              '(default: %(default)s)')
     parser.add_argument('--family', type=str.upper, choices=('PLC5', 'SLC'),
-                        help='of the target, for the cases that read and write')
+                        help='of the target, for the cases that read and write (default: as it '
+                             'says itself)')
     parser.add_argument('--words', metavar='ADDRESS', type=_integer_words,
                         help='integer words that may be overwritten, with --yes (read: N7:0)')
     parser.add_argument('--count', type=whole_option, default=1, metavar='N',
@@ -291,7 +322,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--json', action='store_true', help='print the result as JSON')
     parser.add_argument('--junit', metavar='FILE', help='write the result as JUnit XML too')
     parser.add_argument('--report', action='store_true',
-                        help='print the result as text for an issue')
+                        help='print the result as text for an issue, with the row for '
+                             'docs/hardware.md')
     parser.add_argument('--pty', metavar='LINK', help='make a pseudo-terminal of this name')
     parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
     parser.add_argument('--echo', action='store_true',

@@ -99,6 +99,10 @@ class AskingEnd(ABC):
         return header(self.station, self.own, cmd, tns) + body
 
     @abstractmethod
+    def settle(self) -> None:
+        """Take what the other end still sends or owes, so that a case begins clean."""
+
+    @abstractmethod
     def send(self, command: bytes) -> None:
         """Send a message."""
 
@@ -144,7 +148,6 @@ class MasterEnd(AskingEnd):
     """A half-duplex master that talks to one slave, ``station``; ``own`` is its own address."""
 
     def settle(self) -> None:
-        """Fetch all messages that the slave holds or still owes, so that a case begins clean."""
         self.wire.drain()
         end = self.wire.now + _REPLY_TIMES * self.wire.answer_time
         while self.wire.now < end:
@@ -187,7 +190,6 @@ class PeerEnd(AskingEnd):
     """A full-duplex node that sends commands to another, ``station``."""
 
     def settle(self) -> None:
-        """Take the messages that the other end still sends or owes."""
         end = self.wire.now + 2 * _REPLY_TIMES * self.wire.answer_time
         while self.wire.now < end:
             symbol = self.wire.hear((_REPLY_TIMES if self.owed else 1) * self.wire.answer_time)

@@ -89,6 +89,11 @@ def test_report_is_markdown(port: str, capsys: pytest.CaptureFixture[str]) -> No
     assert main(['slave', '--port', port, '--report', *QUICK]) == 0
     text = capsys.readouterr().out
     assert text.startswith('### Conformance run\n')
+    assert '- processor: SLC 5/0' in text
+    row = text.splitlines()[-1]
+    assert row.startswith('| SLC 5/0') and row.count('|') == 8
+    assert '| serial | CRC, 9600 | conform slave: 2 passed, 0 failed, 1 skipped |' in row
+    assert port not in text
     assert '| PASS | poll-idle | KF2 4-31 |  |' in text
 
 
