@@ -152,6 +152,18 @@ def check_exchange(entry):
         yield f'says {found}'
 
 
+def check_processor(entry):
+    """Yield what is wrong with the frames and commands of a processor."""
+    for frame in entry.get('frames', ()):
+        content = bytes.fromhex(frame['bytes'])
+        _, data, check = parse(content[2:])
+        if content[:2] != b'\x10\x06' or check != right_check('CRC', None, data):
+            yield f'{frame["bytes"]} is not DLE ACK and a message with CRC'
+    for exchange in entry.get('exchanges', ()):
+        if int(exchange['command'][:2], 16) & 0x40:
+            yield f'{exchange["command"]} is no command'
+
+
 def hashes(folder):
     """Return the SHA-256 of every file of the data set by its name."""
     files = [*folder.glob('*.json'), *folder.glob('*.md'), *folder.glob('captures/*.*')]
@@ -165,7 +177,7 @@ def faults(folder):
         return json.loads((folder / name).read_text(encoding='utf-8'))
 
     rules, manifest, wrong = load('schema.json')['$defs'], load('manifest.json'), False
-    for name in ('frames.json', 'exchanges.json', 'captures/index.json'):
+    for name in ('frames.json', 'exchanges.json', 'processors.json', 'captures/index.json'):
         for text in check_schema(load(name), rules[name], rules, name):
             wrong = True
             yield text
@@ -177,7 +189,8 @@ def faults(folder):
                 for name in sorted(captures ^ load('captures/index.json').keys()))
     if wrong:
         return
-    for name, check in (('frames', check_frame), ('exchanges', check_exchange)):
+    for name, check in (('frames', check_frame), ('exchanges', check_exchange),
+                        ('processors', check_processor)):
         content = load(f'{name}.json')
         entries = content[name]
         if content['version'] != manifest['version']:

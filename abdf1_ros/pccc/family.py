@@ -39,7 +39,8 @@ class Family:
     A PLC family: its addresses, its commands for us as a client, and its emulation as a server.
 
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
-    another family to 06/03; ``encode_identity`` makes one for a mode, a fault and full duplex.
+    another family to 06/03; ``encode_identity`` makes one for a mode, a fault, full duplex, and
+    a processor, None for the usual.
     ``described`` has its commands for people. ``meanings`` are those of its own error codes.
     ``by_processor`` is for a family whose processors take packets of different lengths.
     ``served_counters`` returns the layout of a port for full duplex and for a master, None where
@@ -51,7 +52,7 @@ class Family:
     dialects: Mapping[Access, Dialect]
     commands: Callable[[DataTable], ServedFamily]
     decode_identity: Callable[[bytes], Identity | None]
-    encode_identity: Callable[[Mode, bool, bool], bytes]
+    encode_identity: Callable[[Mode, bool, bool, Processor | None], bytes]
     described: Mapping[CommandCode, KnownCommand]
     meanings: Meanings = USUAL_MEANINGS
     by_processor: Mapping[Processor, Dialect] = field(default_factory=dict)

@@ -33,14 +33,14 @@ from typing import ClassVar
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Addressing, AddressRangeError, AddressSyntaxError, BITS
 from abdf1_ros.pccc.address_advice import advice
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.file_types import FileType, FUNCTION_FILES
 
 _FORM = re.compile(
     r'[#$]?(?P<type>[A-Z]{1,3})(?P<file>\d{1,9})?'
     r'(?:[:;](?P<element>\d{1,9})(?:\.(?P<member>[A-Z]+|\d{1,9}))?)?'
     r'(?:/(?P<bit>[A-Z]+|\d{1,9}))?', re.ASCII)
 
-_FIXED_FILES = {FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2}
+_FIXED_FILES = {FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, **FUNCTION_FILES}
 _FIRST_FREE_FILE = 3
 # Files of words whose bits may be numbered from the first word on.
 _FLAT_BITS = (FileType.BINARY, FileType.INTEGER, FileType.ASCII, FileType.BCD)
@@ -83,7 +83,7 @@ class FileAddressing(Addressing):
 
     def show(self, address: Address) -> str:
         kind = address.file_type
-        file = '' if kind.is_io else str(address.file)
+        file = '' if kind.is_io or kind.is_function else str(address.file)
         return f'{kind.value}{file}:{self._element_text(address)}{self._rest_text(address)}'
 
     @abstractmethod
@@ -151,7 +151,8 @@ class FileAddressing(Addressing):
                 f'words of a {kind.value} element run from 0 to {layout.words - 1}')
         if not layout.value_words(word):
             raise AddressSyntaxError(
-                f'word {word} is the second half of a float32; write the first, {word - 1}')
+                f'word {word} is the second half of {_two_words(kind)}; write the first, '
+                f'{word - 1}')
         return replace(address, word=word)
 
     def _with_bit(self, address: Address, text: str, names_word: bool) -> Address:
@@ -162,7 +163,8 @@ class FileAddressing(Addressing):
         if not kind.has_bits or address.bit is not None:
             raise AddressSyntaxError(f'{kind.value} files have no bits to address')
         if layout.value_words(address.word) != 1:
-            raise AddressSyntaxError(f'{address} is a float32, which has no bits to address')
+            raise AddressSyntaxError(
+                f'{address} is {_two_words(kind)}, which has no bits to address')
         octal = self.is_octal(kind)
         if octal and set(text) & set('89'):
             raise AddressSyntaxError('PLC-5 I/O bits are octal, 0 to 17')
@@ -190,6 +192,10 @@ class FileAddressing(Addressing):
         if bit is None:
             return word
         return f'{word}/{bit:02o}' if self.is_octal(address.file_type) else f'{word}/{bit}'
+
+
+def _two_words(kind: FileType) -> str:
+    return 'an int32' if kind.is_function else 'a float32'
 
 
 def _with_member(address: Address, name: str) -> Address:

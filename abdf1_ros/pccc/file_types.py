@@ -70,11 +70,21 @@ class FileType(Enum):
     MESSAGE = 'MG'
     BLOCK_TRANSFER = 'BT'
     SFC_STATUS = 'SC'
+    HSC = 'HSC'
+    PTO = 'PTO'
+    PWM = 'PWM'
+    STI = 'STI'
+    EII = 'EII'
 
     @property
     def default_file(self) -> int | None:
         """Return the file that is meant without a number (S0), None where there is none."""
-        return DEFAULT_FILES.get(self)
+        return DEFAULT_FILES.get(self, FUNCTION_FILES.get(self))
+
+    @property
+    def is_function(self) -> bool:
+        """Tell whether this is a function file of a MicroLogix."""
+        return self in FUNCTION_FILES
 
     @property
     def is_io(self) -> bool:
@@ -96,9 +106,12 @@ DEFAULT_FILES = {
     FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, FileType.BINARY: 3,
     FileType.TIMER: 4, FileType.COUNTER: 5, FileType.CONTROL: 6, FileType.INTEGER: 7,
     FileType.FLOAT: 8}
+# By the numbers with which a MicroLogix 1400 was read by its programming software.
+FUNCTION_FILES = {
+    FileType.HSC: 0, FileType.PTO: 1, FileType.PWM: 2, FileType.STI: 3, FileType.EII: 4}
 _STRUCTURES = (
     FileType.TIMER, FileType.COUNTER, FileType.CONTROL, FileType.PID, FileType.MESSAGE,
-    FileType.BLOCK_TRANSFER, FileType.SFC_STATUS)
+    FileType.BLOCK_TRANSFER, FileType.SFC_STATUS, *FUNCTION_FILES)
 
 
 @dataclass(frozen=True, slots=True)

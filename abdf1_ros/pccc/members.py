@@ -31,7 +31,8 @@ class Member:
     A named part of a structure.
 
     ``word`` counts from 0; ``bit`` is None for a value, which has ``words`` words: two are a
-    float32. ``writable`` tells whether commands from outside may change it.
+    float32, in a function file an int32. ``writable`` tells whether commands from outside may
+    change it.
     """
 
     word: int
@@ -90,6 +91,17 @@ PLC5_PID = _read_only(
               'MINI', 'TIE', words=2),
     'EN', 'PV', 'ERR', 'OUT', 'TIE') | _read_only(
     _flags(1, INI=12, SPOR=11, OLL=10, OLH=9, EWD=8, DVNA=3, DVPA=2, PVLA=1, PVHA=0))
+
+# Function files of a MicroLogix: the values in the order of 1762-RM001 and 1766-RM001. A recording
+# of a 1400 has the limits of its six counters (7FFFFFFF, 80000000) where this order puts them, and
+# the inputs 0 to 7 of its interrupts. Where the bits lie is not known, so words 2 and 3 have
+# numbers only.
+HSC = _read_only(_values(0, 'PFN', 'ER') | _values(4, 'MOD')
+                 | _values(5, 'ACC', 'HIP', 'LOP', 'OVF', 'UNF', words=2)
+                 | _values(15, 'OMB', 'HPO', 'LPO'))
+STI = _read_only(_values(0, 'PFN', 'ER') | _values(3, 'SPM'))
+EII = _read_only(_values(0, 'PFN', 'ER') | _values(3, 'IS'))
+PULSES = _read_only(_values(0, 'OUT'))
 
 # Publication 1762-RM001C 21-4..21-6 (MicroLogix); the rest of the 25 words is reserved.
 SLC_MESSAGE = _read_only(

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.file_types import FileType, FUNCTION_FILES
 
 
 class Processor(Enum):
@@ -76,10 +76,11 @@ class _Model:
 # M 7-17, 7-18. Floats, strings, A and D files came with the 5/03, longs with the MicroLogix
 # (1747-RM001G).
 _OLD = _Model(82, 82, frozenset((
-    FileType.FLOAT, FileType.STRING, FileType.ASCII, FileType.BCD, FileType.LONG)))
-_NEW = _Model(236, 234, frozenset((FileType.LONG,)))
+    FileType.FLOAT, FileType.STRING, FileType.ASCII, FileType.BCD, FileType.LONG,
+    *FUNCTION_FILES)))
+_NEW = _Model(236, 234, frozenset((FileType.LONG, *FUNCTION_FILES)))
 # AG-UM008C 3-38; it has one file each of types O, I, S, B, T, C, R and N.
-_ML1000 = _Model(82, 82, frozenset((FileType.FLOAT,)), has_fixed_files=True)
+_ML1000 = _Model(82, 82, frozenset((FileType.FLOAT, *FUNCTION_FILES)), has_fixed_files=True)
 # The MicroLogix 1100 takes 103 words (1763-RM001); the others take at least as many.
 _MICROLOGIX = _Model(206, 206)
 

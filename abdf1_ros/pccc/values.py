@@ -90,7 +90,7 @@ def types_of(address: Address) -> tuple[ValueType, ...]:
     if address.bit is not None:
         return (ValueType.BOOL,)
     if address.is_value(2):
-        return (ValueType.FLOAT32,)
+        return _TYPES[FileType.LONG if address.file_type.is_function else FileType.FLOAT]
     if address.file_type.is_structure:
         return ValueType.INT16, ValueType.UINT16
     return _TYPES.get(address.file_type, _UNSIGNED_FIRST)

@@ -189,7 +189,7 @@ def addresses(draw: st.DrawFn) -> Address:
     family = draw(FAMILIES)
     kind = draw(st.sampled_from(file_types_of(family)))
     layout = layout_of(kind, family)
-    fixed = kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS)
+    fixed = kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS) or kind.is_function
     file = kind.default_file if fixed else draw(st.integers(3, 255))
     slot = kind.is_io and family == SLC
     words = 256 if slot else layout.words if kind.is_structure else 1
@@ -197,7 +197,8 @@ def addresses(draw: st.DrawFn) -> Address:
     bits = st.one_of(st.none(), st.integers(0, 15))
     bit = draw(bits) if kind.has_bits and layout.value_words(word) == 1 else None
     assert file is not None
-    element = draw(st.integers(0, 30 if slot else 127))
+    last = family_of(family).addressing.last_element(kind)
+    element = draw(st.integers(0, 30 if slot else min(127, last)))
     return Address(family_of(family).addressing, kind, file, element, word, bit)
 
 
@@ -210,12 +211,13 @@ def test_every_address_is_read_back(address: Address) -> None:
 def test_every_member_has_its_name_in_text(family: PlcType) -> None:
     for kind in file_types_of(family):
         for name, member in layout_of(kind, family).members.items():
-            if name == 'CON':
+            if (member.word, member.bit) == (0, None):
                 continue  # T4:1 is that already
             sign = '.' if member.bit is None else '/'
-            address = parse_address(f'{kind.value}10:1.{name}', family)
+            place = f'{kind.value}:0' if kind.is_function else f'{kind.value}10:1'
+            address = parse_address(f'{place}.{name}', family)
             assert (address.word, address.bit) == (member.word, member.bit)
-            assert str(address) == f'{kind.value}10:1{sign}{name}'
+            assert str(address) == f'{place}{sign}{name}'
             assert parse_address(str(address), family) == address
 
 
@@ -354,7 +356,8 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     ('CT20:0', PLC5, 'CT files (ControlNet transfer) cannot be read or written here; file types '
                      'of PLC-5: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
     ('PLS9:0', SLC, 'PLS files (programmable limit switch) cannot be read or written here; file '
-                    'types of SLC: O, I, S, B, T, C, R, N, F, ST, A, D, L, PD, MG')])
+                    'types of SLC: O, I, S, B, T, C, R, N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, '
+                    'STI, EII')])
 def test_what_is_not_supported_is_refused_with_what_would_be_right(
         text: str, family: PlcType, right: str) -> None:
     with pytest.raises(AddressSyntaxError) as caught:

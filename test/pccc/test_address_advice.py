@@ -49,12 +49,10 @@ SLC, PLC5 = PlcType.SLC, PlcType.PLC5
     ('B3:0/O', PLC5, 'that is the letter O where a digit should be; write B3:0/0'),
     ('O:OO1/O0', PLC5, 'that is the letter O where a digit should be; write O:001/00'),
     ('T4:O.ACC', SLC, 'that is the letter O where a digit should be; write T4:0.ACC'),
-    ('RTC:0.HR', SLC, 'RTC is a function file, which is not supported; let the program copy what '
-                      'is needed into an N file'),
-    ('HSC:0.ACC', SLC, 'HSC is a function file, which is not supported; let the program copy '
-                       'what is needed into an N file'),
-    ('CS0:4', SLC, 'CS is a function file, which is not supported; let the program copy what is '
-                   'needed into an N file'),
+    ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (the clock is S:37 to '
+                      'S:42); let the program copy what is needed into an N file'),
+    ('CS0:4', SLC, 'CS is a function file whose type code is not known; let the program copy what '
+                   'is needed into an N file'),
 ])
 def test_other_forms_are_told_what_to_write(text: str, family: PlcType, expected: str) -> None:
     with pytest.raises(AddressSyntaxError) as fault:

@@ -22,6 +22,7 @@ from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
+FUNCTION = ('HSC', 'PTO', 'PWM', 'STI', 'EII')
 
 
 @pytest.mark.parametrize(('letters', 'file'), [
@@ -34,7 +35,8 @@ def test_default_files_are_those_of_the_specification(letters: str, file: int | 
 
 @pytest.mark.parametrize(('letters', 'code', 'words'), [
     ('S', 0x84, 1), ('B', 0x85, 1), ('T', 0x86, 3), ('C', 0x87, 3), ('R', 0x88, 3),
-    ('N', 0x89, 1), ('F', 0x8A, 2), ('O', 0x8B, 1), ('I', 0x8C, 1), ('ST', 0x8D, 42),
+    ('N', 0x89, 1), ('F', 0x8A, 2), ('HSC', 0xE0, 18), ('STI', 0xE2, 4), ('EII', 0xE3, 4),
+    ('PTO', 0xED, 15), ('PWM', 0xEE, 10), ('O', 0x8B, 1), ('I', 0x8C, 1), ('ST', 0x8D, 42),
     ('A', 0x8E, 1), ('D', 0x8F, 1), ('L', 0x91, 2), ('MG', 0x92, 25), ('PD', 0x93, 23)])
 def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
     kind = FileType(letters)
@@ -44,12 +46,12 @@ def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
 
 
 def test_every_file_type_of_an_slc_has_its_own_code() -> None:
-    assert len(BY_CODE) == len(file_types_of(SLC)) == 15
+    assert len(BY_CODE) == len(file_types_of(SLC)) == 20
 
 
 @pytest.mark.parametrize(('family', 'missing'), [
-    (PLC5, {'L'}), (SLC, {'BT', 'SC'}),
-    (PlcType.PLC3, {'R', 'F', 'ST', 'L', 'PD', 'MG', 'BT', 'SC'})])
+    (PLC5, {'L', *FUNCTION}), (SLC, {'BT', 'SC'}),
+    (PlcType.PLC3, {'R', 'F', 'ST', 'L', 'PD', 'MG', 'BT', 'SC', *FUNCTION})])
 def test_file_types_that_a_family_does_not_have(family: PlcType, missing: set[str]) -> None:
     assert {kind.value for kind in FileType} - {
         kind.value for kind in file_types_of(family)} == missing
@@ -61,7 +63,8 @@ def test_file_types_that_a_family_does_not_have(family: PlcType, missing: set[st
 def test_kinds_of_files() -> None:
     assert {kind.value for kind in FileType if kind.is_io} == {'I', 'O'}
     assert {kind.value for kind in FileType if kind.is_structure} == {
-        'T', 'C', 'R', 'PD', 'MG', 'BT', 'SC'}
+        'T', 'C', 'R', 'PD', 'MG', 'BT', 'SC', *FUNCTION}
+    assert {kind.value for kind in FileType if kind.is_function} == set(FUNCTION)
     assert {kind.value for kind in FileType if not kind.has_bits} == {'F', 'ST', 'L'}
 
 
@@ -97,7 +100,7 @@ def test_whole_control_words_are_never_written(family: PlcType) -> None:
     for kind in file_types_of(family):
         layout = layout_of(kind, family)
         flagged = {member.word for member in layout.members.values() if member.bit is not None}
-        assert bool(flagged) is kind.is_structure
+        assert bool(flagged) is (kind.is_structure and not kind.is_function)
         assert not any(layout.may_write(word) for word in flagged)
 
 
@@ -128,7 +131,7 @@ def test_what_may_be_written(letters: str, family: PlcType, names: str) -> None:
 @pytest.mark.parametrize(('letters', 'family', 'word', 'bit'), [
     ('T', PLC5, 0, 3), ('MG', PLC5, 0, 15), ('MG', PLC5, 4, None), ('PD', PLC5, 1, 12),
     ('PD', PLC5, 50, None), ('PD', PLC5, 81, 0), ('PD', SLC, 10, None), ('PD', SLC, 17, None),
-    ('MG', SLC, 16, 15)])
+    ('MG', SLC, 16, 15), ('HSC', SLC, 5, None), ('PWM', SLC, 4, None)])
 def test_what_has_no_name_is_internal(letters: str, family: PlcType, word: int,
                                       bit: int | None) -> None:
     assert not layout_of(FileType(letters), family).may_write(word, bit)

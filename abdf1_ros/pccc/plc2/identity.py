@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
+from abdf1_ros.pccc.processor import Processor
 
 KG = 0x14  # byte 2: a 1771-KG (4) of a PLC-2 (1)
 MODULE_ALONE = 0x08  # byte 1
@@ -69,7 +70,8 @@ def _processor(data: bytes) -> str | None:
     return _KA3_EXPANSION.get(data[2], f'PLC-2 of type 0x{data[2]:02X}') if data[2:] else None
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
+def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
+           processor: Processor | None = None) -> bytes:
     """
     Return the data of the reply of a PLC-2 behind a 1771-KG to 06/03.
 

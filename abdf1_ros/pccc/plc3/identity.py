@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
+from abdf1_ros.pccc.processor import Processor
 
 PORT = 0x47  # byte 2: a 1775-KA's RS-232 port (7) of a PLC-3 (4)
 MAJOR_FAULT = 0x08  # byte 1
@@ -37,7 +38,8 @@ def decode(data: bytes) -> Identity | None:
                     interface=data[1], counter_address=word_at(data, 6))
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
+def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
+           processor: Processor | None = None) -> bytes:
     """
     Return the data of the reply of a PLC-3, asked at the RS-232 port of a 1775-KA, to 06/03.
 

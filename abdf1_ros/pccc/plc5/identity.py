@@ -41,6 +41,7 @@ from abdf1_ros.pccc.identity import (
 from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
+from abdf1_ros.pccc.processor import Processor
 
 EXTENDED = 0xEB  # byte 2: an expansion byte tells the model
 PLC_5_40 = 0x15
@@ -128,7 +129,8 @@ def _with_fault(identity: Identity, reply: bytes) -> Identity:
         fault if text == _UNNAMED_FAULT else text for text in identity.faults))
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
+def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
+           processor: Processor | None = None) -> bytes:
     """
     Return the data of the reply of a PLC-5/40 to 06/03.
 

@@ -47,15 +47,21 @@ FILES = {
     FileType.BCD: Layout(code=0x8F),
     FileType.LONG: Layout(2, 0x91),
     FileType.MESSAGE: Layout(25, 0x92, members.SLC_MESSAGE),
-    FileType.PID: Layout(23, 0x93, members.SLC_PID)}
+    FileType.PID: Layout(23, 0x93, members.SLC_PID),
+    FileType.HSC: Layout(18, 0xE0, members.HSC),
+    FileType.STI: Layout(4, 0xE2, members.STI),
+    FileType.EII: Layout(4, 0xE3, members.EII),
+    FileType.PTO: Layout(15, 0xED, members.PULSES),
+    FileType.PWM: Layout(10, 0xEE, members.PULSES)}
 
 BY_CODE = {layout.code: kind for kind, layout in FILES.items()}
 
 _PLC5_IO = re.compile(r'[#$]?(?P<type>[IO])\d?[:;]0[0-7]{2}(?:/[0-7]{1,2})?', re.ASCII)
-# The function files of the MicroLogix; they are read by other commands than data files.
-_FUNCTION_FILES = re.compile(
-    r'(?P<name>BHI|CS|DAT|DLS|EII|ES|HSC|IOS|LCD|MMI|PTO|PWM|RTC|STI|TPI)\d*(?:[:;/.].*)?',
-    re.ASCII)
+# Function files of the MicroLogix whose type code is not known.
+_UNKNOWN_FILES = re.compile(
+    r'(?P<name>BHI|CS|DAT|DLS|ES|IOS|LCD|MMI|RTC|TPI)\d*(?:[:;/.].*)?', re.ASCII)
+_LAST_OF_FUNCTION = {
+    FileType.HSC: 5, FileType.STI: 0, FileType.EII: 7, FileType.PTO: 2, FileType.PWM: 2}
 
 # Last elements and slots, and last words of a slot (M 13-13).
 _LAST_ELEMENT = 255
@@ -71,10 +77,11 @@ class _SlcAddressing(FileAddressing):
     last_file = 255
 
     def mistaken(self, text: str) -> str | None:
-        """Recognise function files, and the octal inputs and outputs of a PLC-5."""
-        if match := _FUNCTION_FILES.fullmatch(text):
-            return (f'{match["name"]} is a function file, which is not supported; let the program '
-                    'copy what is needed into an N file')
+        """Recognise function files that cannot be read, and the octal I/O of a PLC-5."""
+        if match := _UNKNOWN_FILES.fullmatch(text):
+            clock = ' (the clock is S:37 to S:42)' if match['name'] == 'RTC' else ''
+            return (f'{match["name"]} is a function file whose type code is not known{clock}; let '
+                    'the program copy what is needed into an N file')
         if match := _PLC5_IO.fullmatch(text):
             return ('this is the octal form of a PLC-5; an SLC has slot, word and bit, as in '
                     f'{match["type"]}:1.0/3')
@@ -82,7 +89,7 @@ class _SlcAddressing(FileAddressing):
 
     def last_element(self, kind: FileType, is_flat: bool = False) -> int:
         if not kind.is_io:
-            return _LAST_ELEMENT
+            return _LAST_OF_FUNCTION.get(kind, _LAST_ELEMENT)
         return _LAST_FLAT_WORD if is_flat else _LAST_SLOT
 
     def elements_name(self, kind: FileType, is_flat: bool) -> str:

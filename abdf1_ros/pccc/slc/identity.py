@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What an SLC 500 or MicroLogix says of itself: 24 bytes (M 10-3, 10-4, 10-6)."""
+"""
+What an SLC 500 or MicroLogix says of itself: 24 bytes (M 10-3, 10-4, 10-6).
+
+A MicroLogix 1100 and 1400 have been seen to send a 25th, which no manual explains.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +33,7 @@ from abdf1_ros.pccc.identity import (
     word_at,
 )
 from abdf1_ros.pccc.link_counters import CounterLayout
-from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.slc.faults import major_error
 
 EXTENDED = 0xEE  # byte 2: interface and processor type follow, then a name
@@ -44,7 +48,7 @@ _MODELS = {
     0x18: 'SLC 5/01', 0x1A: 'SLC 500 fixed', 0x25: 'SLC 5/02', SLC_5_03: 'SLC 5/03',
     0x5B: 'SLC 5/04', 0x58: 'MicroLogix 1000', 0x78: 'SLC 5/05',
     0x88: 'MicroLogix 1200', 0x89: 'MicroLogix 1500 LSP', 0x8C: 'MicroLogix 1500 LRP',
-    0x9C: 'MicroLogix 1100'}
+    0x9C: 'MicroLogix 1100', 0x9F: 'MicroLogix 1400'}
 
 # What the name of a model begins with; 5/ and 1747 are any SLC 500.
 _NAMES = {
@@ -55,7 +59,7 @@ _NAMES = {
 
 # By what the name of a model begins with. The fixed ones take the packets of the 5/01 (M 7-17).
 _PROCESSORS = {
-    'SLC 500 fixed': Processor.SLC_5_01, 'SLC 5/01': Processor.SLC_5_01,
+    'SLC 5/01': Processor.SLC_5_01, 'SLC 500 fixed': Processor.SLC_5_01,
     'SLC 5/02': Processor.SLC_5_02, 'SLC 5/03': Processor.SLC_5_03,
     'SLC 5/04': Processor.SLC_5_04, 'SLC 5/05': Processor.SLC_5_05,
     'MicroLogix 1000': Processor.ML1000, 'MicroLogix 1100': Processor.ML1100,
@@ -88,6 +92,7 @@ ML1000_COUNTERS = CounterLayout((
     'framing errors'))
 
 MAJOR_ERROR_HALTED = 0x20  # byte 20
+_ALWAYS_SET = 0x20  # byte 19 of a MicroLogix
 _NO_OWNER = 0xFC  # byte 24: nobody owns the program
 _MINOR_ERROR_LEFT = 0x0020  # the major error of an emulated processor
 
@@ -107,7 +112,9 @@ def decode(data: bytes) -> Identity | None:
     faults = (f'{major_error(error)}, processor halted',) if halted else ()
     remarks += named({
         f'last {major_error(error)}': error and not halted,
-        'forces active': data[18] & 0x20, 'forces installed': data[18] & 0x40,
+        # Bit 5 is always set on a MicroLogix (1762-RM001C C-4).
+        'forces active': data[18] & _ALWAYS_SET and not model.startswith('MicroLogix'),
+        'forces installed': data[18] & 0x40,
         'testing edits': data[0] & 0x40, 'edits in the processor': data[0] & 0x80,
         'program directory corrupted': data[23] & 0x01})
     return Identity(PlcType.SLC, model, *release(data[4]), mode, mode_text, faults, remarks, name,
@@ -149,14 +156,21 @@ def _model(code: int, name: str) -> tuple[str, tuple[str, ...]]:
         f'its processor code 0x{code:02X} is that of a {by_code}': len(by_code)})
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool) -> bytes:
+def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
+           processor: Processor | None = None) -> bytes:
     """
-    Return the data of the reply of an SLC 5/03 to 06/03.
+    Return the data of the reply of an SLC 5/03, or of ``processor``, to 06/03.
 
     Fields for memory and programs, which it does not have, are 0.
     """
+    model = next(name for name, known in _PROCESSORS.items() if known is (processor or USUAL))
+    code = next(code for code, name in _MODELS.items() if name.startswith(model))
+    name = next(start for start, known in _NAMES.items() if known == model)
+    is_micrologix = model.startswith('MicroLogix')
     port = FULL_DUPLEX_PORT if is_full_duplex else HALF_DUPLEX_PORT
     error = _MINOR_ERROR_LEFT if is_faulted else 0
-    return (bytes((0, EXTENDED, port, SLC_5_03, 0)) + b'5/03'.ljust(11)
+    state = code_of(MODES, mode) | _ALWAYS_SET * is_micrologix
+    return (bytes((0, EXTENDED, port, code, 0))
+            + (f'{name}-LEC' if is_micrologix else name).encode().ljust(11)
             + error.to_bytes(2, 'little')
-            + bytes((code_of(MODES, mode), MAJOR_ERROR_HALTED * is_faulted, 0, 0, 0, _NO_OWNER)))
+            + bytes((state, MAJOR_ERROR_HALTED * is_faulted, 0, 0, 0, _NO_OWNER)))

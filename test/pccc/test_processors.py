@@ -1,0 +1,203 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What real processors have answered, and what we make of it: vectors/processors.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import json
+from typing import Any
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.describe import describe
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import decode_identity, dialect_of, parse_address
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
+import pytest
+from support.vectors import VECTOR_FOLDER
+
+PROCESSORS: list[dict[str, Any]] = json.loads(
+    (VECTOR_FOLDER / 'processors.json').read_text(encoding='utf-8'))['processors']
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """A command and its reply, without link header."""
+
+    meaning: str
+    command: Packet
+    reply: Packet
+
+
+def exchanges(name: str) -> list[Exchange]:
+    entry = next(processor for processor in PROCESSORS if processor['name'] == name)
+    found = []
+    for exchange in entry['exchanges']:
+        raw = bytes.fromhex(exchange['command'])
+        command = Packet(1, 0, raw[0], 0, 7, raw[1:])
+        reply = command.reply(bytes.fromhex(exchange['data']), int(exchange['sts'], 16))
+        found.append(Exchange(exchange['meaning'], command, reply))
+    return found
+
+
+ML1400 = exchanges('micrologix_1400')
+
+
+def place_of(command: Packet) -> tuple[Address, int] | None:
+    """Return what a typed logical read asks for, None where we do not know the type."""
+    if (command.cmd, command.data[:1]) != (0x0F, b'\xA2'):
+        return None
+    request = slc.LogicalRead.read(Reader(command.data[1:]))
+    at, code = request.address, request.address.type_code
+    flat = slc.BY_FLAT_CODE.get(code)
+    kind = flat or BY_CODE.get(code)
+    if kind is None:
+        return None
+    start = Address(ADDRESSING, kind, at.file, at.element, is_flat=flat is not None)
+    return start.at_offset(start.offset + (at.sub_element or 0)), request.size // 2
+
+
+KNOWN = [(*place, exchange) for exchange in ML1400 if (place := place_of(exchange.command))]
+
+
+def test_every_command_is_told_as_what_it_is() -> None:
+    for processor in PROCESSORS:
+        for exchange in exchanges(processor['name']) if 'exchanges' in processor else ():
+            assert describe(exchange.command) == exchange.meaning
+    assert len(ML1400) == 73
+
+
+def test_kinds_of_files_that_were_read() -> None:
+    assert {place.file_type.value for place, _, _ in KNOWN} == {
+        'O', 'I', 'S', 'B', 'T', 'C', 'R', 'N', 'F', 'HSC', 'PTO', 'PWM', 'STI', 'EII'}
+
+
+@pytest.mark.parametrize(('place', 'words', 'exchange'), KNOWN, ids=lambda part: str(part)[:20])
+def test_our_read_is_the_command_that_was_accepted(place: Address, words: int,
+                                                   exchange: Exchange) -> None:
+    dialect = dialect_of(PlcType.SLC, None, Processor.ML1400)
+    assert words <= dialect.max_read(place.file_type)
+    cmd, data = dialect.read(place, words)
+    asked, sent = (slc.LogicalRead.read(Reader(raw[1:])) for raw in (exchange.command.data, data))
+    # Their programming software counts words after element 0, also past the first element.
+    assert (cmd, asked.size, asked.address.file, asked.address.type_code) == (
+        0x0F, sent.size, sent.address.file, sent.address.type_code)
+    assert sent.address.element * place.layout.words + (sent.address.sub_element or 0) == \
+        asked.address.element * place.layout.words + (asked.address.sub_element or 0)
+    assert dialect.read_data(place, words, exchange.reply.data) == exchange.reply.data
+
+
+def test_values_of_function_files() -> None:
+    data = {place.file_type.value: exchange.reply.data for place, _, exchange in reversed(KNOWN)}
+    for text, value in (('HSC:0.HIP', 0x7FFFFFFF), ('HSC:0.LOP', -0x80000000),
+                        ('HSC:0.ACC', 0), ('EII:5.IS', 5), ('STI:0.SPM', 0), ('PWM:0.OUT', -1)):
+        place = parse_address(text, PlcType.SLC)
+        at = 2 * place.offset
+        words = place.layout.value_words(place.word)
+        found = data[place.file_type.value][at:at + 2 * words]
+        assert int.from_bytes(found, 'little', signed=True) == value, text
+
+
+@pytest.mark.parametrize(('mode', 'known', 'remarks'), [
+    (0x26, Mode.REMOTE_RUN, ()), (0x21, Mode.REMOTE_PROGRAM, ()),
+    (0x66, Mode.REMOTE_RUN, ('forces installed',))])
+def test_identity_of_a_micrologix_1400(mode: int, known: Mode, remarks: tuple[str, ...]) -> None:
+    reply = next(exchange.reply for exchange in ML1400
+                 if exchange.command.cmd == 6 and exchange.reply.data[18] == mode)
+    identity = decode_identity(reply.data)
+    assert (identity.model, identity.processor) == ('MicroLogix 1400', Processor.ML1400)
+    assert (identity.series, identity.revision, identity.name) == ('B', '4', '1766-LEC')
+    assert (identity.mode, identity.faults, identity.remarks) == (known, (), remarks)
+    assert len(reply.data) == 25
+
+
+def test_mode_that_a_change_of_mode_leads_to() -> None:
+    after = {exchange.command.data[1]: ML1400[number + 1].reply.data[18]
+             for number, exchange in enumerate(ML1400) if exchange.command.data[:1] == b'\x80'
+             and ML1400[number + 1].command.cmd == 6}
+    assert after == {1: 0x21}
+    assert decode_identity(simulated(Setting.PROGRAM)).mode is Mode.REMOTE_PROGRAM
+
+
+def simulated(setting: Setting) -> bytes:
+    """Return the reply of a simulated MicroLogix 1400 to 06/03."""
+    return EmulatedProcessor(
+        PlcType.SLC, setting, is_full_duplex=True, processor=Processor.ML1400).encode()
+
+
+@pytest.mark.parametrize(('setting', 'mode'), [(Setting.REMOTE, 0x26), (Setting.PROGRAM, 0x21)])
+def test_simulated_identity_has_the_bytes_of_the_real_one(setting: Setting, mode: int) -> None:
+    real = next(exchange.reply.data for exchange in ML1400
+                if exchange.command.cmd == 6 and exchange.reply.data[18] == mode)
+    # Its own are port, release, program, memory, and the byte that no manual knows.
+    own = {2, 4, 20, 21, 22}
+    ours = simulated(setting)
+    assert [(at, ours[at]) for at in range(24) if at not in own] == [
+        (at, real[at]) for at in range(24) if at not in own]
+
+
+def test_simulated_data_files_answer_the_same() -> None:
+    table = DataTable(PlcType.SLC)
+    data_files = [entry for entry in KNOWN if not entry[0].file_type.is_function]
+    for place, words, exchange in data_files:
+        start = parse_address(f'{place.file_type.value}:0.0', PlcType.SLC) if place.is_flat \
+            else place
+        table.create(start, words)
+        table.write(start, exchange.reply.data)
+    server = Server(table, EmulatedProcessor(PlcType.SLC, processor=Processor.ML1400))
+    for _, _, exchange in data_files:
+        assert server.serve(exchange.command) == exchange.reply, exchange.meaning
+
+
+def test_masked_write_of_two_words_has_one_mask_and_spares_the_other_bits() -> None:
+    # Recorded on the words of forced inputs, which nobody else has; the same in an N file here.
+    masked = [exchange.command.data for exchange in ML1400 if exchange.command.data[:1] == b'\xAB']
+    assert len(masked) == 4
+    table = DataTable(PlcType.SLC)
+    start = parse_address('N7:0', PlcType.SLC)
+    table.create(start, 2)
+    table.write(start, b'\0\0\xFF\xFF')
+    server, words = Server(table), []
+    for data in masked:
+        command = Packet(1, 0, 0x0F, 0, 7, data[:2] + b'\x07\x89' + data[4:])
+        assert server.serve(command) == command.reply()
+        words.append(table.read(start, 2).hex(' ').upper())
+    # As the polls after each write show: OR word 0020, 0021, 0001, and the AND word unchanged.
+    assert words == ['20 00 FF FF', '21 00 FF FF', '01 00 FF FF', '00 00 FF FF']
+
+
+def test_frames_of_a_serial_line() -> None:
+    frames = [frame for processor in PROCESSORS for frame in processor.get('frames', ())]
+    assert len(frames) == 4
+    for frame in frames:
+        decoder = FrameDecoder(Checksum.CRC, Duplex.FULL)
+        decoder.feed(bytes.fromhex(frame['bytes']))
+        assert decoder.next_symbol() is Control.ACK
+        message = decoder.next_symbol()
+        assert isinstance(message, Frame)
+        assert message.fault is None
+    identity = decode_identity(bytes.fromhex(frames[2]['bytes'])[10:-4])
+    assert (identity.model, identity.mode, identity.remarks) == (
+        'MicroLogix 1100', Mode.REMOTE_RUN, ())
