@@ -62,7 +62,7 @@ class Agenda:
         self._own_in_a_row = 0
         self._writes_in_a_row = 0
         self._has_begun_write = False
-        self._last_check = -math.inf
+        self._last_check = self._last_refresh = -math.inf
         self._last_probe_was_check = False
 
     def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
@@ -89,7 +89,8 @@ class Agenda:
     def _usual(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         if self._writes_in_a_row < MAX_WRITES_IN_A_ROW and (write := self._write(now, busy)):
             return write
-        return self._check(now, busy) or self._read(now, busy) or self._write(now, busy)
+        return self._check(now, busy) or self._refresh(now, busy) or self._read(now, busy) \
+            or self._write(now, busy)
 
     def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a new write, or the next packet of one under way, in turns."""
@@ -115,6 +116,15 @@ class Agenda:
         if self._writes:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
+
+    def _refresh(self, now: float, busy: Container[int]) -> Job | None:
+        """Return a fallback that stands (rule 8); the turn of the reads comes after it."""
+        if self._interlocks is None or self._reads.is_due(self._last_refresh):
+            return None
+        own = self._interlocks.refresh(now, busy)
+        if own is not None:
+            self._last_refresh = now
+        return own
 
     def _probe_from(self, now: float) -> float:
         """

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 Fallback values: what is written when nobody writes any more (rules 7 to 12 and 17).
 
@@ -20,7 +19,7 @@ The numbers of rules are those of docs/heartbeats.md.
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import auto, Enum
 import math
 
 from abdf1_ros.driver.points import Outcome, Write
@@ -28,6 +27,9 @@ from abdf1_ros.settings.mapping import Mapping
 
 # A fallback value that the PLC refuses is written again after so many seconds.
 _PAUSE_AFTER_REFUSAL = 1.0
+
+# One that stands is written again after so many seconds at least (rule 8).
+_LEAST_REFRESH = 5.0
 
 
 class FallbackCause(Enum):
@@ -40,34 +42,67 @@ class FallbackCause(Enum):
     END = 'end'
 
 
+class FallbackState(Enum):
+    """What the PLC holds of a row: a message, or the fallback, as far as one knows."""
+
+    MESSAGE = 'a message stands'
+    DUE = 'the fallback value is due'
+    STANDS = 'the fallback value stands'
+
+
+class FallbackEvent(Enum):
+    """What changes the state: a message also when it may have been written."""
+
+    DUE = auto()
+    FALLBACK_WRITTEN = auto()
+    MESSAGE_WRITTEN = auto()
+
+
+_NEXT = {
+    FallbackState.MESSAGE: {
+        FallbackEvent.DUE: FallbackState.DUE,
+        FallbackEvent.MESSAGE_WRITTEN: FallbackState.MESSAGE,
+        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
+    FallbackState.DUE: {  # whatever is written, until the PLC has confirmed the fallback
+        FallbackEvent.DUE: FallbackState.DUE,
+        FallbackEvent.MESSAGE_WRITTEN: FallbackState.DUE,
+        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
+    FallbackState.STANDS: {
+        FallbackEvent.DUE: FallbackState.DUE,
+        FallbackEvent.MESSAGE_WRITTEN: FallbackState.MESSAGE,
+        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
+}
+
+
 class FallbackRow:
     """
     One row with Fallback, and what the PLC holds of it.
 
-    ``cause`` says why the fallback is due, None where it is not. It stays due until the PLC has
-    confirmed it. ``refreshed`` is when the last confirmed message was published, ``sent`` when the
-    fallback was last sent: a message published before that is not sent any more. Both are clock
-    values (s). ``stands`` tells that the PLC holds the fallback and no message was sent since,
-    ``is_held_up`` that the fallback waits for a message that is under way, ``refusal`` why its
-    last write was not confirmed.
+    ``cause`` says why the fallback is due, None where it is not. ``refreshed`` is when the last
+    confirmed message was published, ``sent`` when the fallback was last sent: a message published
+    before that is not sent any more. ``due`` is when the row has to be looked at. All are clock
+    values (s). ``is_held_up`` tells that the fallback waits for a message that is under way,
+    ``has_failed`` that a message has ended otherwise since the last that was confirmed.
+    ``refusal`` says why the last write of the fallback was not confirmed.
     """
 
     def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
         assert mapping.fallback is not None
         self.mapping = mapping
         self.after = mapping.fallback.after / 1000
+        self.state = FallbackState.MESSAGE
         self.refreshed = -math.inf
         self.sent = -math.inf
+        self.tried = -math.inf  # like ``sent``, also when it is written again
+        self.due = math.inf
         self.cause: FallbackCause | None = None
         self.refusal = ''
         self.is_under_way = False
         self.is_held_up = False
-        self.stands = False
         # From when the time counts: the last confirmed message, or, after a fallback, the first
         # whose outcome is unknown.
         self._counts_from = -math.inf
-        # Whether a message has ended otherwise since the last that was confirmed.
-        self._has_failed = False
+        self.has_failed = False
         self._values = mapping.fallback.values
         self._settle_time = 2 * cmd_timeout
         self._due_since = 0.0
@@ -75,13 +110,23 @@ class FallbackRow:
         # Whether a write has ended as unknown since the last message or fallback was confirmed.
         # What was under way when we began is unknown: a gateway may still hold it.
         self._is_unconfirmed = mapping.via is not None
-        self._again_at = math.inf
+        self._again_at = math.inf  # once more for what a gateway may hold (rule 10)
+        self.refresh_at = math.inf  # for what nobody has seen (rule 8)
+
+    def _go(self, event: FallbackEvent) -> None:
+        self.state = _NEXT[self.state][event]
+
+    @property
+    def stands(self) -> bool:
+        """Tell whether the PLC holds the fallback, and no message was sent since."""
+        return self.state is FallbackState.STANDS
 
     def make_due(self, cause: FallbackCause, now: float) -> None:
         """Make the fallback due; the first cause is the one that is told."""
         if self.cause is None:
             self.cause, self._due_since = cause, now
-        self._next_try = -math.inf
+        self._go(FallbackEvent.DUE)
+        self._next_try = self.due = now
 
     @property
     def is_first_try(self) -> bool:
@@ -100,29 +145,35 @@ class FallbackRow:
         waited for while all goes well: there is always one where they come faster than the PLC
         refuses them.
         """
-        if self.cause is not None:
+        if self.state is FallbackState.DUE:
             return self._due_since
-        if self.stands:
+        if self.state is FallbackState.STANDS:
             return math.inf
         return self.after + (
-            self._counts_from if self._has_failed else max(self._counts_from, youngest))
+            self._counts_from if self.has_failed else max(self._counts_from, youngest))
 
-    def judge(self, now: float, youngest: float) -> None:
-        """Make the fallback due when the time of the last message is up."""
-        if self.cause is None and now >= self.deadline(youngest):
+    def judge(self, now: float, youngest: float) -> bool:
+        """Tell whether the fallback is to be written now; plan when to look again if it is not."""
+        if self.state is FallbackState.MESSAGE and now >= self.deadline(youngest):
             self.make_due(FallbackCause.TIMEOUT, now)
-
-    def next_due(self, youngest: float) -> float:
-        """Return when it wants the line (clock value in s), infinite for never."""
         if self.is_under_way or self.is_held_up:
-            return math.inf
-        if self.cause is not None:
-            return max(self._due_since, self._next_try)
-        return min(self.deadline(youngest), self._again_at)
+            self.due = math.inf
+        elif self.state is FallbackState.DUE:
+            self.due = max(self._due_since, self._next_try)
+        elif self.state is FallbackState.STANDS:
+            self.due = self._again_at
+        else:
+            self.due = self.deadline(youngest)
+        return self.due <= now
 
     def take(self, now: float) -> Write:
         """Return the write of the fallback, which ends with ``ended``."""
-        self.is_under_way, self.sent = True, now
+        self.sent = now
+        return self.refresh(now)
+
+    def refresh(self, now: float) -> Write:
+        """Return the write of a fallback that stands already."""
+        self.is_under_way, self.tried = True, now
         return Write(self.mapping, self._values, now)
 
     def ended(self, outcome: Outcome, now: float) -> float | None:
@@ -132,30 +183,31 @@ class FallbackRow:
         It is written once more where a gateway may still hold a message of the row (rule 10).
         """
         self.is_under_way = False
+        self.due = now
         if outcome is not Outcome.WRITTEN:
             refused = outcome in (Outcome.FAILED, Outcome.PARTLY)
             self._next_try = now + _PAUSE_AFTER_REFUSAL if refused else now
-            if self.cause is None:
-                self._again_at = now + _PAUSE_AFTER_REFUSAL
+            self._again_at = now + _PAUSE_AFTER_REFUSAL
             return None
-        self.stands = True
         self._again_at = now + self._settle_time if self._is_unconfirmed else math.inf
         self._is_unconfirmed = False
-        if self.cause is None:
-            return None
-        self.cause = None
-        return now - self._due_since
+        self.refresh_at = now + max(self.after, _LEAST_REFRESH)
+        was_due, self.cause = self.cause is not None, None
+        self._go(FallbackEvent.FALLBACK_WRITTEN)
+        return now - self._due_since if was_due else None
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
         """Take note how a message of the row ended that had the line (rule 7)."""
-        self._has_failed = outcome is not Outcome.WRITTEN
+        self.is_held_up = False
+        self.due = -math.inf
+        self.has_failed = outcome is not Outcome.WRITTEN
         if outcome is Outcome.WRITTEN:
             self._counts_from = self.refreshed = max(self.refreshed, requested)
-            self._is_unconfirmed, self._again_at = False, math.inf
+            self._is_unconfirmed = False
         elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
             self._is_unconfirmed = True
             if self.stands:
                 self._counts_from = requested
         else:
             return
-        self.stands = False
+        self._go(FallbackEvent.MESSAGE_WRITTEN)

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 Heartbeats: a word that we count up while all conditions hold (rules 1 to 6).
 
@@ -21,6 +20,7 @@ The numbers of rules are those of docs/heartbeats.md.
 from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
+from enum import auto, Enum
 import math
 
 from abdf1_ros.driver.points import Outcome, Write
@@ -30,37 +30,79 @@ LARGEST = 32_767
 
 _LEAST_LIFE_SIGN = 1.0  # s
 
+# At first contact 0 stands for so long (s) at least: a PLC sees a word once in a scan (rule 2).
+_LEAST_ZERO = 0.5
+
+# A stopped executor does not wake the link, so the link looks by itself every so many seconds.
+_GLANCE = 0.1
+
+
+class BeatState(Enum):
+    """What the PLC is to see: 0, or a value that counts."""
+
+    CONTACT = 'first contact: 0 has to be confirmed'
+    SHOWN = '0 stands, for the PLC to see it'
+    COUNTS = 'counts'
+    HELD = '0, while it must not count'
+
+
+class BeatEvent(Enum):
+    """What changes the state."""
+
+    CONTACT = auto()
+    ZERO_CONFIRMED = auto()
+    SEEN = auto()
+    HOLD = auto()
+    RELEASE = auto()
+
+
+_NEXT = {
+    BeatState.CONTACT: {BeatEvent.CONTACT: BeatState.CONTACT,
+                        BeatEvent.ZERO_CONFIRMED: BeatState.SHOWN},
+    BeatState.SHOWN: {BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.SEEN: BeatState.COUNTS},
+    BeatState.COUNTS: {BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.HOLD: BeatState.HELD},
+    BeatState.HELD: {BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.RELEASE: BeatState.COUNTS},
+}
+
 
 class HeartbeatRow:
     """
     One Heartbeat row, and what the PLC holds of it.
 
     ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
-    one. ``reason`` says why it does not count, empty while it does; ``is_held`` tells that the PLC
-    has to get 0. ``refusal`` says why the last write was not confirmed.
+    one. ``reason`` says why it does not count, empty while it does. ``refusal`` says why the last
+    write was not confirmed, ``tried`` when that was sent. ``due`` is when the row has to be looked
+    at (clock values in s).
     """
 
     def __init__(self, mapping: Mapping) -> None:
         assert mapping.heartbeat is not None
         assert mapping.period is not None
         self.mapping = mapping
+        self.state = BeatState.CONTACT
         self.value = 0
         self.confirmed: float | None = None
         self.reason = ''
         self.refusal = ''
-        self.is_held = False
         self.is_under_way = False
-        self._period = mapping.period / 1000
-        self._requires = mapping.heartbeat.requires
+        self.is_first_try = True  # of the 0 that has to be written
+        self.tried = -math.inf
+        self.due = math.inf
+        self.requires = mapping.heartbeat.requires
         self._requires_timeout = (mapping.heartbeat.requires_timeout or 0) / 1000
+        self._period = mapping.period / 1000
         self._is_confirmed = False
-        self._must_begin = True  # 0 has to be confirmed before it counts (rule 2)
         self._next = -math.inf
+
+    def _go(self, event: BeatEvent) -> None:
+        self.state = _NEXT[self.state][event]
 
     def why_not(self, now: float) -> str:
         """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
         if self.reason or self.confirmed is None:
             return self.reason or self.refusal or 'the PLC has not confirmed it yet'
+        if self.state is not BeatState.COUNTS:
+            return self.refusal or self.state.value
         silent = now - self.confirmed
         why = f': {self.refusal}' if self.refusal else ''
         return f'not confirmed for {silent:.1f} s{why}' if silent > 3 * self._period else ''
@@ -72,7 +114,9 @@ class HeartbeatRow:
 
     def begin(self, now: float) -> None:
         """Start again with 0: the PLC may be another one by now (rule 2)."""
-        self._must_begin, self._is_confirmed, self._next = True, False, now
+        self._go(BeatEvent.CONTACT)
+        self._is_confirmed, self.is_first_try = False, True
+        self._next = self.due = now
 
     def missing(self, messages: MappingType[str, float], now: float) -> str:
         """
@@ -80,44 +124,56 @@ class HeartbeatRow:
 
         ``messages`` tells when the last accepted message of each was published (clock value in s).
         """
-        return next((topic for topic in self._requires
+        return next((topic for topic in self.requires
                      if now >= messages.get(topic, -math.inf) + self._requires_timeout), '')
 
     def topics_until(self, messages: MappingType[str, float]) -> float:
         """Return until when it may count by rule 3 (d) without a further message."""
         return min((messages.get(topic, -math.inf) + self._requires_timeout
-                    for topic in self._requires), default=math.inf)
+                    for topic in self.requires), default=math.inf)
 
     def executor_until(self, executor: float) -> float:
         """Return until when it may count by rule 3 (c); ``executor`` is when that ran last."""
         return executor + max(self._period, _LEAST_LIFE_SIGN)
 
-    def wants_zero(self, is_held: bool, now: float) -> bool:
-        """Tell whether 0 is to be written now; ``is_held`` tells that it must not count."""
-        if self.is_under_way or self.is_at_rest and not self._must_begin:
-            return False
-        return (self._must_begin or is_held) and (now >= self._next or self.value != 0)
+    def judge(self, now: float, why_held: str, executor: float,
+              messages: MappingType[str, float]) -> bool:
+        """
+        Tell whether something is to be written now; plan when to look again if it is not.
 
-    def wants_beat(self, now: float) -> bool:
-        """Tell whether the next value is due."""
-        return not self.is_under_way and not self._must_begin and now >= self._next
+        ``why_held`` says why it must not count (rule 3 b, d), empty where it may; ``executor`` is
+        when that ran last.
+        """
+        self.reason = why_held
+        if self.state is BeatState.SHOWN and now >= self._next:
+            self._go(BeatEvent.SEEN)
+        if self.state is BeatState.COUNTS and why_held:
+            self._go(BeatEvent.HOLD)
+            self.is_first_try = True
+        elif self.state is BeatState.HELD and not why_held:
+            self._go(BeatEvent.RELEASE)
+        if self.is_under_way:
+            self.due = math.inf
+        elif self.state is BeatState.HELD:
+            self.due = math.inf if self.is_at_rest else self._next if self.value == 0 else now
+        elif self.state is not BeatState.COUNTS:
+            self.due = self._next
+        elif now >= self.executor_until(executor):
+            self.reason = 'the executor of the node stands still'  # nothing is written then
+            self.due = max(self._next, now + _GLANCE)
+        else:
+            self.due = min(self._next, self.topics_until(messages)) if self.value else self._next
+        return self.due <= now and self.state is not BeatState.SHOWN
 
-    def put_off(self, until: float) -> None:
-        """Write nothing before that clock value (s)."""
-        self._next = until
+    @property
+    def wants_zero(self) -> bool:
+        """Tell whether what is to be written is 0."""
+        return self.state is not BeatState.COUNTS
 
-    def next_due(self, messages: MappingType[str, float]) -> float:
-        """Return when it wants the line (clock value in s), infinite for never by itself."""
-        if self.is_under_way or self.is_held and self.is_at_rest and not self._must_begin:
-            return math.inf
-        if self._must_begin or self.is_held or self.value == 0:
-            return self._next
-        return min(self._next, self.topics_until(messages))
-
-    def take(self, now: float, is_zero: bool) -> Write:
+    def take(self, now: float) -> Write:
         """Return the write of 0, or of the next value, which ends with ``ended``."""
-        self.is_under_way = True
-        if is_zero:
+        self.is_under_way, self.is_first_try, self.tried = True, False, now
+        if self.wants_zero:
             self.value, self._is_confirmed = 0, False
         elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
             self.value, self._is_confirmed = self.value % LARGEST + 1, False
@@ -127,8 +183,10 @@ class HeartbeatRow:
     def ended(self, outcome: Outcome, now: float) -> None:
         """Take note how it ended."""
         self.is_under_way = False
+        self.due = now
         if outcome is not Outcome.WRITTEN:
             return
         self._is_confirmed, self.confirmed = True, now
-        if self.value == 0 and self._must_begin:
-            self._must_begin, self._next = False, now
+        if self.value == 0 and self.state is BeatState.CONTACT:
+            self._go(BeatEvent.ZERO_CONFIRMED)
+            self._next = now + max(self._period, _LEAST_ZERO)

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 What the driver writes without a message: heartbeats and fallback values, and in which order.
 
@@ -23,8 +22,9 @@ while the host sleeps (rule 6). None of this is a safety function.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Iterator, Sequence
+import heapq
+import itertools
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
@@ -36,9 +36,6 @@ from abdf1_ros.driver.writing import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.settings.mapping import Mapping
 
-# A stopped executor does not wake the link, so the link looks by itself every so many seconds.
-_GLANCE = 0.1
-
 # So often in a row a PLC has not answered that is taken as out of reach, though its station is
 # active: that of a gateway is.
 _FAILURES = 2
@@ -48,6 +45,9 @@ _FAILURES = 2
 _LEAST_PAUSE = 1.0
 _SHARE_OF_OTHERS = 7
 
+OwnRow = HeartbeatRow | FallbackRow
+TurnRank = tuple[float, ...]
+
 
 class OwnWrite(WriteJob):
     """
@@ -56,8 +56,8 @@ class OwnWrite(WriteJob):
     It must not be sent after ``expires`` (clock value in s): its value may be wrong by then.
     """
 
-    def __init__(self, row: HeartbeatRow | FallbackRow, write: Write, writing: WritesUnderWay,
-                 interlocks: Interlocks, expires: float = math.inf) -> None:
+    def __init__(self, row: OwnRow, write: Write, writing: WritesUnderWay, interlocks: Interlocks,
+                 expires: float = math.inf) -> None:
         super().__init__(write, writing)
         self.row = row
         self.expires = expires
@@ -71,17 +71,38 @@ class OwnWrite(WriteJob):
         self._interlocks.ended(self)
 
 
-@dataclass(slots=True)
-class _Reach:
-    """How often in a row a PLC has not answered, and until when it is left alone (clock, s)."""
+class _Plc:
+    """
+    The rows of one station, and how it has answered our own writes.
 
-    failures: int = 0
-    pause_end: float = -math.inf
+    ``due`` is when its rows have to be looked at (clock value in s), infinite while it is
+    inactive. ``failures`` counts the last ones that it has not answered; from the second on it is
+    left alone up to ``pause_end``.
+    """
+
+    def __init__(self, station: int) -> None:
+        self.station = station
+        self.heartbeats: list[HeartbeatRow] = []
+        self.fallbacks: list[FallbackRow] = []
+        self.due = math.inf
+        self.failures = 0
+        self.pause_end = -math.inf
+        self.is_running: bool | None = None
 
     @property
     def is_lost(self) -> bool:
         """Tell whether it is out of reach."""
         return self.failures >= _FAILURES
+
+    @property
+    def rows(self) -> list[OwnRow]:
+        """Return all of its rows."""
+        return [*self.heartbeats, *self.fallbacks]
+
+    def plan(self) -> None:
+        """Look at its rows again when the first of them wants it."""
+        self.due = min([row.due for row in self.heartbeats]
+                       + [row.due for row in self.fallbacks], default=math.inf)
 
 
 class Interlocks:
@@ -89,8 +110,9 @@ class Interlocks:
     All heartbeats and fallbacks of a line.
 
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
-    row into our own table; ``report`` gets the result of each fallback that was written. Only
-    ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
+    row into our own table; ``report`` gets the result of each fallback that was written, ``tell``
+    why a PLC does not take one. Only ``executor_ran``, ``wind_down`` and ``resume`` may be called
+    from another thread.
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
@@ -100,21 +122,29 @@ class Interlocks:
         self.heartbeats = [HeartbeatRow(mapping) for mapping in mappings if mapping.heartbeat]
         self.fallbacks = [FallbackRow(mapping, cmd_timeout)
                           for mapping in mappings if mapping.fallback]
-        self._served = [row for row in self.fallbacks if row.mapping.serves]
-        self._numbers = {mapping.station for mapping in mappings
-                         if (mapping.heartbeat or mapping.fallback) and not mapping.serves}
+        self._ours = _Plc(-1)  # the rows of our own table
+        self._plcs: dict[int, _Plc] = {}
+        for beat in self.heartbeats:
+            self._plc(beat).heartbeats.append(beat)
+        for row in self.fallbacks:
+            self._plc(row).fallbacks.append(row)
         self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
+        self._by_topic: dict[str, list[HeartbeatRow]] = {}
+        for beat in self.heartbeats:
+            for topic in beat.requires:
+                self._by_topic.setdefault(topic, []).append(beat)
         self._stations = stations
         self._writes = writes
-        writes.message_ended = self.message_ended
+        writes.message_ended, writes.message_expired = self.message_ended, self.message_expired
         self._writing = writing
         self._store = store
         self._report = report
         self._tell = tell
+        self._due = math.inf
+        self._refreshes: list[tuple[float, int, FallbackRow]] = []
+        self._tickets = itertools.count()
         self._messages: dict[str, float] = {}
         self._executor = -math.inf
-        self._is_running: dict[int, bool] = {}
-        self._reach: dict[int, _Reach] = {}
         self._has_begun = False
         self._is_ending = False
         self._are_all_due = False
@@ -122,6 +152,12 @@ class Interlocks:
     def __bool__(self) -> bool:
         """Tell whether there is anything to write by ourselves."""
         return bool(self.heartbeats or self.fallbacks)
+
+    def _plc(self, row: OwnRow) -> _Plc:
+        if row.mapping.serves:
+            return self._ours
+        number = row.mapping.station
+        return self._plcs.get(number) or self._plcs.setdefault(number, _Plc(number))
 
     # What happens
 
@@ -147,48 +183,48 @@ class Interlocks:
         """Return the tags of the rows that are not confirmed yet at the end."""
         return [row.mapping.tag for row in self._unconfirmed()]
 
-    def _unconfirmed(self) -> list[HeartbeatRow | FallbackRow]:
-        beats = [row for row in self.heartbeats if not row.is_at_rest]
-        return [*beats, *(row for row in self.fallbacks if row.cause is not None)]
+    def _unconfirmed(self) -> Iterator[OwnRow]:
+        yield from (row for row in self.heartbeats if not row.is_at_rest)
+        yield from (row for row in self.fallbacks if row.cause is not None)
 
     def begin(self, now: float) -> None:
         """Take note that the port has been opened: a first contact with everybody (rule 2)."""
-        for row in self.heartbeats:
-            row.begin(now)
-        for fallback in self.fallbacks:
-            if not self._has_begun:
-                fallback.make_due(FallbackCause.START, now)
-            elif not fallback.mapping.serves:
-                self._make_due_unless_fresh(fallback, now)
+        for plc in self._plcs.values():
+            self._contact(plc, now)
+        for row in () if self._has_begun else self.fallbacks:
+            row.make_due(FallbackCause.START, now)
         self._has_begun = True
+        self._plan(*self._plcs.values(), self._ours)
 
     def contact(self, station: int, now: float) -> None:
         """Take note that a station is active again (rules 2, 8)."""
-        for row in self._heartbeats_of(station):
-            row.begin(now)
-        for fallback in self._fallbacks_of(station):
-            self._make_due_unless_fresh(fallback, now)
+        if station in self._plcs:
+            self._contact(self._plcs[station], now)
 
-    def mode_seen(self, station: int, is_running: bool | None, now: float) -> None:
+    def _contact(self, plc: _Plc, now: float, *, always: bool = False) -> None:
+        for beat in plc.heartbeats:
+            beat.begin(now)
+        for row in plc.fallbacks if self._has_begun else ():
+            if always:
+                row.make_due(FallbackCause.RUN, now)
+            elif not row.is_fresh(now):
+                row.make_due(FallbackCause.RETURN, now)
+        self._plan(plc)
+
+    def mode_seen(self, station: int, is_running: bool, now: float) -> None:
         """Take note of a station's mode; a change to RUN is a first contact (rules 2, 8)."""
-        was_running = self._is_running.get(station)
-        if is_running is None:
-            return
-        self._is_running[station] = is_running
-        if is_running and was_running is False:
-            for row in self._heartbeats_of(station):
-                row.begin(now)
-            for fallback in self._fallbacks_of(station):
-                fallback.make_due(FallbackCause.RUN, now)
-
-    def _make_due_unless_fresh(self, fallback: FallbackRow, now: float) -> None:
-        if not fallback.is_fresh(now):
-            fallback.make_due(FallbackCause.RETURN, now)
+        plc = self._plcs.get(station)
+        if plc is not None:
+            was_running, plc.is_running = plc.is_running, is_running
+            if is_running and was_running is False:
+                self._contact(plc, now, always=True)
 
     def message_came(self, write: Write) -> None:
         """Take note of a message that was accepted (rule 3 d)."""
         topic = write.mapping.topic
         self._messages[topic] = max(write.requested, self._messages.get(topic, -math.inf))
+        for beat in self._by_topic.get(topic, ()):
+            self._look_again(beat)
 
     def is_overruled(self, write: Write) -> bool:
         """Tell whether a message was published before a fallback of its row went out (rule 9)."""
@@ -200,131 +236,156 @@ class Interlocks:
         row = self._by_mapping.get(id(write.mapping))
         if row is not None:
             row.message_ended(write.requested, outcome)
-            row.is_held_up = False
+            self._look_again(row)
+
+    def message_expired(self, write: Write) -> None:
+        """Take note that a message was too old to have the line: nobody waits for it any more."""
+        row = self._by_mapping.get(id(write.mapping))
+        if row is not None:
+            self._look_again(row)
+
+    def _look_again(self, row: OwnRow) -> None:
+        row.due = -math.inf
+        self._plan(self._plc(row))
+
+    def _plan(self, *plcs: _Plc) -> None:
+        for plc in plcs:
+            plc.plan()
+        self._due = min((plc.due for plc in self._plcs.values()), default=math.inf)
 
     # Who goes next
 
     def next(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:  # noqa: A003
-        """Return what has to be written next, None for nothing; it ends with ``ended``."""
-        if not self:
-            return None
+        """Return what has to be written next, None for nothing."""
         self.expire(now)
-        at_once = {number for number in self._numbers if number not in busy
-                   and now >= self._free_from(number, is_first_try=True)}
-        free = [number for number in at_once if now >= self._free_from(number)]
-        late = [number for number in free if not self._stations[number].replies_in_time]
-        own = self._first_of({*free}.difference(late), at_once, now)
-        # Those that reply late take turns: the one goes first that was tried the longest ago.
-        for number in sorted(late, key=self._pause_end):
-            own = own or self._first_of({number}, at_once, now)
-        return own
+        if now < self._due:
+            return None
+        best: tuple[TurnRank, _Plc, OwnRow] | None = None
+        youngest = self._writes.youngest()
+        for plc in self._plcs.values():
+            if plc.due <= now and plc.station not in busy and self._stations[plc.station].active:
+                for row in self._ready(plc, youngest, now):
+                    rank = self._rank(plc, row, now)
+                    if rank is not None and (best is None or rank < best[0]):
+                        best = rank, plc, row
+                plc.plan()
+        self._plan()
+        return None if best is None else self._begin(best[1], best[2], youngest, now)
 
-    def _first_of(self, free: Container[int], at_once: Container[int],
-                  now: float) -> OwnWrite | None:
-        """
-        Return what has to be written next to one of some stations, None for nothing.
+    def _ready(self, plc: _Plc, youngest: dict[int, float], now: float) -> list[OwnRow]:
+        """Return the rows of a PLC that want to write now."""
+        due = [row for row in plc.fallbacks
+               if row.due <= now and row.judge(now, youngest.get(id(row.mapping), -math.inf))]
+        held_up = [row for row in due if self._writing.is_held_up(row.mapping)]
+        for row in held_up:  # by a message that is under way (rule 9)
+            row.is_held_up, row.due = True, math.inf
+        why = self._why_held(plc) if plc.heartbeats else ''
+        beats = [beat for beat in plc.heartbeats if beat.judge(
+            now, why or self._missing(beat, now), self._executor, self._messages)]
+        return [*beats, *(row for row in due if row not in held_up)]
 
-        ``at_once`` are those to which the first try of a fallback may go.
-        """
-        return self._zero(now, free) or self._fallback(now, free, at_once) \
-            or self._beat(now, free)
-
-    def _free_from(self, station: int, is_first_try: bool = False) -> float:
-        """
-        Return from when on a station may be written to (clock value in s), infinite for never.
-
-        Inactive ones are not probed (rule 4), those that reply late only in the time for probes.
-        The end (rule 5) and the first try of a fallback do not wait for that: the PLC may well
-        carry out what it does not answer.
-        """
-        if not self._stations[station].active:
-            return math.inf
-        is_at_once = self._is_ending or is_first_try
-        in_turn = -math.inf if is_at_once else self._stations.next_message(station)
-        return max(in_turn, self._pause_end(station))
-
-    def _pause_end(self, station: int) -> float:
-        """Return until when a PLC that does not answer is left alone (clock value in s)."""
-        reach = self._reach.get(station)
-        return reach.pause_end if reach else -math.inf
-
-    def _zero(self, now: float, free: Container[int]) -> OwnWrite | None:
-        for row in self.heartbeats:
-            if row.mapping.station in free:
-                self._judge(row, now)
-                if row.wants_zero(row.is_held, now):
-                    return self._job(row, row.take(now, is_zero=True))
-        return None
-
-    def _judge(self, row: HeartbeatRow, now: float) -> None:
-        """Find out whether a heartbeat must not count, and why (rule 3)."""
-        row.reason = self._why_held(row, now)
-        row.is_held = bool(row.reason)
-        if not row.is_held and now >= row.executor_until(self._executor):
-            row.reason = 'the executor of the node stands still'  # nothing is written then
-
-    def _why_held(self, row: HeartbeatRow, now: float) -> str:
+    def _why_held(self, plc: _Plc) -> str:
+        """Return why no heartbeat of a PLC may count, empty if it may (rules 3 b, 5)."""
         if self._is_ending:
             return 'the bridge ends'
-        for fallback in self._fallbacks_of(row.mapping.station):
-            if fallback.cause is not None:
-                return f'the fallback of {fallback.mapping.tag} is not confirmed'
-        topic = row.missing(self._messages, now)
+        due = next((row for row in plc.fallbacks if row.cause is not None), None)
+        return f'the fallback of {due.mapping.tag} is not confirmed' if due else ''
+
+    def _missing(self, beat: HeartbeatRow, now: float) -> str:
+        topic = beat.missing(self._messages, now)
         return f'no message of {topic} in time' if topic else ''
 
-    def _fallback(self, now: float, free: Container[int],
-                  at_once: Container[int]) -> OwnWrite | None:
-        youngest = self._writes.youngest()
-        for row in self.fallbacks:
-            mapping = row.mapping
-            if mapping.serves or mapping.station not in (at_once if row.is_first_try else free) \
-                    or row.next_due(youngest.get(id(mapping), -math.inf)) > now:
-                continue
-            write = row.take(now)
-            if self._writing.is_held_up(write):  # by a message that is under way (rule 9)
-                row.is_under_way, row.is_held_up = False, True
-                continue
-            self._writes.drop('fallback', now, mapping)
-            return self._job(row, write)
-        return None
+    def _rank(self, plc: _Plc, row: OwnRow, now: float) -> TurnRank | None:
+        """
+        Return when a row has its turn, the least first; None where it has to wait (rules 10, 11).
 
-    def _beat(self, now: float, free: Container[int]) -> OwnWrite | None:
-        for row in self.heartbeats:
-            if row.mapping.station not in free or not row.wants_beat(now) or row.is_held:
-                continue
-            if row.reason:
-                row.put_off(now + _GLANCE)
-            else:
-                return self._job(row, row.take(now, is_zero=False), self._good_until(row))
-        return None
+        First tries go at once: the PLC may well carry out what it does not answer. Those that
+        answer go before those that do not. Of these the one goes first that was tried the longest
+        ago, and those that reply late have the time for probes only.
+        """
+        is_zero = isinstance(row, HeartbeatRow) and row.wants_zero
+        is_beat = isinstance(row, HeartbeatRow) and not row.wants_zero
+        is_ill = plc.failures > 0 or not self._stations[plc.station].replies_in_time
+        if row.is_first_try and not is_beat:
+            return 0, is_ill, not is_zero
+        if not is_ill:
+            return (2, 0, 0, row.tried) if is_beat else (1, 0, not is_zero, row.tried)
+        if now < self._free_from(plc):
+            return None
+        return 3, plc.pause_end, is_beat, not is_zero, row.tried
 
-    def _job(self, row: HeartbeatRow | FallbackRow, write: Write,
-             expires: float = math.inf) -> OwnWrite:
+    def _free_from(self, plc: _Plc) -> float:
+        """Return from when on more than first tries may be written to a PLC (clock value in s)."""
+        if self._is_ending:
+            return plc.pause_end
+        return max(plc.pause_end, self._stations.next_message(plc.station))
+
+    def _begin(self, plc: _Plc, row: OwnRow, youngest: dict[int, float], now: float) -> OwnWrite:
+        expires = math.inf
+        if isinstance(row, FallbackRow):
+            self._writes.drop('fallback', now, row.mapping)
+        elif not row.wants_zero:
+            expires = self._good_until(plc, row, youngest)
+        write = row.take(now)
+        row.due = math.inf
+        self._plan(plc)
         return OwnWrite(row, write, self._writing, self, expires)
 
-    def _good_until(self, row: HeartbeatRow) -> float:
+    def _good_until(self, plc: _Plc, row: HeartbeatRow, youngest: dict[int, float]) -> float:
         """Return until when a heartbeat may be sent (clock value in s): later it may be wrong."""
-        youngest = self._writes.youngest()
         ends = [fallback.deadline(youngest.get(id(fallback.mapping), -math.inf))
-                for fallback in self._fallbacks_of(row.mapping.station)]
+                for fallback in plc.fallbacks]
         return min([row.executor_until(self._executor), row.topics_until(self._messages), *ends])
+
+    def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
+        """
+        Return a fallback that stands and is to be written again, None for none (rule 8).
+
+        It does not go before messages, and waits while one of its row does, if these are taken.
+        """
+        while self._refreshes and self._refreshes[0][0] <= now:
+            when, _, row = self._refreshes[0]
+            station = row.mapping.station
+            if station in busy:
+                return None
+            heapq.heappop(self._refreshes)
+            if when != row.refresh_at or not row.stands:
+                continue
+            is_waiting = id(row.mapping) in self._writes.youngest()
+            if row.is_under_way or is_waiting and not row.has_failed \
+                    or self._writing.is_held_up(row.mapping) \
+                    or not self._stations[station].replies_in_time:
+                self._plan_refresh(row, now + row.after)
+                continue
+            write = row.refresh(now)
+            row.due = math.inf
+            return OwnWrite(row, write, self._writing, self)
+        return None
+
+    def _plan_refresh(self, row: FallbackRow, when: float) -> None:
+        row.refresh_at = when
+        heapq.heappush(self._refreshes, (when, next(self._tickets), row))
 
     def ended(self, own: OwnWrite) -> None:
         """Take note how one of our writes ended."""
         row, result, now = own.row, own.result, self._writing.line.now
+        plc = self._plc(row)
         outcome = Outcome.NOT_SENT if result is None else result.outcome
-        self._judge_reach(own, outcome, now)
+        self._judge_reach(plc, own, outcome, now)
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, own.write, outcome, now)
+        for beat in plc.heartbeats:  # they may depend on it (rule 3 b)
+            beat.due = min(beat.due, now)
+        self._plan(plc)
         if result is not None and outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(result.error)
             if isinstance(result.error, RemoteError) and refusal != row.refusal:
                 self._tell(row.mapping, f'not written: {refusal}')
             row.refusal = refusal
 
-    def _judge_reach(self, own: OwnWrite, outcome: Outcome, now: float) -> None:
+    def _judge_reach(self, plc: _Plc, own: OwnWrite, outcome: Outcome, now: float) -> None:
         """
         Leave a PLC that does not answer alone for a while, or it would take the whole line.
 
@@ -333,62 +394,61 @@ class Interlocks:
         """
         is_behind_gateway = own.row.mapping.via is not None
         if outcome is Outcome.UNKNOWN:
-            reach = self._reach.setdefault(own.station, _Reach())
-            reach.failures += 1
-            if reach.is_lost:
-                share = _SHARE_OF_OTHERS * (now - own.write.requested) * is_behind_gateway
-                reach.pause_end = now + max(_LEAST_PAUSE, share)
+            plc.failures += 1
+            if plc.is_lost:
+                share = _SHARE_OF_OTHERS * (now - own.begun) * is_behind_gateway
+                plc.pause_end = now + max(_LEAST_PAUSE, share)
         elif outcome is not Outcome.NOT_SENT:
-            reach = self._reach.pop(own.station, _Reach())
-            if reach.is_lost and is_behind_gateway:
-                self.contact(own.station, now)
+            was_lost, plc.failures, plc.pause_end = plc.is_lost, 0, -math.inf
+            if was_lost and is_behind_gateway:
+                self._contact(plc, now)
 
     def _fallback_ended(self, row: FallbackRow, write: Write, outcome: Outcome,
                         now: float) -> None:
         cause = row.cause
         seconds = row.ended(outcome, now)
+        if outcome is Outcome.WRITTEN and not row.mapping.serves:
+            self._plan_refresh(row, row.refresh_at)
         if seconds is not None and cause is not None:
             self._report(WriteResult(
                 row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
 
     def expire(self, now: float) -> None:
-        """Make overdue fallbacks due; those of Serve rows are stored at once."""
+        """Do what needs no line: begin the end, store overdue fallbacks of our own table."""
         if not self._has_begun:
             return
-        youngest = self._writes.youngest() if self.fallbacks else {}
-        for row in self.fallbacks:
-            row.judge(now, youngest.get(id(row.mapping), -math.inf))
-            if self._is_ending and row.cause is None and not row.stands:
-                row.make_due(FallbackCause.END, now)
-                row.is_held_up = False
-            if row.mapping.serves and row.cause is not None:
+        if self._is_ending and not self._are_all_due:
+            self._make_all_due(now)
+        if now < self._ours.due:
+            return
+        youngest = self._writes.youngest()
+        for row in self._ours.fallbacks:
+            if row.due <= now and row.judge(now, youngest.get(id(row.mapping), -math.inf)):
                 write = row.take(now)
                 self._store(write)
                 self._fallback_ended(row, write, Outcome.WRITTEN, now)
-        self._are_all_due = self._is_ending
+                row.judge(now, -math.inf)
+        self._ours.plan()
+
+    def _make_all_due(self, now: float) -> None:
+        for row in self.fallbacks:
+            if row.cause is None and not row.stands:
+                row.make_due(FallbackCause.END, now)
+                row.is_held_up = False
+        for beat in self.heartbeats:
+            beat.due = now
+        self._are_all_due = True
+        self._plan(*self._plcs.values(), self._ours)
 
     def next_expiry(self) -> float:
         """Return when a fallback of our own table is due (clock value in s)."""
-        if not self._served or not self._has_begun:
-            return math.inf
-        return min(row.next_due(-math.inf) for row in self._served)
+        return self._ours.due if self._has_begun else math.inf
 
     def next_due(self) -> float:
         """Return when there is something to write (clock value in s), infinite for never."""
-        return min(self._moments(), default=math.inf)
-
-    def _moments(self) -> Iterator[float]:
-        youngest = self._writes.youngest()
-        for fallback in self.fallbacks:
-            if not fallback.mapping.serves:
-                yield max(fallback.next_due(youngest.get(id(fallback.mapping), -math.inf)),
-                          self._free_from(fallback.mapping.station, fallback.is_first_try))
-        for row in self.heartbeats:
-            yield max(row.next_due(self._messages), self._free_from(row.mapping.station))
-
-    def _heartbeats_of(self, station: int) -> Iterable[HeartbeatRow]:
-        return (row for row in self.heartbeats if row.mapping.station == station)
-
-    def _fallbacks_of(self, station: int) -> Iterable[FallbackRow]:
-        return (row for row in self.fallbacks
-                if row.mapping.station == station and not row.mapping.serves)
+        due = self._refreshes[0][0] if self._refreshes else math.inf
+        for plc in self._plcs.values():
+            if plc.due < due and self._stations[plc.station].active:
+                is_first = any(row.is_first_try and row.due <= plc.due for row in plc.rows)
+                due = min(due, plc.due if is_first else max(plc.due, self._free_from(plc)))
+        return due

@@ -123,30 +123,31 @@ class Readings:
             is_rare = point.period > period and not job.is_refresh  # others are for every read
             if is_rare and not point.is_due(now, period):
                 continue
-            if point.guard is None:
-                self._update(point, data[place])
+            guard = point.guard
+            if guard is not None and (reason := guard.why_not(point, job.started, now)):
+                self._withhold(point, guard, reason)
+            elif guard is not None and point in guard.withheld:
+                self._release(point, guard, data[place])
             else:
-                self._guarded(point, point.guard, data[place], job.started)
+                self._update(point, data[place])
         job.done(now)
         if has_recovered:
             self._change(self._refusals.recovered(job.block, self.blocks))
 
-    def _guarded(self, point: ReadPoint, guard: Guard, words: bytes, started: float) -> None:
-        """
-        Update a guarded point, or withhold its value.
-
-        Both are told once for all rows that depend on the same (rule 15).
-        """
-        now, was_withheld = self._line.now, point in guard.withheld
-        reason, is_first = guard.why_not(point, started, now), not guard.withheld
-        if not reason:
-            self._update(point, words)
-            if was_withheld and not guard.withheld:
-                self._listener.published_again(point.mapping, now - point.withheld_since)
-        elif point.withhold(reason, now) and is_first:
+    def _withhold(self, point: ReadPoint, guard: Guard, reason: str) -> None:
+        """Withhold a value; told once for all rows that depend on the same (rule 15)."""
+        is_first = not guard.withheld
+        if point.withhold(reason, self._line.now) and is_first:
             count = len(guard.points)
             more = f'; so are all {count} rows that depend on it' if count > 1 else ''
             self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
+
+    def _release(self, point: ReadPoint, guard: Guard, words: bytes) -> None:
+        """Update a point whose values were withheld; told with the last of the guard."""
+        self._update(point, words)
+        if not guard.withheld:
+            self._listener.published_again(
+                point.mapping, self._line.now - point.withheld_since)
 
     def served(self, mapping: Mapping, words: bytes) -> None:
         """Take words of ours that the other end has written."""

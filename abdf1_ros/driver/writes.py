@@ -63,13 +63,15 @@ class WriteQueue:
 
     ``report`` gets the results. ``tx_delay`` (s) comes before each transmission. A write to a
     silent station is a probe; one that ``stations.probes`` does not admit ends unsent.
-    ``message_ended`` is called for each that had the line. Another thread may only ask for the
-    length. ``next_expiry`` is when ``expire`` has something to do (clock value in s).
+    ``message_ended`` is called for each that had the line, ``message_expired`` for each that was
+    too old before. Another thread may only ask for the length. ``next_expiry`` is when ``expire``
+    has something to do (clock value in s).
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
                  report: Callable[[WriteResult], None], tx_delay: float = 0.0) -> None:
         self.message_ended: Callable[[Write, Outcome], None] = lambda write, outcome: None
+        self.message_expired: Callable[[Write], None] = lambda write: None
         self._stations = stations
         self._writing = writing
         self._patience = patience
@@ -137,7 +139,7 @@ class WriteQueue:
             station = write.mapping.station
             if station in busy or station in held_up:
                 continue
-            if not self._writing.is_held_up(write):
+            if not self._writing.is_held_up(write.mapping):
                 return write
             held_up.add(station)
         return None
@@ -163,6 +165,7 @@ class WriteQueue:
             if reason:
                 self._waiting.remove(write)
                 self._report(write.result(Outcome.NOT_SENT, reason, now))
+                self.message_expired(write)
             else:
                 self.next_expiry = min(self.next_expiry, self._expiry(write))
 

@@ -27,6 +27,7 @@ from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.errors import CommandExpired, RemoteError
 from abdf1_ros.pccc.steps import Steps
 from abdf1_ros.plan.planner import Planner
+from abdf1_ros.settings.mapping import Mapping
 
 
 class WriteJob(Job):
@@ -61,9 +62,9 @@ class WritesUnderWay:
         self._readings = readings
         self._read_backs = read_backs
 
-    def is_held_up(self, write: Write) -> bool:
+    def is_held_up(self, mapping: Mapping) -> bool:
         """Tell whether a write has to wait for one of the same words that is under way."""
-        return any(map(write.overlaps, self.under_way))
+        return any(mapping.extent.meets(write.mapping.extent) for write in self.under_way)
 
     def begin(self, write: Write) -> None:
         """Take note that a write is under way, until it has ``ended``."""

@@ -38,6 +38,7 @@ from abdf1_ros.plan.interlocks import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, store
 from support.mappings import make_mapping
@@ -187,6 +188,16 @@ def test_rule_2_port_that_is_back_begins_with_0() -> None:
     cell.run(1.0)
     assert cell.written('N10:0', since)[:3] == [0, 1, 2]
     assert cell.results() == [START, RETURN]
+
+
+@pytest.mark.parametrize('period', [200, 700])
+def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
+        period: int) -> None:
+    cell = Cell(beat_row(period))
+    cell.run(2.0)
+    zero, one = [when for when, _, value in cell.writes if value in (0, 1)]
+    assert max(period / 1000, 0.5) < one - zero < max(period / 1000, 0.5) + 0.05
+    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
 
 
 def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
@@ -399,6 +410,36 @@ def test_rule_8_change_to_run_is_a_first_contact() -> None:
     assert cell.results()[-1] == RUN
 
 
+def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None:
+    cell = Cell(speed_row(), speed_row(address='N7:1', tag='slow', fallback=Fallback((5,), 7000)))
+    cell.run(1.0)
+    store(cell.plc, 'N7:0', [888, 888])  # a download in a short time of PROGRAM
+    cell.run(4.5)
+    assert (cell.word('N7:0'), cell.word('N7:1')) == (7, 888)
+    cell.run(2.0)
+    assert (cell.word('N7:0'), cell.word('N7:1')) == (7, 5)
+    cell.run(20.0)
+    assert len(cell.written('N7:0')) == 6 + 4  # of both: every 5 s, every 7 s
+    assert cell.results() == [START, START]
+
+
+def test_rule_8_message_that_stands_is_not_written_over() -> None:
+    speed = speed_row()
+    cell = Cell(speed)
+    cell.run(1.0)
+    cell.publish(speed, 3, times=200)
+    cell.run(19.0)
+    assert cell.written('N7:0').count(7) == 1
+    cell.run(2.0)
+    cell.refused = {'N7:0'}
+    cell.spared = 7
+    cell.publish(speed, 99, times=5000, gap=0.004)  # one waits at any time, and none is taken
+    since = cell.now
+    cell.run(19.0)
+    assert len(cell.written('N7:0', since)) in (3, 4)
+    assert cell.results().count(TIMEOUT) == 1
+
+
 def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
     speed = speed_row(Fallback((7,), 60_000))
     cell = Cell(speed, start=False)
@@ -442,11 +483,72 @@ def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
     cell.run(1.0)
     cell.bench.far.say = say
     cell.run(15.0)
-    assert cell.written('N7:0')[0] == 7
-    assert cell.written('N7:0')[-2:] == [7, 7]
-    first, second = [when for when, name, value in cell.writes if name == 'N7:0'][-2:]
+    assert cell.written('N7:0')[:4] == [7, 3, 7, 7]
+    first, second = [when for when, name, value in cell.writes if name == 'N7:0'][2:4]
     assert second == pytest.approx(first + 2 * 0.5, abs=0.2)
     assert len([result for result in cell.results() if result.startswith('fallback')]) == 2
+
+
+class Line(DriverBench):
+    """PLCs of which some carry out what they are told and do not reply; who was asked for what."""
+
+    def __init__(self, rows: Sequence[Mapping], stations: Sequence[int]) -> None:
+        super().__init__(rows, network=Network(
+            baud=115200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1))
+        self.mute: set[int] = set()
+        self.asked: list[tuple[float, int, int]] = []
+        for number in stations:
+            plc = self.plc(number, 'PLC5', ('N7:0', 40), ('N10:0', 4))
+            plc.slave = HalfDuplexSlave(SlaveSettings(number), partial(self._serve, plc))
+        self._tick()
+
+    def _tick(self) -> None:
+        self.driver.interlocks.executor_ran(self.clock())
+        self.at(self.clock() + 0.1, self._tick)
+
+    def _serve(self, plc: SimulatedPlc, command: Packet) -> Packet:
+        reply = plc.serve(command)
+        if command.cmd == 0x0F and command.data[0] == 0x67 and command.data[6] == 7:
+            self.asked.append((self.clock(), plc.station, command.data[7]))
+        if plc.station in self.mute:
+            reply = reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
+        return reply
+
+
+def test_rule_10_plc_that_answers_has_its_fallback_before_those_that_do_not() -> None:
+    stations = range(11, 19)
+    rows = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=500,
+                         heartbeat=Heartbeat()) for number in stations]
+    speeds = [make_mapping('N7:0', 'Write', station=number, tag=f'speed{number}',
+                           fallback=Fallback((7,), 8000)) for number in stations]
+    line = Line([*rows, *speeds], stations)
+    line.run(2.0)
+    for speed in speeds:
+        line.write(speed, [3])
+    begun = line.clock()
+    line.run(0.4)
+    line.mute = {*stations[:-1]}
+    line.run(7.5)
+    line.asked.clear()
+    line.run(30.0)
+    when, first = line.asked[0][:2]
+    assert (first, {station for _, station, _ in line.asked}) == (18, {*stations})
+    assert when - begun < 8.0 + 1.3  # what was under way
+
+
+def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
+    rows = [make_mapping(f'N7:{number}', 'Write', tag=f'speed{number}',
+                         fallback=Fallback((7,), 1000)) for number in range(8)]
+    line = Line(rows, [1])
+    line.run(1.0)
+    for row in rows:
+        line.write(row, [3])
+    line.run(0.3)
+    line.mute, begun = {1}, line.clock()
+    line.asked.clear()
+    line.run(30.0)
+    assert {element for _, _, element in line.asked[:8]} == {*range(8)}
+    assert line.asked[7][0] - begun < 1.0 + 8 * (0.5 + 0.1)
 
 
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:

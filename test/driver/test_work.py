@@ -15,7 +15,8 @@
 
 from __future__ import annotations
 
-from abdf1_ros.settings.heartbeats import PublishWhile
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.settings.heartbeats import Fallback, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from support.counting import lines_run
@@ -57,3 +58,30 @@ def test_guarded_rows_cost_little_more_than_others() -> None:
     plain = work_of_reads(None, ROWS)
     guarded = work_of_reads(PublishWhile('alive', 500), ROWS)
     assert guarded < 1.6 * plain  # lines; of the time less
+
+
+STATIONS, COMMANDS = range(11, 41), 30
+
+
+def work_of_a_transaction(fallback: Fallback | None) -> float:
+    """Return the lines run for reading 30 stations, and writing to them now and then."""
+    reads = [make_mapping('N9:0', station=station, tag=f'read{station}') for station in STATIONS]
+    writes = [make_mapping(f'N7:{number}', 'Write', station=station, fallback=fallback,
+                           tag=f'speed{station}_{number}')
+              for station in STATIONS for number in range(COMMANDS)]
+    bench = DriverBench([*reads, *writes], network=Network(baud=115200, timeout=200))
+    for station in STATIONS:
+        bench.plc(station, 'PLC5', ('N7:0', COMMANDS), ('N9:0', 1))
+    bench.run(12.0)  # each fallback has been written
+    for number in range(100):
+        bench.at(12.0 + 0.02 * number, lambda number=number: bench.write(  # type: ignore[misc]
+            writes[7 * number % len(writes)], [number]))
+    before = bench.driver.transactions
+    work = lines_run(lambda: bench.run(2.5), 'driver')
+    assert bench.listener.outcomes().count(Outcome.WRITTEN) == 100
+    assert bench.driver.transactions - before > 250
+    return work / (bench.driver.transactions - before)
+
+
+def test_transaction_costs_little_more_with_900_fallbacks() -> None:
+    assert work_of_a_transaction(Fallback((7,), 60_000)) < 2 * work_of_a_transaction(None)

@@ -26,6 +26,7 @@ from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.fallbacks import FallbackCause
+from abdf1_ros.driver.heartbeats import BeatState
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
 from abdf1_ros.messages import Event, Message
@@ -492,7 +493,7 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     assert bench.says('writes')[1].endswith('alive: heartbeat does not count')
     beat = bench.driver.interlocks.heartbeats[0]
-    beat.confirmed = NOW
+    beat.confirmed, beat.state = NOW, BeatState.COUNTS
     assert bench.says('writes', NOW + 1.5) == (OK, 'OK: 0 of 0 writes confirmed')
     assert bench.says('writes', NOW + 1.6)[0] == WARN
     assert details(bench.status('writes', NOW + 4))['alive'] == \

@@ -16,17 +16,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 import sys
 from types import FrameType
 from typing import Any
 
+import abdf1_ros
 
-def lines_run(work: Callable[[], object], within: str = 'abdf1_ros') -> int:
-    """Return how many lines of files in the folder ``within`` are run by ``work``."""
-    count = 0
+PACKAGE = Path(abdf1_ros.__file__).parent
+
+
+def lines_run(work: Callable[[], object], room: str) -> int:
+    """Return how many lines of a ``room`` of the package are run by ``work``."""
+    count, folder = 0, f'{PACKAGE / room}/'
 
     def trace(frame: FrameType, event: str, argument: object) -> Any:
-        if f'/{within}/' not in frame.f_code.co_filename:
+        if not frame.f_code.co_filename.startswith(folder):
             return None
         return take
 
