@@ -103,6 +103,7 @@ class Accounting:
             task.fail(WrongCommandCode(*details))
             return
         station.replies += 1
+        station.unanswered = 0
         station.returns = 0
         station.local_status = reply.sts if is_local_status(reply.sts) else 0
         station.overdue = station.overdue + keeps_others_waiting if station.local_status else 0
@@ -114,6 +115,7 @@ class Accounting:
         """Count and report a reply that has not come within Cmd_Timeout (S0, counter 2545)."""
         self.counters.command_timeouts += 1
         self._stations[station].overdue += keeps_others_waiting
+        self._stations[station].unanswered += 1
         self.note(Message.ERR_COMMAND_TIMEOUT, station=station)
 
     def overdue(self, task: Task, *, keeps_others_waiting: bool) -> None:

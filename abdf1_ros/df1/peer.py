@@ -93,7 +93,12 @@ Hearing = Generator[Step, Heard, None]
 
 @dataclass(frozen=True, slots=True)
 class PeerSettings:
-    """The settings of a full-duplex peer, named as in S0; times in seconds."""
+    """
+    The settings of a full-duplex peer, named as in S0; times in seconds.
+
+    Commands to another ``station`` than this are executed too, as the ports of SLC and MicroLogix
+    do, whose users therefore leave any number in a MSG; they are counted as wrongly addressed.
+    """
 
     checksum: Checksum = Checksum.CRC
     nak_retries: int = 3
@@ -102,6 +107,7 @@ class PeerSettings:
     cmd_timeout: float = 1.0
     max_outstanding: int = 1
     duplicate_detection: bool = True
+    station: int | None = None
 
     def retry_time(self, enq_retries: int) -> float:
         """Return the seconds that the other end needs for so many ENQs, at most."""
@@ -338,6 +344,8 @@ class FullDuplexPeer:
             self._take_reply(packet)
         else:
             self._counters.commands_received += 1
+            is_ours = self._settings.station in (None, packet.dst)
+            self._counters.invalid_messages += not is_ours
             self._replies.append(self._serve(packet))
 
     def _hear(self, symbol: Symbol) -> bytes:

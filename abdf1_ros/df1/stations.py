@@ -41,7 +41,8 @@ class Station:
     first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
     nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
     message whose addresses cannot be right. ``overdue`` counts the commands in a row that
-    were delivered and not answered within Cmd_Timeout, where that keeps others waiting.
+    were delivered and not answered within Cmd_Timeout, where that keeps others waiting;
+    ``unanswered`` counts all of them.
     ``local_status`` is the STS of the last reply to a command where a node on the way, such as a
     gateway, has sent that in its place, 0 where it is its own.
     ``returns`` counts how often it has become active again since its last reply to a command.
@@ -58,6 +59,7 @@ class Station:
     remote_errors: int = 0
     silent_since: float | None = None
     overdue: int = 0
+    unanswered: int = 0
     local_status: int = 0
     returns: int = 0
 
@@ -65,6 +67,11 @@ class Station:
     def replies_in_time(self) -> bool:
         """Tell whether this station is likely to reply to a command in time."""
         return self.active and self.overdue < _MOST_OVERDUE
+
+    @property
+    def has_no_replies(self) -> bool:
+        """Tell whether the last commands to it have had no reply in time."""
+        return self.unanswered >= _MOST_OVERDUE
 
     @property
     def takes_no_commands(self) -> bool:

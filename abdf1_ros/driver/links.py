@@ -75,7 +75,7 @@ def make_link(line: LinkSettings, settings: DriverSettings, machine: Machine,
     if line.mode == 'Peer':
         peer_settings = PeerSettings(
             line.checksum, line.nak_retries, line.enq_retries, line.timeout, line.cmd_timeout,
-            settings.max_outstanding, settings.duplicate_detection)
+            settings.max_outstanding, settings.duplicate_detection, line.station)
         return FullDuplexPeer(machine, peer_settings, stations, serve, report)
     if line.mode == 'Slave':
         slave_settings = SlaveSettings(

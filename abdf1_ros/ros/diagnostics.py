@@ -272,10 +272,10 @@ class Diagnostics:
         if station.local_status:
             return WARN, f'commands do not get to station {station.number}: ' \
                          f'{status_text(station.local_status)}'
+        if not station.replies_in_time or station.has_no_replies:
+            return WARN, f'station {station.number} takes commands, but does not reply in time'
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
-        if not station.replies_in_time:
-            return WARN, f'station {station.number} takes commands, but does not reply in time'
         why = processor_fault(self._driver.health.known(station.number).identity)
         if why is not None:
             return WARN, f'station {station.number} active, but {why}'

@@ -236,8 +236,8 @@ class BridgeSession:
         """Log a numbered event and remember it for the diagnostics."""
         if self._is_left_over(event):
             self.notes.info(
-                f'station {event.station}', f'station {event.station}: a reply to a command from '
-                'before the port was opened is dropped')
+                f'station {event.station}',
+                f'{event}; it may answer a command from before the port was opened')
             return
         self.diagnostics.happened(event, line_time())
         is_change = event.message is Message.ERR_INACTIVE_STATION \

@@ -56,6 +56,30 @@ def later(packet: Packet, number: int) -> Packet:
     return packet._replace(tns=packet.tns + number & 0xFFFF)
 
 
+@pytest.mark.parametrize(('dst', 'count'), [(5, 0), (6, 1), (255, 1)])
+def test_command_to_another_station_is_executed_and_counted(dst: int, count: int) -> None:
+    peer = PeerBench(PeerSettings(station=5))
+    command = THEIRS._replace(dst=dst)
+    assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+    assert peer.served == [command]
+    assert peer.counts().get('invalid_messages', 0) == count
+
+
+def test_peer_that_acknowledges_and_never_replies_has_no_replies() -> None:
+    peer = bench()
+    for number in range(3):
+        peer.begin(later(COMMAND, number))
+        peer.said()
+        peer.hear(ACK)
+        assert peer.stations[1].has_no_replies == (number > 1)
+        peer.wait(CMD_TIMEOUT)
+    assert peer.stations[1].active
+    peer.begin(later(COMMAND, 9))
+    peer.said()
+    peer.hear(ACK, peer.frame(later(REPLY, 9)))
+    assert not peer.stations[1].has_no_replies
+
+
 # Transmitter
 
 @pytest.mark.parametrize('checksum', Checksum)

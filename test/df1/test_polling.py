@@ -430,7 +430,7 @@ def test_next_command_may_leave_after_a_timeout() -> None:
     assert task.result == task.command.reply()
 
 
-def test_nak_is_never_sent_whatever_the_setting() -> None:
+def test_nak_is_never_sent_to_a_station_that_never_replies() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, nak_on_command_timeout=True))
     rig[1].delay = 9.0
     rig.start()
@@ -439,6 +439,9 @@ def test_nak_is_never_sent_whatever_the_setting() -> None:
     rig.run(5.0)
     assert rig.master.counts()['command_timeouts'] == 4
     assert 'naks_sent' not in rig.master.counts()
+    station = rig.master.stations[1]
+    # The others are polled meanwhile: it is asked on as before, but its silence is told.
+    assert station.has_no_replies and station.replies_in_time
 
 
 def test_reply_with_a_wrong_command_code() -> None:

@@ -315,9 +315,12 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     assert bench.says('station 1', NOW + 12)[0] == OK
 
 
-def test_station_that_does_not_reply_in_time(bench: Bench) -> None:
-    bench.driver.stations.heard(1, NOW)
-    bench.driver.stations[1].overdue = 2
+@pytest.mark.parametrize('counter', ['overdue', 'unanswered'])
+@pytest.mark.parametrize('is_heard', [False, True])
+def test_station_that_does_not_reply_in_time(bench: Bench, counter: str, is_heard: bool) -> None:
+    if is_heard:
+        bench.driver.stations.heard(1, NOW)
+    setattr(bench.driver.stations[1], counter, 2)
     assert bench.says('station 1') == (
         WARN, 'WARN: station 1 takes commands, but does not reply in time')
 
