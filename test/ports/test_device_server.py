@@ -101,6 +101,16 @@ def test_settings_are_sent_and_their_answers_taken(
         assert bytes([255, 250, 44]) + command + bytes([255, 240]) in said
 
 
+@pytest.mark.parametrize('short', [
+    bytes([255, 250, 255, 240]), bytes([255, 250, 44, 255, 240]),
+    bytes([255, 250, 44, 101, 255, 240]), bytes([255, 250, 1, 101, 5, 255, 240])])
+def test_option_that_is_short_or_another_answers_nothing(
+        ends: tuple[Rfc2217Port, socket.socket], short: bytes) -> None:
+    port, server = ends
+    server.sendall(DO_COM_PORT + BAUD_115200 + REST + short)
+    port.negotiate(EVEN)
+
+
 def test_setting_that_the_server_does_not_take(
         ends: tuple[Rfc2217Port, socket.socket]) -> None:
     port, server = ends

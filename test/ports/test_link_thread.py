@@ -23,6 +23,7 @@ import os
 from pathlib import Path
 import queue
 import resource
+import select
 import socket
 import threading
 import time
@@ -234,7 +235,47 @@ def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:
 
 
 def test_stop_before_start() -> None:
-    LinkThread(Script().machine, lambda: pytest.fail('opened')).stop()
+    before = os.listdir('/proc/self/fd')
+    thread = LinkThread(Script().machine, lambda: pytest.fail('opened'))
+    assert len(os.listdir('/proc/self/fd')) == len(before) + 2
+    thread.stop()
+    thread.wake()  # somebody who does not know
+    assert len(os.listdir('/proc/self/fd')) == len(before)
+    thread.start()
+    thread.join(PATIENCE)
+    assert not thread.is_alive()
+
+
+class Counted:
+    """What waits for wakes, and how often it was asked to."""
+
+    def __init__(self, wakes: select.poll) -> None:
+        self.waits: list[float] = []
+        self._wakes = wakes
+
+    def poll(self, milliseconds: float | None = None) -> list[tuple[int, int]]:
+        """Wait."""
+        self.waits.append(math.inf if milliseconds is None else milliseconds)
+        return self._wakes.poll(milliseconds)
+
+
+def test_missing_port_is_waited_for_asleep() -> None:
+    """A thread that looks at the clock over and over would take a whole core."""
+    attempts = []
+
+    def refuse() -> Port:
+        attempts.append(time.monotonic())
+        if len(attempts) == 4:
+            thread._stopping = True
+        raise OSError('no')
+
+    thread = LinkThread(Script().machine, refuse, retry_period=0.05)
+    thread._wakes = counted = Counted(thread._wakes)  # type: ignore[assignment]
+    thread.run()
+    pauses = [wait for wait in counted.waits if wait != math.inf]
+    assert sum(pauses) >= 3 * 45
+    assert len(pauses) <= 3 * 3  # one and what is left of it, not one after the other
+    thread.stop()
 
 
 class _NoLine:
