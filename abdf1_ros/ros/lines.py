@@ -24,7 +24,7 @@ a line needs 1.3 ms. What goes wrong with one line stays with it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 import difflib
 import itertools
@@ -37,7 +37,9 @@ from typing import Any
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.graph import Graph
 from abdf1_ros.ros.interlocks import END_LIMIT
+from abdf1_ros.ros.log import bug_text
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
+from abdf1_ros.ros.parameter_store import overrides
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
@@ -207,7 +209,8 @@ class Line:
     def _begin_again(self, error: Exception | str) -> None:
         """End the node, which may take seconds that the other lines do not have."""
         self.restarts += 1
-        self._logger.error(f'ends by an internal error and begins again: {error!r}')
+        text = error if isinstance(error, str) else bug_text(error)
+        self._logger.error(f'ends by an internal error and begins again: {text}')
         self._again = time.monotonic() + _RESTART_AFTER
         node, callbacks = self.node, self._callbacks
         if node is not None:
@@ -238,23 +241,31 @@ class Line:
 
 
 def _close(node: BridgeNode, callbacks: _Callbacks | None) -> None:
-    give_up = time.monotonic() + _LAST_WORDS
-    _say_last_words(node, give_up)
+    _say_last_words(node, time.monotonic() + _LAST_WORDS)
     if callbacks is not None:
         callbacks.end(time.monotonic() + _LAST_WORDS)
-    with suppress(Exception):  # it may be broken
+    with _telling(node):
         node.destroy_node()
 
 
 def _say_last_words(node: BridgeNode, give_up: float) -> None:
-    with suppress(Exception):  # the same
+    with _telling(node):
         node.stop(Duration(seconds=max(0.0, give_up - time.monotonic())))
+
+
+@contextmanager
+def _telling(node: BridgeNode) -> Iterator[None]:
+    """Log an error at the end of a node: it may be broken, and the others go on."""
+    try:
+        yield
+    except Exception as error:
+        node.get_logger().error(f'its end fails: {bug_text(error)}')
 
 
 def _options(node: Node) -> tuple[list[str], bool]:
     """Return which lines are wanted, and whether all have to run; raises ConfigurationError."""
     problems = []
-    for name in getattr(node, '_parameter_overrides', {}):  # rclpy has no public way to ask
+    for name in overrides(node):
         close = difflib.get_close_matches(name, OPTIONS, 1, 0.75)
         if close and name not in OPTIONS:
             problems.append(Problem(

@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import traceback
 
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.text import printable
@@ -50,6 +51,12 @@ _MINUTE = 60.0
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
+
+
+def bug_text(error: Exception) -> str:
+    """Return what to log of an error that is a bug: a line, and the traceback."""
+    lines = ''.join(traceback.format_exception(error)).splitlines()
+    return '\n'.join([f'{printable(repr(error))}; please report it', *map(printable, lines)])
 
 
 @dataclass(slots=True)

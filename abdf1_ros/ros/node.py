@@ -34,6 +34,7 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.graph import DuplicateNameWatch, Graph
 from abdf1_ros.ros.interlocks import END_LIMIT
+from abdf1_ros.ros.log import bug_text
 from abdf1_ros.ros.messages import latched_qos
 from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
 from abdf1_ros.ros.port_owners import PortOwners
@@ -215,7 +216,7 @@ class BridgeNode(Node):
         self._session.port_changed(state)
 
     def _fault(self, error: Exception) -> None:
-        self.get_logger().error(f'internal error: {error!r}; please report it')
+        self.get_logger().error(f'internal error: {bug_text(error)}')
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Use the files as they are now, or go on as before where these have faults."""

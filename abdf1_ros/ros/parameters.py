@@ -31,6 +31,7 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.files import FileWatch
+from abdf1_ros.ros.parameter_store import forget, overrides, show
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
@@ -41,11 +42,9 @@ from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
     ParameterDescriptor,
-    ParameterType,
 )
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 
 def _parameter(default: bool | float | str, description: str, low: float | None = None,
@@ -182,9 +181,9 @@ def read_again(node: Node, parameters: Parameters) -> Configuration:
 
 def declare_again(node: Node, configuration: Configuration) -> None:
     """Declare anew what comes from the files."""
-    _forget(node, 'net.')
+    forget(node, 'net.')
     _declare_network(node, configuration.network)
-    _forget(node, 'map.')
+    forget(node, 'map.')
     _declare_map(node, configuration)
 
 
@@ -224,17 +223,11 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
                          _ignored_overrides(node, mappings), files)
 
 
-def _forget(node: Node, prefix: str) -> None:
-    """Undeclare parameters; rclpy itself cannot do it for those that are read-only."""
-    for name in [name for name in node._parameters if name.startswith(prefix)]:
-        del node._parameters[name], node._descriptors[name]
-
-
 def _overridden_network(node: Node, network: Network) -> Network:
     """Return the network with what overrides it; nothing is declared."""
     given = {}
     for name, entry in FIELDS.items():
-        override = _overrides(node).get(entry.parameter)
+        override = overrides(node).get(entry.parameter)
         if override is not None and _text(override.value) != str(getattr(network, name)):
             given[name] = _text(override.value), f'parameter {entry.parameter}'
     return make_network(given, network)
@@ -267,7 +260,7 @@ def _unknown_overrides(node: Node) -> list[Problem]:
     known = [entry.name for entry in fields(Parameters)]
     known += [entry.parameter for entry in FIELDS.values()]
     problems = []
-    for name in _overrides(node):
+    for name in overrides(node):
         close = difflib.get_close_matches(name, known, 1, 0.75)
         if name not in known and (close or name.startswith('net.')):
             hint = f'did you mean {close[0]}?' if close else 'net.* are its columns'
@@ -277,16 +270,11 @@ def _unknown_overrides(node: Node) -> list[Problem]:
 
 def _ignored_overrides(node: Node, mappings: list[Mapping]) -> list[str]:
     """Return the names of overrides ``map.*`` that say something else than the map."""
-    given = {name: _text(parameter.value) for name, parameter in _overrides(node).items()
+    given = {name: _text(parameter.value) for name, parameter in overrides(node).items()
              if name.startswith('map.')}
     repeated = {name for name, value, _ in _map_cells(mappings) if given.get(name) == value} \
         if given else set()
     return sorted(given.keys() - repeated)
-
-
-def _overrides(node: Node) -> dict[str, Parameter]:
-    """Return all that the user has given; rclpy has no public way to ask for it."""
-    return getattr(node, '_parameter_overrides', {})
 
 
 def _polling(parameters: Parameters, mappings: list[Mapping],
@@ -316,7 +304,7 @@ def _declare(node: Node, name: str, default: Any, description: str, low: float |
     rclpy shows types and ranges to the user, but we check them, with better messages. A path is
     shown resolved and returned as it was given.
     """
-    given = _overrides(node).get(name)
+    given = overrides(node).get(name)
     if name in _PATHS and given is not None and isinstance(given.value, str):
         descriptor = ParameterDescriptor(description=description, read_only=True)
         path = os.path.expanduser(given.value)  # in net_file:=~/net.csv the shell leaves it
@@ -387,11 +375,5 @@ def _map_cells(mappings: list[Mapping]) -> list[Cell]:
 
 
 def _declare_map(node: Node, configuration: Configuration) -> None:
-    if not configuration.parameters.expose_map_parameters:
-        return
-    # ``declare_parameters`` would send an event for each: 120,000 for 5000 rows, in 12 s.
-    for name, value, description in _map_cells(configuration.mappings):
-        node._parameters[name] = Parameter(name, Parameter.Type.STRING, value)
-        node._descriptors[name] = ParameterDescriptor(
-            name=name, type=ParameterType.PARAMETER_STRING, description=description,
-            read_only=True)
+    if configuration.parameters.expose_map_parameters:
+        show(node, _map_cells(configuration.mappings))

@@ -29,11 +29,11 @@ import signal
 import sys
 import threading
 import time
-import traceback
 from typing import NamedTuple
 
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.ros.log import bug_text
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy
@@ -126,8 +126,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
         try:
             status = program.run(ended)
         except Exception as error:
-            get_logger(name).fatal(f'internal error: {error!r}')
-            traceback.print_exc()
+            get_logger(name).fatal(f'internal error: {bug_text(error)}')
             status = EXIT_FAULT
         ended.set()
         _destroy(program, ended.when + _DESTRUCTION_LIMIT)

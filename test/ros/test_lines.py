@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, nullcontext
+from itertools import pairwise
 from pathlib import Path
 import resource
 import threading
@@ -326,19 +327,45 @@ def test_line_that_ends_slowly_does_not_hold_up_the_others(
     assert plant.speeds('b') == [7, 8]
 
 
+@pytest.mark.parametrize('broken', ['a', 'b'])
 def test_internal_error_restarts_its_line_only(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        capfd: pytest.CaptureFixture[str], broken: str) -> None:
     monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
     plant.start()
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
     before = {**plant.nodes}
-    plant.fail('b')
-    plant.observer.until(lambda: plant.nodes['b'] is not before['b'], 'another node')
-    assert plant.speeds('b') == [7, 8]
-    assert [before[name].link.is_alive() for name in 'abc'] == [True, False, True]
+    plant.fail(broken)
+    plant.observer.until(
+        lambda: plant.nodes[broken] is not before[broken], 'another node')
+    assert plant.speeds(broken) == [7, 8]
+    assert {name for name in 'abc' if not before[name].link.is_alive()} == {broken}
     assert line_status(plant, OK)['restarts'] == '1'
-    assert 'ends by an internal error and begins again' in capfd.readouterr().err
+    said = capfd.readouterr().err
+    assert 'ends by an internal error and begins again' in said
+    assert 'Traceback' in said
+
+
+def test_end_of_a_line_that_fails_is_told(
+        plant: Plant, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    def stop(node: BridgeNode, patience: Any) -> None:
+        node.link.stop()
+        raise KeyError('a bug')
+
+    plant.start('-p', 'lines:=[a]')
+    assert plant.speeds('a') == [7, 8]
+    monkeypatch.setattr(BridgeNode, 'stop', stop)
+    assert plant.end() == 0
+    assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
+
+
+def test_status_of_all_lines_comes_once_a_second(plant: Plant) -> None:
+    plant.start('-p', 'lines:=[a]')
+    inbox = plant.observer.diagnostics('')
+    stamps = [message.header.stamp for message in [inbox.next() for _ in range(4)]]
+    seconds = [stamp.sec + stamp.nanosec / 1e9 for stamp in stamps]
+    assert all(later - one > 0.8 for one, later in pairwise(seconds))
 
 
 def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(

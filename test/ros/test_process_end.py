@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 import signal
 import time
 
 import pytest
-from support.ros import EXAMPLE_FILES, PATIENCE, Process, ros_args
+from support.ros import EXAMPLE_FILES, PATIENCE, Process, ros_args, write_csv
 
 # After SIGTERM all is over within so many seconds, and some for a busy host to see it; systemd
 # waits for 10.
@@ -107,3 +108,24 @@ def test_clock_ends_what_does_not_come_back(
         assert process.result() == status, process.text
         assert time.monotonic() - begun < LIMIT + BUSY
         assert ('in hang' in process.text) is bool(status)  # it says where
+
+
+def processor_time(number: int) -> float:
+    """Return what a process has used so far (s), which a busy host makes little longer."""
+    fields = Path(f'/proc/{number}/stat').read_text().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+def test_node_of_5000_rows_starts_and_ends_in_time(tmp_path: Path) -> None:
+    rows = (f'row_{number},{"Read" if number % 5 else "ReadWrite"},N{10 + number // 250}:'
+            f'{number % 250},1,PLC5' for number in range(5000))
+    table = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type', rows)
+    net = write_csv(tmp_path / 'net.csv', 'Com_Port,Baud', [f'{tmp_path}/none,19200'])
+    arguments = ros_args(f'net_file:={net}', f'map_file:={table}')
+    with Process('node', *arguments, is_forked=False) as process:
+        process.wait_for('cannot open the port')
+        assert processor_time(process.number) < 12
+        process.send(signal.SIGTERM)
+        begun = time.monotonic()
+        assert process.result() == 0, process.text
+        assert time.monotonic() - begun < LIMIT + BUSY
