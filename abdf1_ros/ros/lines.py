@@ -28,7 +28,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 import difflib
 import itertools
-from pathlib import Path
 import resource
 import threading
 import time
@@ -39,6 +38,7 @@ from abdf1_ros.ros.graph import Graph
 from abdf1_ros.ros.interlocks import END_LIMIT
 from abdf1_ros.ros.log import bug_text
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
+from abdf1_ros.ros.parameter_files import parameter_files, parameter_tree
 from abdf1_ros.ros.parameter_store import overrides
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
@@ -411,13 +411,9 @@ def sections(path: str) -> list[LineName]:
     Raises ConfigurationError where there is none that can be read, and where one comes twice:
     only one of them would run.
     """
-    try:
-        tree = yaml.compose(Path(path).read_text(encoding='utf-8'))
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise ConfigurationError([Problem(path, ' '.join(str(error).split()))]) from None
     found: dict[LineName, int] = {}
     problems = []
-    for name, line in _sections_of('', tree, 1):
+    for name, line in _sections_of('', parameter_tree(path), 1):
         first = found.setdefault(name, line)
         if first != line:
             problems.append(Problem(Place(path, line), (
@@ -440,12 +436,6 @@ def _sections_of(above: str, tree: yaml.Node | None, line: int) -> Iterator[tupl
         return
     for key, number, below in keys:
         yield from _sections_of(f'{above}/{key}', below, number)
-
-
-def parameter_files(args: Sequence[str]) -> list[str]:
-    """Return the parameter files among the arguments of a process."""
-    return [path for option, path in zip(args, args[1:], strict=False)
-            if option == '--params-file']
 
 
 def chosen(names: Sequence[LineName], wanted: Sequence[str]) -> list[LineName]:

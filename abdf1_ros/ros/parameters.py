@@ -114,6 +114,8 @@ Cell = tuple[str, str, str]
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
 
+_STATION_LISTS = 'poll_list', 'priority_poll_list'
+
 # Shown as resolved paths, because a relative one does not tell which file it is.
 _PATHS = ('net_file', 'map_file')
 
@@ -336,6 +338,8 @@ def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
             value = float(value)
         if kind is str and isinstance(value, int | float):
             value = str(value)
+        if entry.name in _STATION_LISTS and isinstance(value, list):  # of YAML: [1, 2]
+            value = ','.join(map(str, value))
         if type(value) is not kind or (low is not None and not low <= value <= high):
             right = _KINDS[kind]
             if low is not None:

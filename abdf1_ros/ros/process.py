@@ -34,6 +34,7 @@ from typing import NamedTuple
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.log import bug_text
+from abdf1_ros.ros.parameter_files import check_parameter_files
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy
@@ -69,6 +70,11 @@ _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file
 
 # Words in rclpy's errors about arguments.
 _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
+
+# What to say before such an error.
+_ADVICE = (
+    (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
+    (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
 
 
 def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
@@ -142,6 +148,7 @@ def _ending_signals() -> Iterator[signal.Signals]:
 
 def _made(parser: argparse.ArgumentParser, make: Callable[[Sequence[str]], Program],
           given: list[str]) -> Program:
+    check_parameter_files(given)
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
                      '--ros-args')
@@ -213,4 +220,5 @@ def _refusal(error: Exception) -> tuple[int, str]:
         not isinstance(error, rclpy_implementation.UnknownROSArgsError)
     if may_pass and not _BAD_ARGUMENTS.search(text):
         return EXIT_FAULT, f'ROS does not start: {text}'
-    return EXIT_CONFIGURATION, f'bad arguments: {text}'
+    advice = next((advice for pattern, advice in _ADVICE if re.search(pattern, text)), '')
+    return EXIT_CONFIGURATION, f'bad arguments: {advice}{text}'

@@ -28,8 +28,9 @@ from typing import Any
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros import process
-from abdf1_ros.ros.lines import chosen, LineName, main, parameter_files, sections
+from abdf1_ros.ros.lines import chosen, LineName, main, sections
 from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.ros.parameter_files import check_parameter_files, parameter_files
 from abdf1_ros.signals import EndRequest
 import pytest
 from rclpy.utilities import get_default_context
@@ -87,6 +88,19 @@ def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) ->
     path = str(tmp_path / 'nothing') if text is None else yaml_file(tmp_path, text)
     with pytest.raises(ConfigurationError, match=path):
         sections(path)
+
+
+@pytest.mark.parametrize(('text', 'expected'), [
+    ('a:\n\tros__parameters:\n\t\tport: x\n', ':2:1: a tab; YAML is indented with spaces'),
+    ('a: [1\nb: 2\n', ":2:2: expected ',' or ']', but got ':'"),
+    ('a:\n  ros__parameters: {}\nhall/press-plc:\n  ros__parameters: {"x-y": 1}\n',
+     ':3: "hall/press-plc" cannot name a node: letters, digits and underscores, as in '
+     'hall/press_plc')])
+def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expected: str) -> None:
+    path = yaml_file(tmp_path, text)
+    with pytest.raises(ConfigurationError) as error:
+        check_parameter_files(['node', '--ros-args', '--params-file', path])
+    assert str(error.value) == f'{path}{expected}'
 
 
 def test_parameter_files_of_the_arguments() -> None:

@@ -650,11 +650,13 @@ def test_faulty_parameter_is_told_in_one_line(
 
 
 @pytest.mark.parametrize(('arguments', 'expected'), [
-    (['--ros-args', '-r', '__node:=a-b'], "Couldn't parse remap rule: '-r __node:=a-b'."),
+    (['--ros-args', '-r', '__node:=a-b'], "a node name has letters, digits and underscores; "
+     "Failed to parse ROS arguments: Couldn't parse remap rule: '-r __node:=a-b'."),
+    (['--ros-args', '-p', 'net_file=net.csv'], 'a parameter is NAME:=VALUE, with a colon; '),
     (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
     (['--ros-args', '--bogus'], '--bogus'),
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'")],
-    ids=['remap', 'parameter', 'unknown', 'long'])
+    ids=['remap', 'colon', 'parameter', 'unknown', 'long'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     lines = refusal(*arguments)

@@ -185,7 +185,8 @@ def test_port(configured: Callable[..., Configuration], values: dict[str, Any],
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
     ('stale_after', 5, 5.0), ('diagnostics_period', 60, 60.0), ('diagnostics_period', 0.1, 0.1),
     ('default_period', 0, 0), ('default_period', 86_400_000, 86_400_000),
-    ('read_only', True, True), ('write_timeout', 0.05, 0.05)])
+    ('read_only', True, True), ('write_timeout', 0.05, 0.05), ('poll_list', [1, 2], '1,2'),
+    ('poll_list', 3, '3')])
 def test_own_parameters(configured: Callable[..., Configuration], name: str, value: Any,
                         expected: Any) -> None:
     found = getattr(configured(**{name: value}).parameters, name)

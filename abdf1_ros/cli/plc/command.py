@@ -102,16 +102,20 @@ def _run(options: argparse.Namespace) -> int:
         return EXIT_INTERRUPTED
 
 
-def _mappings(options: argparse.Namespace, session: Session, command: Command,
-              addresses: Sequence[str], length: int | str) -> list[Mapping]:
-    """Return the mappings of addresses; where needed, ask the PLC for its type first."""
-    kind = {'PLC_Type': options.plc_type} if options.plc_type \
-        else data.ask_kind(session, options.station)
+def _cells(options: argparse.Namespace, command: Command, length: int | str) -> dict[str, str]:
+    """Return what the options say of the columns of a map CSV."""
     given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
              'Type': options.type, 'Word_Order': options.word_order, 'Access': options.access,
-             'Processor': options.processor,
+             'Processor': options.processor, 'PLC_Type': options.plc_type,
              'Via': None if options.via is None else str(options.via)}
-    cells = kind | {column: text for column, text in given.items() if text}
+    return {column: text for column, text in given.items() if text}
+
+
+def _mappings(options: argparse.Namespace, session: Session, cells: dict[str, str],
+              addresses: Sequence[str]) -> list[Mapping]:
+    """Return the mappings of addresses; where needed, ask the PLC for its type first."""
+    if not options.plc_type:
+        cells = data.ask_kind(session, options.station) | cells
     return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
 
 
@@ -162,10 +166,10 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
 
 def _read(options: argparse.Namespace) -> int:
     status = 0
-    with Session(_line(options), via=options.via) as session:
+    network, cells = _line(options), _cells_to_read(options)
+    with Session(network, via=options.via) as session:
         try:
-            mappings = _mappings(
-                options, session, Command.READ, options.addresses, options.length)
+            mappings = _mappings(options, session, cells, options.addresses)
         except Abdf1Error as error:
             return _failed(options, session, error)
         plc_type = options.plc_type
@@ -180,6 +184,13 @@ def _read(options: argparse.Namespace) -> int:
     return status
 
 
+def _cells_to_read(options: argparse.Namespace) -> dict[str, str]:
+    """Return the cells of a read; raises ConfigurationError where no PLC could have them."""
+    cells = _cells(options, Command.READ, options.length)
+    data.check_for_some_family(options.addresses, cells)
+    return cells
+
+
 def _print_values(mapping: Mapping, values: Values,
                   radix: data.Radix = data.Radix.DECIMAL) -> None:
     rows = list(data.rows(mapping, values, radix))
@@ -189,11 +200,17 @@ def _print_values(mapping: Mapping, values: Values,
 
 
 def _write(options: argparse.Namespace) -> int:
-    with Session(_line(options), via=options.via) as session:
+    network = _line(options)
+    cells = _cells(options, Command.READ_WRITE,
+                   data.length_of(options.address, options.type, options.values))
+    try:
+        data.check_for_some_family([options.address], cells, options.values)
+    except FormatError as error:
+        _complain(f'{options.address}: {error}')
+        return EXIT_USAGE
+    with Session(network, via=options.via) as session:
         try:
-            length = data.length_of(options.address, options.type, options.values)
-            mapping, = _mappings(
-                options, session, Command.READ_WRITE, [options.address], length)
+            mapping, = _mappings(options, session, cells, [options.address])
         except Abdf1Error as error:
             return _failed(options, session, error)
         try:
@@ -251,11 +268,10 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    network = _line(options)
+    network, cells = _line(options), _cells_to_read(options)
     with Session(network, via=options.via) as session:
         try:
-            mappings = _mappings(
-                options, session, Command.READ, options.addresses, options.length)
+            mappings = _mappings(options, session, cells, options.addresses)
         except Abdf1Error as error:
             return _failed(options, session, error)
     failed = Watch(network, mappings, options.period, RADIXES[options.radix]).run(options.count)

@@ -27,10 +27,12 @@ import time
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.transactions import carry_out
-from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.steps import AddressedValues
@@ -75,6 +77,24 @@ def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Map
     if mapping is None:
         raise ConfigurationError([_in_arguments(fault, row) for fault in reader.faults])
     return mapping
+
+
+def check_for_some_family(addresses: Sequence[str], cells: MappingType[str, str],
+                          texts: Sequence[str] = ()) -> None:
+    """
+    Check addresses, and values where there are any, before the PLC has said what it is.
+
+    Raises ConfigurationError or FormatError where no family could have them.
+    """
+    for item, address in enumerate(addresses, 1):
+        errors: dict[str, Abdf1Error] = {}
+        for family in FAMILIES:
+            try:
+                parse_values(mapping_of(address, {'PLC_Type': family.value, **cells}, item), texts)
+            except (ConfigurationError, FormatError) as error:
+                errors[family.value] = error
+        if len(errors) == len(FAMILIES):
+            raise errors[cells.get('PLC_Type', PlcType.SLC.value)]
 
 
 def _in_arguments(fault: CellFault, row: Row) -> Problem:
@@ -162,7 +182,7 @@ class Writing:
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
     """Return the values of texts, whole numbers also as 0x and 0b; FormatError for others."""
-    if mapping.type is ValueType.STRING:
+    if texts and mapping.type is ValueType.STRING:
         if len(texts) != 1:
             raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
         return texts[0]

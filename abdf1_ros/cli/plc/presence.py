@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import os
 import time
 
-from abdf1_ros.cli.plc.line import free_station
+from abdf1_ros.cli.plc.line import free_station, MODES
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
@@ -33,7 +33,7 @@ _ECHO = bytes(range(1, 17))
 
 # A half-duplex station does not answer at all when a setting is wrong; so these come first.
 SILENCE = ('not one character came: station (a PLC-5 shows its own in octal), check or duplex '
-           'wrong? Then cable, port, power.')
+           'wrong? Then cable, port, power, baud rate and parity.')
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,13 +133,15 @@ def hint(session: Session, error: Abdf1Error) -> str:
         return ''
     if session.echoes:
         return COMES_BACK
-    received = session.counters.chars_received
-    if not received:
-        return f'{SILENCE} "plc detect" tries other settings'
-    if session.counters.messages_received + session.counters.acks_received == 0:
-        return (f'{received} characters came, but no answer that makes sense: baud rate, '
-                'check, duplex, or another master? "plc detect" tries other settings')
-    return ''
+    received, network = session.counters.chars_received, session.network
+    if session.counters.messages_received + session.counters.acks_received:
+        return ''
+    duplex = 'full' if network.mode == MODES['full'] else 'half'
+    cause = SILENCE if not received else (
+        f'{received} characters came, but no answer that makes sense: baud rate, parity, check, '
+        'duplex, or another master?')
+    return (f'asked with {network.baud} baud, parity {network.parity}, {duplex} duplex, '
+            f'{network.error_code}: {cause} "plc detect" tries other settings')
 
 
 def type_hint(session: Session, station: int, error: Abdf1Error, plc_type: str | None) -> str:

@@ -27,6 +27,7 @@ import sys
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.df1.echo import COMES_BACK
 import pytest
+from support.cases import for_all
 from support.commands import call, running_simulator, Said
 from support.ptys import Pty
 from support.ros import Process, write_csv
@@ -232,6 +233,22 @@ def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: 
     said = plc('write', *args, '--yes', '--station', '2')
     assert said.status == 2
     assert text in said.err
+
+
+@for_all(('args', 'text'), [
+    (('read', 'N7:0', '--length', 'x'), '--length: "x" should be a whole number from 1 to 65535'),
+    (('watch', 'N7:0', '--length', '0'), '--length: "0" should be a whole number from 1 to 65535'),
+    (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
+                               'write B3:0'),
+    (('write', 'N7:0', '99999'), 'N7:0: "99999" is not a valid int16, a whole number from -32768 '
+                                 'to 32767'),
+    (('write', 'F8:0', '1,000'), 'F8:0: "1,000" could be two numbers; write 1000 or 1.000'),
+    (('write', 'N7:250', *'0123456', '--plc-type', 'SLC'),
+     'VALUE: 7 elements do not fit at N7:250; the last word there can be is N7:255')])
+def test_what_no_plc_could_take_is_told_before_the_port_is_opened(
+        capsys: pytest.CaptureFixture[str], args: tuple[str, ...], text: str) -> None:
+    assert main([*args, '--port', '/nowhere/plc', '--station', '1']) == 2
+    assert capsys.readouterr().err == f'plc: {text}\n'
 
 
 def test_refused_write(plc: Plc, simulator: Process) -> None:

@@ -58,11 +58,17 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
         assert isinstance(presence.error, StationInactive)
         assert not presence.is_there
         assert not presence.takes_commands
-        assert 'not one character came' in hint(session, presence.error)
+        duplex = 'full' if mode == 'Peer' else 'half'
+        asked = f'asked with 9600 baud, parity None, {duplex} duplex, CRC: '
+        assert hint(session, presence.error) == (
+            f'{asked}not one character came: station (a PLC-5 shows its own in octal), check or '
+            'duplex wrong? Then cable, port, power, baud rate and parity. "plc detect" tries '
+            'other settings')
         line.write(b'\x55\xaa\x00')
         presence = look_at(session, 1)
         assert presence.error is not None
-        assert hint(session, presence.error).startswith('3 characters came, but no answer')
+        assert hint(session, presence.error).startswith(
+            f'{asked}3 characters came, but no answer')
         assert hint(session, FormatError('x')) == ''
     line.close()
 
