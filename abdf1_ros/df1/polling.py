@@ -36,8 +36,11 @@ not wait for them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
+from itertools import chain
+import math
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.link import LinkStatus, ScanTimes
@@ -64,6 +67,11 @@ COMMANDS_BETWEEN_POLLS = 4
 
 # A poll and the EOT that answers it.
 _POLL_CHARACTERS = 6
+
+# Where several stations behind a gateway have not replied in time, it gets one command at a time
+# for so long (s). It may work on one after the other; with more than it can do in Cmd_Timeout it
+# would be late with all of them, for ever.
+_SLOW_TIME = 30.0
 
 # Pause between scans in which no station could be polled (s).
 _PAUSE = 0.05
@@ -147,6 +155,7 @@ class StandardPollingMaster:
         # as that of a probe: otherwise a station that takes no commands would come back at once.
         self._unproven: set[int] = set()
         self._last_probed: _PollList | None = None
+        self._slow_until: defaultdict[int, float] = defaultdict(lambda: -math.inf)  # of gateways
 
     def status(self) -> LinkStatus:
         """Return the scan times of both lists."""
@@ -288,9 +297,20 @@ class StandardPollingMaster:
 
     def _overdue(self, number: int) -> None:
         """End the command whose reply has not come in time."""
-        # No other station waits for it: the others are polled meanwhile.
-        self._line.accounting.overdue(
-            self._outstanding.pop(number).task, keeps_others_waiting=False)
+        via, now = self._stations.via(number), self._machine.now
+        # Mostly no other station waits for it: the others are polled meanwhile.
+        self._line.accounting.overdue(self._outstanding.pop(number).task,
+                                      keeps_others_waiting=now < self._slow_until[via])
+        behind = self._stations.behind(via)
+        if sum(self._stations[other].unanswered > 0 for other in behind) > 1:
+            self._slow_until[via] = now + _SLOW_TIME
+
+    def _busy(self) -> Container[int]:
+        """Return the stations that get no command now, as they or their slow gateways have one."""
+        gateways = {self._stations.via(number) for number in self._outstanding}
+        slow = [self._stations.behind(number) for number in gateways
+                if self._machine.now < self._slow_until[number]]
+        return {*self._outstanding, *chain(*slow)} if slow else self._outstanding
 
     def _end(self, number: int, error: LinkError) -> None:
         """End the command that waits for a reply of a station, if there is one."""
@@ -318,7 +338,7 @@ class StandardPollingMaster:
                     and self._stations.via(number) not in self._polled:
                 self._overdue(number)
         for _ in range(COMMANDS_BETWEEN_POLLS):
-            task = source.next_task(self._machine.now, self._outstanding)
+            task = source.next_task(self._machine.now, self._busy())
             if task is None:
                 return
             yield from self._send(task)

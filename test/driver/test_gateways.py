@@ -198,6 +198,60 @@ def _refuse_half(dice: Random, sts: int, serve: Callable[[Packet], Packet],
     return command.reply(sts=sts) if dice.random() < 0.5 else serve(command)
 
 
+class OneByOne(DriverBench):
+    """Three PLCs behind a gateway that works on one command after the other, in ``seconds``."""
+
+    def __init__(self, *seconds: float) -> None:
+        self.rows = [make_mapping('N7:0', station=number, via=GATEWAY) for number in (1, 2, 3)]
+        network = Network(baud=19200, timeout=100, cmd_timeout=500, polling='Standard')
+        super().__init__(self.rows, network=network, start=False)
+        self.seconds = dict(zip((1, 2, 3), seconds, strict=True))
+        self._answer = SimulatedGateway(GATEWAY, [
+            simulated_plc(number, 'PLC5', self.clock, ('N7:0', 10)) for number in (1, 2, 3)
+        ], Checksum.CRC).handle
+        self.mute: set[int] = set()
+        self._ready: list[float] = []  # when each reply will be, in their order
+        self.connect(self)
+        self.open()
+
+    def handle(self, symbol: Symbol) -> bytes:
+        """Answer; a poll gets EOT until the work on the next reply is done."""
+        if isinstance(symbol, Poll) and self._ready and self._ready[0] > self.clock():
+            return frames.EOT
+        if isinstance(symbol, Frame) and Packet.decode(symbol.data).dst in self.mute:
+            return frames.ACK
+        answer = self._answer(symbol)
+        if isinstance(symbol, Frame) and answer:
+            free = max(self.clock(), *self._ready[-1:], 0.0)
+            self._ready.append(free + self.seconds.get(Packet.decode(symbol.data).dst, 0.0))
+        elif isinstance(symbol, Poll) and answer != frames.EOT:
+            self._ready.pop(0)
+        return answer
+
+    def counts(self, seconds: float) -> list[int]:
+        """Return how many values each row gets in so many seconds."""
+        self.listener.reads.clear()
+        self.run(seconds)
+        return [len(self.listener.values(row)) for row in self.rows]
+
+
+def test_slow_gateway_holds_a_plc_up_for_the_time_of_the_others_and_not_for_ever() -> None:
+    bench = OneByOne(0.4, 0.4, 0.0)
+    bench.run(5.0)
+    assert min(bench.counts(20.0)) >= 20 / (2 * 0.5 + 0.1)
+    bench.seconds = dict.fromkeys((1, 2, 3), 0.0)
+    bench.run(5.0)
+    assert min(bench.counts(5.0)) >= 40  # of 50: side by side again
+
+
+def test_plcs_that_never_reply_cost_another_behind_their_gateway_little() -> None:
+    bench = OneByOne(0.0, 0.0, 0.0)
+    bench.mute = {1, 2}
+    bench.run(10.0)
+    counts = bench.counts(20.0)
+    assert counts[:2] == [0, 0] and counts[2] > 140  # of 200
+
+
 @pytest.mark.parametrize('polling', POLLING)
 def test_gateway_that_fills_in_its_own_node(polling: str) -> None:
     """M 6-4: it may put its node in place of our station, so replies come to that."""
