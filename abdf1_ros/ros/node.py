@@ -129,7 +129,8 @@ class BridgeNode(Node):
             # All writes that wait can end at once, faster than a subscriber takes their results.
             self.create_publisher(DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES),
             self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
-            self.create_publisher(DiagnosticArray, '/diagnostics', 10), self._writes)
+            self.create_publisher(DiagnosticArray, '/diagnostics', 10),
+            self.create_publisher(DiagnosticArray, '~/snapshot', 1), self._writes)
         self._session = BridgeSession(self._surroundings, configuration)
         self.link = self._surroundings.link = LinkThread(
             self.driver.machine, self._opener.open,

@@ -71,6 +71,8 @@ class Parameters:
         100, 'ms between reads of a mapping without Period; 0: as often as the line allows',
         0, MAX_PERIOD)
     diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
+    snapshot_period: float = _parameter(
+        1.0, 's between snapshots of all values, while somebody subscribes; 0: never', 0.0, 3600.0)
     stale_after: float = _parameter(
         3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
     processor_period: float = _parameter(

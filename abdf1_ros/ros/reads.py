@@ -63,7 +63,8 @@ class ReadTopics:
     Publish values in the link thread; made and ended in the thread of the executor.
 
     ``open`` has to come before the driver runs; what is ``published`` before is used again where
-    it fits. ``take_over`` comes when the driver of before does not run any more.
+    it fits. ``take_over`` comes when the driver of before does not run any more. ``latest`` are
+    the last values by topic.
     """
 
     def __init__(self, node: Node, published: dict[str, ReadTopic]) -> None:
@@ -71,6 +72,7 @@ class ReadTopics:
         self._published = published
         self._at_once = _VALUES_AT_ONCE
         self._later: deque[tuple[Any, Any]] = deque()
+        self.latest: dict[str, Values] = {}
         self._topics: dict[str, ReadTopic] = {}
         self._to_come: dict[str, tuple[Mapping, ReadPoint]] = {}
         self._kept_back: dict[str, Values] = {}
@@ -119,6 +121,7 @@ class ReadTopics:
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""
         name = mapping.topic
+        self.latest[name] = values
         if name in self._to_come:
             self._kept_back[name] = values
             if name not in self._to_come:  # it came in this moment

@@ -44,6 +44,7 @@ from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.parameters import Configuration
 from abdf1_ros.ros.reads import ReadTopic, ReadTopics
+from abdf1_ros.ros.snapshot import ValueSnapshot
 from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
@@ -81,6 +82,7 @@ class Surroundings:
     results: Any
     active_stations: Any
     diagnostics: Any
+    snapshot: Any
     writes: WriteTopics
     published: dict[str, ReadTopic] = field(default_factory=dict)
     link: LinkThread = field(init=False)
@@ -129,7 +131,8 @@ class BridgeSession:
         self._told_speed: float | None = None
         self._port_text = ''
         self._levels: list[bytes] = []
-        self._next_diagnostics = self._next_look = 0.0
+        self._next_diagnostics = self._next_look = self._next_snapshot = 0.0
+        self._snapshot: ValueSnapshot | None = None
         # The nodes of a process are not to publish all at the same moment.
         self._phase = random.uniform(0.0, parameters.diagnostics_period)
 
@@ -321,6 +324,7 @@ class BridgeSession:
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self.publish_diagnostics(now)
+        self._publish_snapshot(now)
 
     def _tell_news(self, about: str, texts: Sequence[str],
                    tell: Callable[[str, str], None]) -> None:
@@ -385,12 +389,25 @@ class BridgeSession:
         """Publish all statuses at the clock value ``now`` (s)."""
         period = self.configuration.parameters.diagnostics_period
         self._next_diagnostics = now + period - (now - self._phase) % period
-        message = DiagnosticArray(status=self.diagnostics.statuses(now))
+        self._publish(self._surroundings.diagnostics,
+                      DiagnosticArray(status=self.diagnostics.statuses(now)))
+
+    def _publish_snapshot(self, now: float) -> None:
+        """Publish all values where that is due and somebody wants to see them."""
+        period = self.configuration.parameters.snapshot_period
+        if not period or now < self._next_snapshot:
+            return
+        self._next_snapshot = now + period
+        if self._surroundings.snapshot.get_subscription_count():
+            self._snapshot = self._snapshot or ValueSnapshot(self.driver.points, self.reads.latest)
+            self._publish(self._surroundings.snapshot, self._snapshot.message(now))
+
+    def _publish(self, publisher: Any, message: DiagnosticArray) -> None:
         # Simulated time may still be 0, which would sort before all other messages.
-        now_ros = self._surroundings.node.get_clock().now()
-        stamped = now_ros if now_ros.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
+        now = self._surroundings.node.get_clock().now()
+        stamped = now if now.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
-        self._surroundings.diagnostics.publish(message)
+        publisher.publish(message)
 
 
 def _where(mapping: Mapping) -> str:

@@ -1,0 +1,123 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""All values of a map in one message, and who gets it when."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+import time
+
+from abdf1_ros.driver.points import ReadPoint
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.ros.snapshot import ValueSnapshot
+from abdf1_ros.settings.mapping import Mapping
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import pytest
+from support.mappings import make_mapping
+from support.ros import details, EVERYTHING, Inbox, Observer, Plcs, ros_args, write_csv
+
+OK, STALE, ERROR = DiagnosticStatus.OK, DiagnosticStatus.STALE, DiagnosticStatus.ERROR
+
+
+def status_of(mapping: Mapping, values: array | str | None, *others: Mapping,
+              age: float = 0.5, error: str | None = None) -> DiagnosticStatus:
+    """Return the status of a row whose values are so old (s)."""
+    now = line_time()
+    points = {row: ReadPoint(row, 1.0, 3.0) for row in (mapping, *others)}
+    if values is not None:
+        points[mapping].last_good = now - age
+    points[mapping].error = error
+    latest = {} if values is None else {mapping.topic: values}
+    return ValueSnapshot(points, latest).message(now).status[0]
+
+
+def test_single_value_has_all_that_is_known_of_it() -> None:
+    status = status_of(make_mapping('N7:10', station=2, topic='speed', description='of belt 3'),
+                       array('h', [1200]))
+    assert (status.level, status.hardware_id) == (OK, 'station 2 N7:10')
+    assert status.message == 'OK: 1200, 0.5 s ago'
+    values = details(status)
+    stamp = datetime.fromisoformat(values.pop('stamp')).timestamp()
+    assert time.time() - stamp == pytest.approx(0.5, abs=0.2)
+    assert values == {'value': '1200', 'age_ms': '500', 'address': 'N7:10', 'type': 'int16',
+                      'topic': 'speed', 'description': 'of belt 3'}
+
+
+@pytest.mark.parametrize(('address', 'length', 'kind', 'values', 'keys'), [
+    ('N7:10', 2, '', array('h', [1, 2]), ['value N7:10', 'value N7:11']),
+    ('B3:0/15', 2, '', array('B', [1, 0]), ['value B3:0/15', 'value lamp']),
+    ('N7:0', 2, 'int32', array('i', [1, 2]), ['value N7:0', 'value N7:2']),
+    ('N7:0', 33, '', array('h', range(33)), ['value']),
+    ('ST9:0', 1, '', 'text', ['value'])])
+def test_each_value_of_an_array_has_a_key(
+        address: str, length: int, kind: str, values: array | str, keys: list[str]) -> None:
+    row = make_mapping(address, length=length, kind=kind)
+    lamp = make_mapping('B3:1/0', tag='lamp', topic='lamp')
+    found = [key for key in details(status_of(row, values, lamp)) if key.startswith('value')]
+    assert found == keys
+
+
+@pytest.mark.parametrize(('values', 'age', 'error', 'level', 'message'), [
+    (array('h', [7]), 2.0, None, OK, 'OK: 7, 2.0 s ago'),  # late, and not stale yet
+    (array('h', [7]), 9.0, None, STALE, 'STALE: 7, 9.0 s ago'),
+    (array('h', [7]), 9.0, 'no reply', ERROR, 'ERROR: no reply; 7, 9.0 s ago'),
+    (None, 0.0, None, STALE, 'STALE: waiting for the first read')])
+def test_value_that_is_not_fresh_says_so(
+        values: array | None, age: float, error: str | None, level: bytes, message: str) -> None:
+    status = status_of(make_mapping('N7:0'), values, age=age, error=error)
+    assert (status.level, status.message) == (level, message)
+
+
+# On its topic
+
+
+@pytest.fixture
+def inbox(tmp_path: Path) -> Iterator[Inbox]:
+    data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values',
+                     ['1,PLC5,N7:0,4,7 8'])
+    net = write_csv(tmp_path / 'net.csv', 'Baud,Timeout', ['115200,100'])
+    table = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Scale,Offset',
+                      ['speed,Read,N7:0,1,PLC5,0.5,1', 'order,Write,N7:2,1,PLC5'])
+    arguments = ros_args(f'net_file:={net}', f'map_file:={table}', 'snapshot_period:=0.2')
+    with Observer() as observer, Plcs(data) as plcs:
+        node = BridgeNode(context=observer.context, use_global_arguments=False,
+                          cli_args=[*arguments, '-p', f'port:={plcs.port}'])
+        observer.executor.add_node(node)
+        node.start()
+        yield observer.listen(DiagnosticArray, '/abdf1/snapshot', EVERYTHING)
+        observer.executor.remove_node(node)
+        node.stop()
+        node.destroy_node()
+
+
+def test_snapshot_comes_to_who_subscribes(inbox: Inbox) -> None:
+    message = inbox.until(lambda array: array.status[0].level == OK, 'the values')
+    (status,) = message.status  # a row that is written alone has no value
+    assert status.message.startswith('OK: 4.5, ')
+    assert message.header.stamp.sec > 0
+
+
+def test_snapshot_is_made_for_nobody(inbox: Inbox, monkeypatch: pytest.MonkeyPatch) -> None:
+    inbox.first()
+    made: list[float] = []
+    monkeypatch.setattr(ValueSnapshot, 'message', lambda snapshot, now: made.append(now))
+    publisher_gone = time.monotonic() + 0.5
+    inbox._observer.forget(inbox)
+    inbox._observer.until(lambda: time.monotonic() > publisher_gone, 'half a second')
+    assert not made
