@@ -19,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
+from random import Random
+import struct
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
@@ -36,6 +38,12 @@ from support.peers import CommandTask
 
 SETTINGS = MasterSettings(
     station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
+
+
+# Of a line with three stations: delivery and Cmd_Timeout, then a scan until the next answer, one
+# before it, and all tries of every command and poll in them; 0.02 s for the longest frame.
+_TRY = 0.1 + 0.02
+LONGEST = 2 * _TRY + 0.5 + 2 * (3 * (2 + 3) + 1) * _TRY
 
 
 def bench(polling: PollingSettings, *, dead: tuple[int, ...] = (),
@@ -364,6 +372,42 @@ def test_inactive_station_gets_no_second_poll_and_no_retry_counts() -> None:
     assert len(rig.master.times('P1')) == 1
     assert not {'enq_retries', 'enq_limit_exceeded'} & set(rig.master.counts())
     assert rig.master.numbers() == []
+
+
+class Losses:
+    """A line that loses a share of its frames, commands as well as replies and ACKs."""
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+
+    def damage(self, data: bytes, random: Random) -> bytes:
+        """Return a frame, or nothing."""
+        return b'' if random.random() < self._share else data
+
+
+@pytest.mark.parametrize('share', [0.3, 0.6])
+@pytest.mark.parametrize('polling', [PollingSettings((1, 2, 3)), None])
+def test_value_is_never_older_than_its_transaction(
+        share: float, polling: PollingSettings | None) -> None:
+    """The PLC executes the first copy of a command; ACKs, polls and reply may be lost later."""
+    rig = MasterBench(1, 2, 3, settings=SETTINGS, polling=polling)
+    for slave in rig.slaves.values():
+        setattr(slave, '_execute', lambda command: command.reply(struct.pack('<d', rig.clock())))
+    rig.line.noise = Losses(share)
+    rig.start()
+    tasks = {number: rig.ask(number) for number in rig.slaves}
+    count = 0
+    while rig.clock() < 300.0:
+        rig.run(0.05)
+        for number, task in tasks.items():
+            if isinstance(task.result, Packet):
+                count += 1
+                assert task.ended is not None
+                age = task.ended - struct.unpack('<d', task.result.data)[0]
+                assert age <= task.seconds < LONGEST
+            if ended(task):
+                tasks[number] = rig.ask(number)
+    assert count
 
 
 def test_command_timeout_is_noticed_at_the_stations_own_poll() -> None:
