@@ -42,11 +42,12 @@ from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.steps import AddressedValues, Steps
+from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread, PortState

@@ -35,10 +35,11 @@ from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import decode_counters
 from abdf1_ros.pccc.status import check_status
-from abdf1_ros.pccc.steps import echo, identify, Steps
+from abdf1_ros.pccc.steps import echo, identify
 
 # A station gets an echo after so many seconds of silence, and the next one after as many.
 ECHO_PERIOD = 2.0

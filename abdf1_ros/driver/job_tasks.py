@@ -29,8 +29,7 @@ from typing import Protocol, TypeVar
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError
-from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.steps import Steps
+from abdf1_ros.pccc.dialect import Request, Steps
 
 _With = TypeVar('_With', Packet, LinkError)
 

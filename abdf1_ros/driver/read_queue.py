@@ -37,7 +37,7 @@ import math
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.driver.transactions import words_of
-from abdf1_ros.pccc.steps import Steps
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
 from abdf1_ros.plan.planner import Block
 

@@ -33,9 +33,9 @@ from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
-from abdf1_ros.pccc.steps import Steps
 
 _Result = TypeVar('_Result')
 

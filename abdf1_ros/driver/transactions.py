@@ -21,9 +21,10 @@ from collections.abc import Callable
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
-from abdf1_ros.pccc.steps import data_of, Steps, words_in
+from abdf1_ros.pccc.steps import data_of, words_in
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping

@@ -25,7 +25,7 @@ from abdf1_ros.driver.read_backs import ReadBacks
 from abdf1_ros.driver.readings import Readings
 from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.errors import CommandExpired, RemoteError
-from abdf1_ros.pccc.steps import Steps
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 

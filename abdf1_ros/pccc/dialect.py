@@ -16,15 +16,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
 
 Request = tuple[int, bytes]
 """CMD, and what follows TNS."""
+
+_Result = TypeVar('_Result')
+
+Steps = Generator[Request, Packet, _Result]
+"""What is done with a station: yields requests, is sent the replies, returns the result."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from abdf1_ros.pccc.address import Addressing
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.diagnostics import MAX_ECHO
 from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.file_search import FileSearch
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.link_counters import CounterLayout
@@ -46,6 +47,7 @@ class Family:
     ``served_counters`` returns the layout of a port for full duplex and for a master, None where
     its counters are not emulated; they are at every address where ``counters_anywhere``.
     ``is_spoken_by_all`` tells that PLCs of other families know its commands too.
+    ``file_search`` finds out which files a PLC has, None where they cannot be looked for.
     """
 
     addressing: Addressing
@@ -60,6 +62,7 @@ class Family:
     counters_anywhere: bool = False
     max_echo: int = MAX_ECHO
     is_spoken_by_all: bool = False
+    file_search: FileSearch | None = None
 
     @property
     def plc_type(self) -> PlcType:

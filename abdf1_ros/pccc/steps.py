@@ -16,16 +16,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, Request, Steps, Transfer
 from abdf1_ros.pccc.families import decode_identity, dialect_of, family_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -33,11 +32,6 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
-
-_Result = TypeVar('_Result')
-
-Steps = Generator[Request, Packet, _Result]
-"""What is done with a station: yields requests, is sent the replies, returns the result."""
 
 
 @dataclass(frozen=True, slots=True)

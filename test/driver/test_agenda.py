@@ -35,7 +35,7 @@ from abdf1_ros.driver.read_queue import ReadJob
 from abdf1_ros.driver.readings import Readings
 from abdf1_ros.driver.writes import MessageJob, WriteQueue
 from abdf1_ros.driver.writing import WritesUnderWay
-from abdf1_ros.pccc.steps import Steps
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping

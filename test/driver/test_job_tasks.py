@@ -21,7 +21,7 @@ import math
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.errors import CommandTimeout, PortLost
-from abdf1_ros.pccc.steps import Steps
+from abdf1_ros.pccc.dialect import Steps
 import pytest
 
 OURS = 5

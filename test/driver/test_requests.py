@@ -24,7 +24,8 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
-from abdf1_ros.pccc.steps import echo, identify, Steps
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
 from support.driver_bench import simulated_plc
 from support.virtual_line import VirtualLine

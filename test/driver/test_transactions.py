@@ -27,9 +27,9 @@ from abdf1_ros.driver.transactions import (
     REWRITTEN,
 )
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
-from abdf1_ros.pccc.dialect import Request
+from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.pccc.steps import echo, identify, Steps
+from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.network import Network

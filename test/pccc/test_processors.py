@@ -16,10 +16,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-import json
-from typing import Any
-
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder
 from abdf1_ros.df1.packet import Packet
@@ -36,33 +32,7 @@ from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 import pytest
-from support.vectors import VECTOR_FOLDER
-
-PROCESSORS: list[dict[str, Any]] = json.loads(
-    (VECTOR_FOLDER / 'processors.json').read_text(encoding='utf-8'))['processors']
-
-
-@dataclass(frozen=True, slots=True)
-class Exchange:
-    """A command and its reply, without link header."""
-
-    meaning: str
-    command: Packet
-    reply: Packet
-
-
-def exchanges(name: str) -> list[Exchange]:
-    entry = next(processor for processor in PROCESSORS if processor['name'] == name)
-    found = []
-    for exchange in entry['exchanges']:
-        raw = bytes.fromhex(exchange['command'])
-        command = Packet(1, 0, raw[0], 0, 7, raw[1:])
-        reply = command.reply(bytes.fromhex(exchange['data']), int(exchange['sts'], 16))
-        found.append(Exchange(exchange['meaning'], command, reply))
-    return found
-
-
-ML1400 = exchanges('micrologix_1400')
+from support.processors import Exchange, exchanges, ML1400, PROCESSORS
 
 
 def place_of(command: Packet) -> tuple[Address, int] | None:

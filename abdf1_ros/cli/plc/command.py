@@ -49,11 +49,14 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import printable
@@ -114,8 +117,9 @@ def _cells(options: argparse.Namespace, command: Command, length: int | str) -> 
 def _mappings(options: argparse.Namespace, session: Session, cells: dict[str, str],
               addresses: Sequence[str]) -> list[Mapping]:
     """Return the mappings of addresses; where needed, ask the PLC for its type first."""
-    if not options.plc_type:
-        cells = data.ask_kind(session, options.station) | cells
+    plc_type, processor = _family(options, session)
+    kind = {'PLC_Type': plc_type.value, 'Processor': data.processor_cell(processor)}
+    cells = {column: text for column, text in kind.items() if text} | cells
     return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
 
 
@@ -426,32 +430,46 @@ def _ports(options: argparse.Namespace) -> int:
 
 
 def _files(options: argparse.Namespace) -> int:
+    mappings = load_mappings(options.map)[0] if options.map else []
     with Session(_line(options), via=options.via) as session:
         try:
-            kind = {'PLC_Type': options.plc_type} if options.plc_type \
-                else data.ask_kind(session, options.station)
-            family = PlcType(kind['PLC_Type'])
-            if family not in files.FAMILIES:
-                raise FormatError(f'a {family.value} has no files that can be looked for')
+            family, processor = _family(options, session)
             progress = Progress()
             found = []
-            for entry in files.find_files(session, options.station, family, options.files,
-                                          progress.show):
+            for entry in files.find_files(session, options.station, family, processor,
+                                          options.files, progress.show, _complain):
                 found.append(entry)
-                if not options.map:
+                if options.map is None:
                     progress.clear()
-                    print(f'{str(entry):6} {entry.elements or "":4} '
-                          f'{"elements" if entry.elements else "by rack or slot"}', flush=True)
+                    print(f'{str(entry):6} {_extent(entry)}', flush=True)
             progress.clear()
         except Abdf1Error as error:
             return _failed(options, session, error)
     if options.map:
+        faults = [*files.outside(found, mappings, options.station, options.map)]
+        print('\n'.join(map(str, faults)) or f'all rows of station {options.station} lie inside')
+        return EXIT_FAILED if faults else 0
+    if options.map is not None:
         print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period'
               + ('' if options.via is None else ',Via'))
-        for row in files.map_rows(found, options.station, family, kind.get('Processor', ''),
-                                  options.via):
+        for row in files.map_rows(found, options.station, family,
+                                  data.processor_cell(processor), options.via):
             print(row)
     return 0 if found else EXIT_FAILED
+
+
+def _family(options: argparse.Namespace,
+            session: Session) -> tuple[PlcType, Processor | None]:
+    """Return family and processor of the station, which is asked where nobody has said it."""
+    if options.plc_type:
+        return PlcType(options.plc_type), None
+    return data.ask_family(session, options.station)
+
+
+def _extent(entry: DataFile) -> str:
+    if entry.type.is_io:
+        return f'{entry.elements:4} words' if entry.elements else '     by rack or slot'
+    return f'{entry.elements:4} elements'
 
 
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {

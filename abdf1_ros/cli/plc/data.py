@@ -33,7 +33,6 @@ from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Values, ValueType
@@ -122,23 +121,21 @@ def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
     return max(1, (len(texts[0]) + 1) // 2) if is_packed else len(texts)
 
 
-def ask_kind(session: Session, station: int) -> dict[str, str]:
+def ask_family(session: Session, station: int) -> tuple[PlcType, Processor | None]:
     """
-    Return the columns PLC_Type and Processor of a station, as it says itself.
+    Return family and processor of a station, as it says itself.
 
     Raises LinkError, RemoteError, or FormatError where that cannot be told.
     """
     identity = session.ask(station, steps.identify())
     if identity.plc_type is None:
         raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
-    return {'PLC_Type': identity.plc_type.value, 'Processor': processor_of(identity)}
+    return identity.plc_type, identity.processor
 
 
-def processor_of(identity: Identity) -> str:
-    """Return the Processor cell of a map file for an identity; empty for the usual one."""
-    model = identity.model.replace('MicroLogix ', 'ML').removeprefix('SLC ').partition(' ')[0]
-    unusual = {processor.value for processor in Processor if processor is not USUAL}
-    return model if model in unusual else ''
+def processor_cell(processor: Processor | None) -> str:
+    """Return the Processor cell of a map file; empty for the usual one."""
+    return '' if processor is None or processor is USUAL else processor.value
 
 
 def read(session: Session, mapping: Mapping) -> Values:

@@ -12,141 +12,76 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Which data files a processor has, and how long they are, found by reading alone.
-
-An element is there if a read of it succeeds. A PLC-5 says in its reply what the elements are; an
-SLC is asked for every type that a file may have, because a read has to name it.
-"""
+"""The data files of a PLC: found, as rows of a map, and compared with a map."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.families import dialect_of, family_of, file_types_of, layout_of
-from abdf1_ros.pccc.file_types import DEFAULT_FILES, FileType, PlcType
-from abdf1_ros.pccc.status import check_status
-from abdf1_ros.pccc.steps import Steps
-from abdf1_ros.pccc.typed_data import BYTE_STRING, TypedData
-
-_USUAL = {number: kind for kind, number in DEFAULT_FILES.items()}
-
-# Types of user files of an SLC, the frequent ones first. The first three files have one type.
-_SLC_TYPES = (FileType.INTEGER, FileType.BINARY, FileType.FLOAT, FileType.TIMER,
-              FileType.COUNTER, FileType.CONTROL, FileType.LONG, FileType.STRING,
-              FileType.ASCII, FileType.BCD)
-_FIRST_OF_ANY_TYPE = 3
-
-# Slots of an SLC that are tried for inputs and outputs: slot 0 is the processor's own.
-_SLOTS_TRIED = 8
+from abdf1_ros.pccc.families import dialect_of, family_of, layout_of
+from abdf1_ros.pccc.file_search import DataFile
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.problems import Place, Problem
+from abdf1_ros.settings.mapping import Mapping
 
 # Period of the proposed rows (ms): reading all files of a PLC is a lot for a slow line.
 _DRAFT_PERIOD = 5000
 
-_MOST_ELEMENTS = {PlcType.PLC5: 1000, PlcType.SLC: 256}
-FAMILIES = tuple(_MOST_ELEMENTS)
-"""Whose files can be found."""
+USUAL_NUMBERS = tuple(range(32))
+"""What is looked for one by one where nobody says what."""
 
 
-@dataclass(frozen=True, slots=True)
-class DataFile:
+def find_files(session: Session, station: int, plc_type: PlcType, processor: Processor | None,
+               numbers: Sequence[int] | None = None,
+               show: Callable[[str], None] = lambda text: None,
+               warn: Callable[[str], None] = lambda text: None) -> Iterator[DataFile]:
     """
-    A file with its elements.
+    Yield the files among ``numbers``: all of the processor's own list, or what reads find.
 
-    The number is 0 for the images of inputs and outputs, which are addressed by rack or slot and
-    cannot be counted.
+    ``show`` gets a text about the file being asked for, ``warn`` why a list is not used. Raises
+    FormatError for a family whose files cannot be looked for, and LinkError.
     """
-
-    type: FileType  # noqa: A003
-    number: int
-    elements: int
-
-    def __str__(self) -> str:
-        """Return type and number as in an address."""
-        return f'{self.type.value}{self.number}'
-
-
-def find_files(session: Session, station: int, plc_type: PlcType, numbers: Sequence[int],
-               show: Callable[[str], None] = lambda text: None) -> Iterator[DataFile]:
-    """
-    Yield the files among ``numbers``; ``show`` gets a text about the file being asked for.
-
-    Raises LinkError where the station does not answer any more.
-    """
-    for number in numbers:
+    search = family_of(plc_type).file_search
+    if search is None:
+        raise FormatError(f'a {plc_type.value} has no files that can be looked for')
+    steps = search.directory(processor)
+    if steps is not None:
+        try:
+            for entry in session.ask(station, steps):
+                if numbers is None or entry.number in numbers:
+                    yield entry
+            return
+        except (RemoteError, FormatError) as error:
+            warn(f'its file directory cannot be read ({error}); so every file is tried')
+    for number in USUAL_NUMBERS if numbers is None else numbers:
         show(f'file {number}')
-        kind = _type_of(session, station, plc_type, number)
-        if kind is None:
+        found = session.ask(station, search.look_for(number))
+        if found is not None:
+            yield found
+
+
+def outside(found: Sequence[DataFile], mappings: Sequence[Mapping], station: int,
+            path: str) -> Iterator[Problem]:
+    """Yield the rows of a map that lie outside of the files of a station, and why."""
+    files = {entry.number: entry for entry in found if not entry.type.is_function}
+    for mapping in mappings:
+        address = mapping.address
+        if mapping.station != station or mapping.serves or address.file_type.is_function or (
+                address.file_type.is_io):
             continue
-        elements = 0 if kind.is_io else _count(session, station, plc_type, kind, number)
-        yield DataFile(kind, number, elements)
-
-
-def _type_of(session: Session, station: int, plc_type: PlcType, number: int) -> FileType | None:
-    """Return the type of a file, None where there is none of a type that we can read."""
-    if plc_type == PlcType.PLC5:
-        return _type_by_reply(session, station, number)
-    addressing = family_of(plc_type).addressing
-    usual = _USUAL.get(number)
-    candidates = [usual] if usual else []
-    if number >= _FIRST_OF_ANY_TYPE:
-        candidates += [kind for kind in _SLC_TYPES if kind is not usual]
-    return next((kind for kind in candidates if any(
-        _is_there(session, station, Address(addressing, kind, number, element))
-        for element in range(_SLOTS_TRIED if kind.is_io else 1))), None)
-
-
-def _type_by_reply(session: Session, station: int, number: int) -> FileType | None:
-    """Return the type that a PLC-5 tells; words of N, B, O, I and S files are all integers."""
-    try:
-        data = session.ask(station, _first_element(number))
-    except (RemoteError, FormatError):
-        return None
-    usual = _USUAL.get(number, FileType.INTEGER)
-    if data.type_id == layout_of(usual, PlcType.PLC5).code:
-        return usual
-    if data.type_id == BYTE_STRING:
-        return FileType.ASCII if data.element_size == 1 else FileType.STRING
-    return next((kind for kind in file_types_of(PlcType.PLC5)
-                 if layout_of(kind, PlcType.PLC5).code == data.type_id), None)
-
-
-def _first_element(number: int) -> Steps[TypedData]:
-    address = Address(family_of(PlcType.PLC5).addressing, FileType.INTEGER, number, 0)
-    reply = yield dialect_of(PlcType.PLC5).read(address, 1)
-    return TypedData.decode(check_status(reply))
-
-
-def _element(address: Address) -> Steps[bytes]:
-    dialect, words = dialect_of(address.plc_type), address.layout.words
-    reply = yield dialect.read(address, words)
-    return dialect.read_data(address, words, check_status(reply))
-
-
-def _is_there(session: Session, station: int, address: Address) -> bool:
-    try:
-        session.ask(station, _element(address))
-    except (RemoteError, FormatError):
-        return False
-    return True
-
-
-def _count(session: Session, station: int, plc_type: PlcType, kind: FileType,
-           number: int) -> int:
-    """Return how many elements a file has, by halving: the first of them is there."""
-    addressing = family_of(plc_type).addressing
-    low, high = 1, _MOST_ELEMENTS[plc_type]
-    while low < high:
-        middle = (low + high + 1) // 2
-        if _is_there(session, station, Address(addressing, kind, number, middle - 1)):
-            low = middle
-        else:
-            high = middle - 1
-    return low
+        entry, fault = files.get(address.file), ''
+        if entry is None:
+            fault = f'there is no file {address.file}'
+        elif entry.type is not address.file_type:
+            fault = f'file {address.file} is {entry}'
+        elif mapping.extent.end > entry.elements * address.layout.words:
+            fault = f'{entry} has {entry.elements} elements'
+        if fault:
+            yield Problem(Place(path, mapping.file_line, column='Address'),
+                          f'{address}, Length {mapping.length}: {fault}')
 
 
 def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
@@ -154,9 +89,9 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
     """Yield a row of a map CSV for each file, as long as one packet; others are comments."""
     for entry in found:
         kind = entry.type
-        if kind.is_io:
-            yield (f'# {entry}: inputs and outputs are addressed by '
-                   f'{"rack and group" if plc_type == PlcType.PLC5 else "slot"}')
+        if kind.is_io or kind.is_function:
+            yield (f'# {entry}: addressed by ' + ('rack or slot' if kind.is_io else
+                                                  'the names of its words'))
             continue
         per_element = layout_of(kind, plc_type).words
         packet = dialect_of(plc_type).max_read(kind)

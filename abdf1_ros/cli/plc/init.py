@@ -20,7 +20,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from abdf1_ros.cli.plc.data import processor_of
+from abdf1_ros.cli.plc.data import processor_cell
 from abdf1_ros.cli.plc.detect import Found
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.presence import Presence
@@ -92,7 +92,7 @@ def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
             yield f'# its family is not known: write PLC_Type yourself\n' \
                   f'# words_{number},Read,N7:0,{number},SLC,,10,1000,,,\n'
             continue
-        tail = f'{number},{family.value},{processor_of(identity)}'
+        tail = f'{number},{family.value},{processor_cell(identity.processor)}'
         guard = 'RUN' if identity.mode is not None else ''  # docs/heartbeats.md, rule 13
         # Every processor of these families has the status file; N7 may be missing.
         yield f'status_{number},Read,S:0,{tail},4,1000,,,\n'

@@ -130,7 +130,8 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
                        help='who may be there in half duplex (default: 0-7)')
     begin.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
     _complete_files(add('files', 'tell which data files a PLC has and how long they are',
-                        'files 1 --net net.csv', 'files 1 --map --net net.csv'))
+                        'files 1 --net net.csv', 'files 1 --map --net net.csv',
+                        'files 1 --map map.csv --net net.csv'))
     commands.add_parser('ports', help='list serial ports and adapters',
                         description='List serial ports and adapters.')
     return parser
@@ -143,11 +144,13 @@ def _add_station(parser: argparse.ArgumentParser) -> None:
 
 def _complete_files(found: argparse.ArgumentParser) -> None:
     _add_station(found)
-    found.add_argument('--files', metavar='LIST', type=_stations, default=tuple(range(32)),
-                       help='numbers to look for, up to 254 (default: 0-31)')
+    found.add_argument('--files', metavar='LIST', type=_stations,
+                       help='numbers up to 254 (default: all that the PLC lists, or 0-31)')
     found.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
                        help='default: the PLC is asked what it is')
-    found.add_argument('--map', action='store_true', help='print rows for a map CSV')
+    found.add_argument('--map', metavar='FILE', nargs='?', const='',
+                       help='print rows for a map CSV; with FILE, say which of its rows lie '
+                            'outside of the files')
 
 
 def _complete_write(write: argparse.ArgumentParser) -> None:

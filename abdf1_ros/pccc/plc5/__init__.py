@@ -22,9 +22,11 @@ from abdf1_ros.pccc.plc5 import identity
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.describe import DESCRIBED
 from abdf1_ros.pccc.plc5.dialect import PLC5_TYPED, PLC5_WORD_RANGE
+from abdf1_ros.pccc.plc5.file_search import Plc5FileSearch
 from abdf1_ros.pccc.plc5.server import Plc5Commands
 
 FAMILY = Family(
     ADDRESSING, {Access.TYPED: PLC5_TYPED, Access.WORD_RANGE: PLC5_WORD_RANGE},
     Plc5Commands, identity.decode, identity.encode, DESCRIBED,
-    served_counters=lambda is_full_duplex, is_master: identity.COUNTERS, counters_anywhere=True)
+    served_counters=lambda is_full_duplex, is_master: identity.COUNTERS, counters_anywhere=True,
+    file_search=Plc5FileSearch())

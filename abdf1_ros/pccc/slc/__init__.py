@@ -23,6 +23,7 @@ from abdf1_ros.pccc.slc import identity
 from abdf1_ros.pccc.slc.address import ADDRESSING
 from abdf1_ros.pccc.slc.describe import DESCRIBED
 from abdf1_ros.pccc.slc.dialect import BY_PROCESSOR
+from abdf1_ros.pccc.slc.file_search import SlcFileSearch
 from abdf1_ros.pccc.slc.server import SlcCommands
 from abdf1_ros.pccc.status import Meanings
 
@@ -38,4 +39,5 @@ FAMILY = Family(
     ADDRESSING, dict.fromkeys((Access.SLOT, Access.FLAT), BY_PROCESSOR[USUAL]),
     SlcCommands, identity.decode, identity.encode, DESCRIBED, MEANINGS,
     by_processor=BY_PROCESSOR, served_counters=identity.served_counters,
-    max_echo=236)  # of an SLC 5/03 and later (M 7-8)
+    max_echo=236,  # of an SLC 5/03 and later (M 7-8)
+    file_search=SlcFileSearch())

@@ -28,6 +28,7 @@ from abdf1_ros.pccc.plc5.server import TypedService
 from abdf1_ros.pccc.serving import Codes, Commands, Refusal
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
+from abdf1_ros.pccc.slc.file_search import directory_of, SLC_DIRECTORY
 
 _COMMON_INTERFACE_FILE = 9
 _ADDRESSING_MODE = Address(ADDRESSING, FileType.STATUS, 2, 2)
@@ -58,8 +59,17 @@ class SlcCommands:
     def _read(self, reader: Reader, is_short: bool = False) -> bytes:
         request = slc.LogicalRead.read(reader, is_short)
         self._check_size(request.size, slc.MAX_READ)
+        if (request.address.file, request.address.type_code) == (0, SLC_DIRECTORY.type_code):
+            return self._directory(request)
         return b''.join(self._table.read(*place)
                         for place in self._places(request.address, request.size))
+
+    def _directory(self, request: slc.LogicalRead) -> bytes:
+        at = 2 * (request.address.element + (request.address.sub_element or 0))
+        data = directory_of(self._table)[at:at + request.size]
+        if len(data) < request.size:
+            raise OutOfRange('the file directory is shorter')
+        return data
 
     def _write(self, reader: Reader, is_short: bool = False) -> bytes:
         request = slc.LogicalWrite.read(reader, is_short)

@@ -25,7 +25,7 @@ from abdf1_ros.cli.plc.data import (
     length_of,
     mapping_of,
     parse_values,
-    processor_of,
+    processor_cell,
     Radix,
     rows,
     value_texts,
@@ -34,8 +34,7 @@ from abdf1_ros.cli.plc.data import (
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.errors import FormatError, PortLost
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
@@ -140,11 +139,11 @@ def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
     assert (result.outcome, result.detail) == (Outcome.UNKNOWN, 'port lost: closed')
 
 
-@pytest.mark.parametrize('model, processor', [
-    ('SLC 5/02', '5/02'), ('SLC 5/03', ''), ('SLC 5/05', '5/05'), ('MicroLogix 1000', 'ML1000'),
-    ('MicroLogix 1500 LRP', 'ML1500'), ('SLC 500 fixed', ''), ('1763-LEC', '')])
-def test_processor_that_says_what_it_is(model: str, processor: str) -> None:
-    assert processor_of(Identity(PlcType.SLC, model)) == processor
+@pytest.mark.parametrize('processor, cell', [
+    (None, ''), (Processor.SLC_5_02, '5/02'), (Processor.SLC_5_03, ''),
+    (Processor.ML1500, 'ML1500')])
+def test_processor_that_says_what_it_is(processor: Processor | None, cell: str) -> None:
+    assert processor_cell(processor) == cell
 
 
 @given(st.integers(-32768, 32767))

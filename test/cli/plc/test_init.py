@@ -22,9 +22,13 @@ import time
 
 from abdf1_ros.cli.plc import command
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.files import find_files
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.listing import SerialPortInfo
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.network import load_network
+from abdf1_ros.settings.network import load_network, Network
 import pytest
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
@@ -104,7 +108,7 @@ def test_init_leaves_files_alone_that_are_there(
 @pytest.mark.parametrize(('station', 'found'), [
     ('1', {'O0': 0, 'S2': 32, 'B3': 5, 'T4': 10, 'N7': 256, 'F8': 10, 'ST9': 2, 'A12': 7,
            'D13': 1, 'C20': 1}),
-    ('2', {'I1': 0, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L11': 2})])
+    ('2', {'I1': 2, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L11': 2})])
 def test_files_are_found_with_type_and_length(
         port: str, station: str, found: dict[str, int], capsys: Output) -> None:
     assert main(['files', station, '--port', port, '--files', '0-21']) == 0
@@ -129,6 +133,33 @@ def test_files_become_rows_of_a_map(
     mappings, problems = load_mappings(str(path))
     assert problems == []
     assert {mapping.tag for mapping in mappings} >= {'s2', 'b3', 'n7'}
+
+
+def test_rows_of_a_map_that_lie_outside_of_the_files(
+        port: str, tmp_path: Path, capsys: Output) -> None:
+    path = tmp_path / 'map.csv'
+    header = 'Tag,Command,Address,Station,PLC_Type,Length\n'
+    path.write_text(header + 'a,Read,N7:90,2,SLC,10\nb,Read,F10:3,2,SLC,1\nc,Read,N7:0,1,PLC5,\n'
+                    'd,Read,I:3.0,2,SLC,9\n', encoding='utf-8')
+    line = ('--map', str(path), '--port', port)
+    assert main(['files', '2', *line]) == 0
+    assert capsys.readouterr().out == 'all rows of station 2 lie inside\n'
+    path.write_text(header + 'a,Read,N7:90,2,SLC,11\nb,Read,N10:0,2,SLC,1\n'
+                    'c,Read,B12:0,2,SLC,\n', encoding='utf-8')
+    assert main(['files', '2', *line]) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        f'{path}:2 (Address): N7:90, Length 11: N7 has 100 elements',
+        f'{path}:3 (Address): N10:0, Length 1: file 10 is F10',
+        f'{path}:4 (Address): B12:0, Length 1: there is no file 12']
+
+
+def test_directory_takes_few_reads(port: str, capsys: Output) -> None:
+    with Session(Network(com_port=port, baud=19200, timeout=300)) as session:
+        found = [*find_files(session, 2, PlcType.SLC, Processor.SLC_5_03)]
+        assert session.counters.commands_sent <= 10
+        by_reads = [*find_files(session, 2, PlcType.SLC, None, (7, 10))]
+        assert session.counters.commands_sent > 20
+    assert {str(entry) for entry in by_reads} <= {str(entry) for entry in found}
 
 
 def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:

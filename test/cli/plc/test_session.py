@@ -24,7 +24,8 @@ from abdf1_ros.cli.plc.session import opened, Session
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.errors import PortLost
-from abdf1_ros.pccc.steps import echo, identify, Steps
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
 import pytest
 from support.ptys import Pty
