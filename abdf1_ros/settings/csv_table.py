@@ -101,6 +101,16 @@ def shown(cell: str) -> str:
     return cell if len(cell) <= _SHOWN else f'{cell[:_SHOWN]}...'
 
 
+def looks_like_address(text: str) -> bool:
+    """Tell whether a cell has the form of most addresses, such as N7:0."""
+    return _LIKE_AN_ADDRESS.fullmatch(text.upper()) is not None
+
+
+def is_export_of_kepserver(names: Sequence[str]) -> bool:
+    """Tell whether a first row is that of an export of tags from KEPServerEX."""
+    return {'tag name', 'address', 'data type'} <= {name.lower() for name in names}
+
+
 def read_rows(path: str, known: Sequence[str]) -> list[Row]:
     """
     Read all data rows of a file whose header uses ``known`` column names.
@@ -125,6 +135,9 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = ()) ->
         _check_text(Place(path, first), header)
         delimiter = max(_DELIMITERS, key=header.count)
         names = _cells(Place(path, first), header, delimiter)
+        if is_export_of_kepserver(names):
+            raise Problem(path, f'is an export of KEPServerEX; "plc import {path}" makes a map '
+                                'of it')
         _check_direction(Place(path, first), names, others, known)
     except Problem as problem:
         raise ConfigurationError([problem]) from None
@@ -285,9 +298,9 @@ def _kind(names: list[str]) -> str:
     """Return what a first row seems to be that names no column."""
     if names[0].startswith('//'):
         return ', and a comment begins with #'
-    if any(_LIKE_AN_ADDRESS.fullmatch(name.upper()) for name in names):
-        return (', it has an address, as in an export of symbols from a programming software or '
-                'a map without its first row')
+    if any(map(looks_like_address, names)):
+        return (', it has an address, as in an export of symbols from RSLogix ("plc import" makes '
+                'a map of it) or a map without its first row')
     return ''
 
 

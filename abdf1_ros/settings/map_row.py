@@ -73,14 +73,16 @@ class CellFault:
     value: str | None = None
     is_superfluous: bool = False
 
-    def in_file(self, row: Row) -> Problem:
-        """Return the fault in the words of the map file that the row stands in."""
+    def words(self) -> str:
+        """Return the fault in the words of a map file."""
         text = self.text
         if self.value is not None:
             text = f'{self.column} = "{shown(self.value)}" {text}'
-        if self.is_superfluous:
-            text += '; leave the cell empty'
-        where = row.where(self.column)
+        return f'{text}; leave the cell empty' if self.is_superfluous else text
+
+    def in_file(self, row: Row) -> Problem:
+        """Return the fault in the words of the map file that the row stands in."""
+        text, where = self.words(), row.where(self.column)
         if self.message is None:
             return Problem(where, f'Item: {row.item}, {text}')
         return Problem(where, text, self.message, (row.item, *self.args))

@@ -168,8 +168,8 @@ def test_file_without_a_header_is_one_fault(path: Path, content: str) -> None:
 def test_export_of_symbols_is_told_from_a_map(path: Path, content: str) -> None:
     problem, = problems_of(path, content)
     assert problem.startswith(
-        'FILE:1: no column is named here, it has an address, as in an export of symbols from a '
-        'programming software or a map without its first row; the first row names them')
+        'FILE:1: no column is named here, it has an address, as in an export of symbols from '
+        'RSLogix ("plc import" makes a map of it) or a map without its first row; the first row')
 
 
 @pytest.mark.parametrize('head', [b'PK\x03\x04\x14\0', b'\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1\0'])

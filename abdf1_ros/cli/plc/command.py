@@ -28,7 +28,7 @@ import errno
 from pathlib import Path
 import sys
 
-from abdf1_ros.cli.plc import data, detect, files, init, presence
+from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION, make_parser, RADIXES
 from abdf1_ros.cli.plc.session import Session
@@ -405,6 +405,26 @@ def _init(options: argparse.Namespace) -> int:
     return 0
 
 
+def _import(options: argparse.Namespace) -> int:
+    target = Path(options.into) / 'map.csv'
+    result = exports.import_map(options.file, options.station, PlcType(options.plc_type))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open('x', encoding='utf-8') as file:
+            file.write(result.text)
+    except FileExistsError:
+        raise ConfigurationError([Problem(str(target), (
+            'is there already and stays as it is; name another folder with --into'))]) from None
+    except OSError as error:
+        raise ConfigurationError([Problem(
+            str(target), f'cannot be written: {error.strerror}')]) from None
+    for problem in result.left_out:
+        _complain(str(problem))
+    left_out = f', {len(result.left_out)} left out' if result.left_out else ''
+    print(f'written: {target}: {result.count} rows{left_out}')
+    return EXIT_FAILED if result.left_out else 0
+
+
 def _only_port() -> str:
     """Return the only port; ConfigurationError where there is none or more than one."""
     ports = serial_ports()
@@ -474,7 +494,8 @@ def _extent(entry: DataFile) -> str:
 
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
-    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files}
+    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files,
+    'import': _import}
 
 
 def _complain(text: str) -> None:

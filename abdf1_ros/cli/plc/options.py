@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
+from typing import Any
 
 from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
@@ -132,9 +133,28 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     _complete_files(add('files', 'tell which data files a PLC has and how long they are',
                         'files 1 --net net.csv', 'files 1 --map --net net.csv',
                         'files 1 --map map.csv --net net.csv'))
+    _add_import(commands)
     commands.add_parser('ports', help='list serial ports and adapters',
                         description='List serial ports and adapters.')
     return parser
+
+
+def _add_import(commands: Any) -> None:
+    command = commands.add_parser(
+        'import', help='make a map of an export of RSLogix or KEPServerEX',
+        description='Make map.csv of the symbols of RSLogix 500 or 5, or of the tags of '
+                    'KEPServerEX.\nRows that cannot be used stay in it as comments.',
+        epilog='example:\n  plc import plant.csv --station 2 --plc-type SLC\n\n'
+               'exit status: 0 when all rows could be used, 1 when some are left out, 2 for files',
+        allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
+    command.add_argument('file', metavar='FILE', help='the export, a CSV file')
+    command.add_argument('--into', metavar='FOLDER', default='.',
+                         help='where map.csv is to be (default: here)')
+    command.add_argument('--station', metavar='N', type=_station, default=DEFAULT_STATION,
+                         help='of the PLC (default: %(default)s)')
+    command.add_argument('--plc-type', type=str.upper, default='SLC',
+                         choices=[kind.value for kind in FAMILIES],
+                         help='of the PLC; a MicroLogix is SLC (default: %(default)s)')
 
 
 def _add_station(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,172 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Maps made of exports; the contents of the rows are made up, their forms are not.
+
+KEPServerEX: its 17 columns as Kepware ("CSV Import/Export"), Software Toolbox ("Comma Separated
+Variable File Support") and PTC's Kepware.Api (CsvTagSerializer) list them; arrays and data types
+as in the help of its drivers for Allen-Bradley ("Integer Files", "Data Types Description").
+
+RSLogix 500: no header; address, scope, symbol, descriptions, and rows DFILE:, as two programs
+read them: FactoryTalk Optix (RSLogix500_TagImporter) and a parser of exports of an SLC
+(SLCTagParser).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.exports import import_map
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import load_network
+import pytest
+from support.cases import for_all
+
+KEPSERVER = (
+    'Tag Name,Address,Data Type,Respect Data Type,Client Access,Scan Rate,Scaling,Raw Low,'
+    'Raw High,Scaled Low,Scaled High,Scaled Data Type,Clamp Low,Clamp High,Eng Units,Description,'
+    'Negate Value\n')
+RSLOGIX = (
+    '"I:1.0/3","Global","DOOR_CLOSED","Guard door","cell 2","","",""\n'
+    '"N7:0","Global","LINE_SPEED","Conveyor","speed","","",""\n'
+    '"T4:0","Global","","Cycle timer","","","",""\n'
+    '"T4:1.ACC","Global","WAIT","","","","",""\n')
+
+
+def imported(folder: Path, text: str | bytes,
+             plc_type: PlcType = PlcType.SLC) -> tuple[list[Mapping], list[str]]:
+    """Return the mappings of the map that is made, which has to be good, and what is left out."""
+    source, target = folder / 'export.csv', folder / 'map.csv'
+    source.write_bytes(text if isinstance(text, bytes) else text.encode())
+    result = import_map(str(source), 2, plc_type)
+    target.write_text(result.text, encoding='utf-8')
+    mappings, problems = load_mappings(str(target))
+    assert problems == [] and len(mappings) == result.count
+    return mappings, [str(problem).removeprefix(f'{source}:') for problem in result.left_out]
+
+
+@for_all(('row', 'expected'), [
+    ('"Speed","N7:0",Short,1,R/W,100,,,,,,,,,,"",',
+     {'Tag': 'Speed', 'Command': 'ReadWrite', 'Address': 'N7:0', 'Type': 'int16',
+      'Period': '100'}),
+    ('"Press.Motor.Run","B3:0/5",Boolean,1,RO,250,,,,,,,,,,"motor runs",',
+     {'Tag': 'Press/Motor/Run', 'Topic': 'Press/Motor/Run', 'Type': 'bool', 'Period': '250',
+      'Command': 'Read', 'Description': 'motor runs'}),
+    ('"Recipe","N7:10 [8]",Word Array,1,WO,100,,,,,,,,,,"",',
+     {'Address': 'N7:10', 'Length': '8', 'Type': 'uint16', 'Command': 'Write', 'Period': ''}),
+    ('"Grid","N15:0 [4][5]",Short Array,1,RO,100,,,,,,,,,,"",', {'Length': '20'}),
+    ('"Bits","N7/12 [9]",Boolean Array,1,RO,100,,,,,,,,,,"",',
+     {'Address': 'N7:0/12', 'Length': '9'}),
+    ('"Levels","F8:10 [16]",Float Array,1,Read Only,100,,,,,,,,,,"",',
+     {'Length': '16', 'Type': 'float32', 'Command': 'Read'}),
+    ('"Total","N7:10",DWord,1,RO,100,,,,,,,,,,"",', {'Type': 'uint32', 'Word_Order': 'Low'}),
+    ('"Weight","D9:0",BCD,1,RO,100,,,,,,,,,,"",', {'Type': 'bcd16'}),
+    ('"Plain","ST9:1",String,1,RO,100,,,,,,,,,,"",', {'Type': 'string'}),
+    ('"Tank","N7:20",Word,1,RO,100,Linear,0,32767,0,3276.7,Float,1,1,V,"level",',
+     {'Scale': '0.1', 'Offset': '0', 'Min': '', 'Description': 'level [V]'}),
+    ('"Set","N7:21",Short,1,R/W,100,Linear,4000,20000,-10,50,Float,1,1,degC,"",',
+     {'Scale': '0.00375', 'Offset': '-25', 'Min': '-10', 'Max': '50', 'Description': '[degC]'}),
+    ('"Down","N7:22",Short,1,RO,100,Linear,0,100,0,10,Float,0,0,,"",1',
+     {'Scale': '-0.1', 'Offset': '0'}),
+    ('"Turned","N7:23",Short,1,RO,100,,,,,,,,,,"",1', {'Scale': '-1'})])
+def test_tag_of_kepserver(tmp_path: Path, row: str, expected: dict[str, str]) -> None:
+    (mapping,), left_out = imported(tmp_path, f'{KEPSERVER}{row}\n')
+    assert left_out == []
+    assert {column: mapping.cell(column) for column in expected} == expected
+    assert (mapping.station, mapping.plc_type) == (2, PlcType.SLC)
+
+
+@for_all(('row', 'expected'), [
+    ('"Root","N7:0",Word,1,RO,100,Square Root,0,100,0,10,Float,0,0,,"",',
+     'Scaling "Square Root" has no counterpart; Linear has'),
+    ('"Flat","N7:0",Word,1,RO,100,Linear,5,5,0,10,Float,0,0,,"",',
+     'Raw Low, Raw High, Scaled Low and Scaled High should be numbers, and both raw ones differ'),
+    ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
+    ('"Word","N7:0",Word,1,never,100,,,,,,,,,,"",', 'Client Access "never" has no counterpart'),
+    ('"Meter","400101",Word,1,RO,100,,,,,,,,,,"",',
+     'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
+    ('"Empty","",Word,1,RO,100,,,,,,,,,,"",', 'Address is missing'),
+    ('"---","N7:0",Word,1,RO,100,,,,,,,,,,"",', 'Tag = "---" has no letter, digit or underscore'),
+    ('"speed","N7:5",Word,1,RO,100,,,,,,,,,,"",', 'the name speed is that of line 2')])
+def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
+        tmp_path: Path, row: str, expected: str) -> None:
+    first = '"Speed","N7:0",Short,1,R/W,100,,,,,,,,,,"",\n'
+    mappings, left_out = imported(tmp_path, f'{KEPSERVER}{first}{row}\n')
+    assert [mapping.tag for mapping in mappings] == ['Speed']
+    assert left_out == [f'3: {expected}']
+    assert f'# line 3: {row.split(",")[0].strip(chr(34))},' in (tmp_path / 'map.csv').read_text()
+
+
+def test_symbols_of_rslogix(tmp_path: Path) -> None:
+    rows = RSLOGIX + '"DFILE:N7","","","Numbers"\n"PLS10:0","Global","CAM"\n"","Global","LOST"\n'
+    mappings, left_out = imported(tmp_path, rows)
+    assert [(mapping.tag, mapping.name, str(mapping.address), mapping.length, mapping.description)
+            for mapping in mappings] == [
+        ('DOOR_CLOSED', 'DOOR_CLOSED', 'I:1.0/3', 1, 'Guard door cell 2'),
+        ('LINE_SPEED', 'LINE_SPEED', 'N7:0', 1, 'Conveyor speed'),
+        ('T4:0', 'T4_0', 'T4:0', 3, 'Cycle timer'), ('WAIT', 'WAIT', 'T4:1.ACC', 1, '')]
+    assert [text.partition(': ')[0] for text in left_out] == ['5', '6', '7']
+    assert left_out[0] == '5: is about a file or a rung' and left_out[2] == '7: Address is missing'
+
+
+def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
+    row = '"I:017/12","Global","DOOR"\n'
+    (mapping,), left_out = imported(tmp_path, row, PlcType.PLC5)
+    assert (str(mapping.address), left_out) == ('I:017/12', [])
+    assert 'octal form of a PLC-5' in imported(tmp_path, row)[1][0]
+
+
+def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) -> None:
+    (mapping,), _ = imported(tmp_path, (
+        KEPSERVER.replace(',', ';') + '"Höhe";"N7:0";Short;1;RO;100;;;;;;;;;mm;"Höhe\nlinks";\n'
+        ).encode('cp1252'))
+    assert (mapping.tag, mapping.name, mapping.description) == ('Höhe', 'H_he', 'Höhe links [mm]')
+
+
+def test_command_writes_a_map_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, target = tmp_path / 'symbols.csv', tmp_path / 'line' / 'map.csv'
+    source.write_text(RSLOGIX, encoding='utf-8')
+    options = ['import', str(source), '--into', str(target.parent), '--station', '3']
+    assert main(options) == 0
+    assert capsys.readouterr().out == f'written: {target}: 4 rows\n'
+    assert {mapping.station for mapping in load_mappings(str(target))[0]} == {3}
+    assert main(options) == 2
+    assert f'{target}: is there already' in capsys.readouterr().err
+    source.write_text(f'{RSLOGIX}"N7:999",,"FAR"\n', encoding='utf-8')
+    assert main([*options[:3], str(tmp_path / 'other')]) == 1
+    assert f'{source}:5: ' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('text', ['a,b\n1,2\n', '', 'Tag,Command,Address\n'])
+def test_what_is_no_export(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigurationError, match='is neither an export of KEPServerEX'):
+        imported(tmp_path, text)
+
+
+def test_export_in_place_of_a_map_or_net_file_is_told(tmp_path: Path) -> None:
+    path = tmp_path / 'tags.csv'
+    path.write_text(f'{KEPSERVER}"Speed","N7:0",Short,1,R/W,100,,,,,,,,,,"",\n', encoding='utf-8')
+    for load in (load_mappings, load_network):
+        with pytest.raises(ConfigurationError) as caught:
+            load(str(path))
+        assert str(caught.value) == (
+            f'{path}: is an export of KEPServerEX; "plc import {path}" makes a map of it')
+    path.write_text(RSLOGIX, encoding='utf-8')
+    with pytest.raises(ConfigurationError, match='export of symbols from RSLogix .*plc import'):
+        load_mappings(str(path))
