@@ -179,10 +179,12 @@ class Times:
         longest = max(network.nak_retries, network.enq_retries) + 1
         # A frame that breaks off is over after a pause, and a peer pauses after NAKs and retries.
         quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time
-        total = forecast.longest_transaction(network) + longest * (frames + quiet)
+        # Cmd_Timeout runs from the beginning of the try that is acknowledged.
+        timeout, tries = network.timeout / 1000, network.nak_retries + network.enq_retries + 1
+        total = tries * timeout + max(network.cmd_timeout / 1000, timeout) \
+            + longest * (frames + quiet)
         if network.mode == 'Peer':
             total += _LATE_RESPONSE + _NAK_PAUSE * sum(range(network.nak_retries))
-        timeout = network.timeout / 1000
         deliver = (network.nak_retries + 1) * (timeout + frames)
         if any(mapping.serves for mapping in self._mappings):
             total += deliver  # of a reply of ours, which takes turns with our commands

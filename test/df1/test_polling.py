@@ -579,7 +579,7 @@ def replies_of(polling: PollingSettings | None, delay: float) -> int:
     """Return how many commands to three stations are done in 15 s on a line with this delay."""
     settings = replace(SETTINGS, nak_retries=3, enq_retries=3, cmd_timeout=1.0)
     rig = MasterBench(7, 8, 9, settings=settings, polling=polling)
-    setattr(rig.line, '_propagation', delay / 2)
+    setattr(rig.line, 'propagation', delay / 2)
     rig.start()
     waiting = [rig.ask(number) for number in (7, 8, 9)]
     done = []
@@ -625,7 +625,7 @@ def test_message_that_is_late_for_its_poll_belongs_to_the_station_that_sends_it(
 
 def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, enq_retries=3))
-    setattr(rig.line, '_propagation', 0.06)
+    setattr(rig.line, 'propagation', 0.06)
     tasks = [rig.ask(1), rig.ask(2)]
     rig.start()
     rig.run(3.0)

@@ -59,8 +59,8 @@ def test_write_of_a_word_is_counted_by_its_frames() -> None:
 
 
 def at_most(line_time: float) -> float:
-    """Return the seconds of a transaction on QUICK: twice the frames, and what breaks off."""
-    return 1.3 + 2 * (line_time + 0.02 + 10 * 10 / 19200)
+    """Return the seconds of a transaction on QUICK: three waits, all frames twice."""
+    return 1.1 + 2 * (line_time + 0.02 + 10 * 10 / 19200)
 
 
 @pytest.mark.parametrize('others, reads', [(0, 1), (5, 1), (6, 2)])

@@ -81,9 +81,9 @@ class VirtualLine:
     """
     The line between ``machines``, and their clock.
 
-    ``baud`` is bits per second, ``propagation`` seconds that a byte travels. ``chunk`` bytes
-    are handed over together, when the last of them is here (1: as a bare UART does; more: as
-    its FIFO or an adapter does). ``noise`` may be changed at any time and acts on what is sent
+    ``baud`` is bits per second, ``propagation`` seconds that a byte travels. ``chunk`` bytes are
+    handed over together, when the last of them is here (1: as a bare UART does; more: as its FIFO
+    or an adapter does). ``noise`` may be changed at any time and acts on what is sent
     from then on; so does ``echoes``, with which a sender hears itself.
     """
 
@@ -94,7 +94,7 @@ class VirtualLine:
         self.echoes = False
         self.char_time = char_time(baud)
         self._machines = list(machines)
-        self._propagation = propagation
+        self.propagation = propagation
         self.chunk = chunk
         self._random = Random(seed)
         self._free = [0.0] * len(machines)  # when each sender's last byte has left
@@ -210,7 +210,7 @@ class VirtualLine:
         noise = None if self.noise is QUIET else self.noise
         for at in range(0, len(data), self.chunk):
             part = data[at:at + self.chunk]
-            here = start + (at + len(part)) * self.char_time + self._propagation
+            here = start + (at + len(part)) * self.char_time + self.propagation
             if noise is not None:
                 part = noise.damage(part, self._random)
             if part:
