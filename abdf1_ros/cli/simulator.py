@@ -59,7 +59,7 @@ from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, Tcp
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.settings.network import BAUD_RATES, make_network, Network
+from abdf1_ros.settings.network import BAUD_RATES, make_network, Network, URLS
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
 from abdf1_ros.simulator.gateway import stations_of
@@ -265,7 +265,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                       help='a pseudo-terminal of this name (default: one with the name that is '
                            'printed)')
     line.add_argument('--port', type=_name,
-                      help='a serial port, socket://host:port or rfc2217://host:port')
+                      help=f'a serial port, {URLS}')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
     parser.add_argument('--ladder', metavar='STATION', action='append', default=[],
                         help='its program watches a heartbeat in N10:0 and says when ROS is in '

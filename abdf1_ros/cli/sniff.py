@@ -54,7 +54,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.problems import Problem
-from abdf1_ros.settings.network import BAUD_RATES, Network
+from abdf1_ros.settings.network import BAUD_RATES, Network, URLS
 from abdf1_ros.sniffer.capture import Chunk
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
@@ -221,8 +221,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='captures, pcap, pcapng or hex dumps, decoded one after the other')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
     parser.add_argument('--port', metavar='NAME',
-                        help='listen on a serial port, a socket:// or rfc2217:// URL, pty, '
-                             'or pty:NAME')
+                        help=f'listen on a serial port, {URLS}, pty, or pty:NAME')
     parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'),
                         help='listen between two ports; ">" is from A to B')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,

@@ -36,7 +36,7 @@ from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network
+from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
 from abdf1_ros.settings.station_lists import parse_stations
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -60,7 +60,7 @@ class Parameters:
     net_file: str = _parameter('', 'path of the net CSV, needed')
     map_file: str = _parameter('', 'path of the map CSV, needed')
     port: str = _parameter(
-        '', 'device path, socket:// or rfc2217:// URL to use instead of Com_Port')
+        '', f'device path, {URLS} to use instead of Com_Port')
     low_latency: bool = _parameter(
         True, 'ask the driver of the port to hand on bytes at once, where it can')
     rs485: bool = _parameter(

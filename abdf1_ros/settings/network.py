@@ -45,7 +45,9 @@ _MODE_WORDS = {
 POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
-_DEVICE_SERVERS = ('socket', 'rfc2217')
+# Schemes of the URLs of device servers; each has a module in ``ports``.
+DEVICE_SERVERS = ('socket', 'rfc2217')
+URLS = ' or '.join(f'{scheme}://host:port' for scheme in DEVICE_SERVERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +149,7 @@ class Network:
         message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
     com_port: str = _net(
         'Com_Port', '1',
-        'n for /dev/ttyS(n-1), a device path, socket://host:port, or rfc2217://host:port')
+        f'n for /dev/ttyS(n-1), a device path, {URLS}')
     baud: int = _net('Baud', 9600, 'bits per second', choices=BAUD_RATES)
     data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
@@ -268,15 +270,15 @@ def _check_port(name: str, value: int | str, where: Place | str) -> None:
     if name == 'com_port' and not (_is_url(text) or text.startswith('/') or (
             text.isdigit() and (whole_number(text) or 0) >= 1)):
         raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
-                             'path such as /dev/ttyUSB0, socket://host:port, or '
-                             f'rfc2217://host:port; "plc ports" lists the devices{hint(text)}')
+                             f'path such as /dev/ttyUSB0, {URLS}; '
+                             f'"plc ports" lists the devices{hint(text)}')
 
 
 def _is_url(text: str) -> bool:
     """Tell whether ``text`` is the URL of a device server: host, port, and nothing after them."""
     try:
         url = urlsplit(text)
-        return '://' in text and url.scheme in _DEVICE_SERVERS and bool(
+        return '://' in text and url.scheme in DEVICE_SERVERS and bool(
             url.hostname and url.port) and not (url.path or url.query or url.fragment)
     except ValueError:  # a port above 65535
         return False

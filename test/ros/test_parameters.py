@@ -206,10 +206,10 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
     ('strict_map', 'on', "strict_map = 'on' should be true or false"),
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
     ('port', 'ttyUSB0', 'Com_Port = "ttyUSB0" should be a number from 1, a device path such as '
-     '/dev/ttyUSB0, socket://host:port, or rfc2217://host:port; "plc ports" '
+     '/dev/ttyUSB0, socket://host:port or rfc2217://host:port; "plc ports" '
      'lists the devices'),
     ('port', 'sokket://plc:4001', 'Com_Port = "sokket://plc:4001" should be a number from 1, a '
-     'device path such as /dev/ttyUSB0, socket://host:port, or rfc2217://host:port; "plc ports" '
+     'device path such as /dev/ttyUSB0, socket://host:port or rfc2217://host:port; "plc ports" '
      'lists the devices'),
     ('net.station', 255,
      '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
@@ -226,7 +226,7 @@ def test_own_parameters(configured: Callable[..., Configuration], name: str, val
     ('net.baud', 9601, 'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, '
                        '57600, 115200'),
     ('net.com_port', 0, 'Com_Port = "0" should be a number from 1, a device path such as '
-                        '/dev/ttyUSB0, socket://host:port, or rfc2217://host:port; "plc ports" '
+                        '/dev/ttyUSB0, socket://host:port or rfc2217://host:port; "plc ports" '
      'lists the devices'),
     ('net.handshake', 1, 'Handshake = "1" should be one of Yes, No')])
 def test_faulty_value_is_a_problem_that_says_what_would_be_right(

@@ -160,7 +160,7 @@ def test_choice_that_is_none(
     ('Parity', 'Mark', 'Parity = "Mark" should be one of None, Even, Odd'),
     ('Com_Port', 'COM1',
      'Com_Port = "COM1" should be a number from 1, a device path such as /dev/ttyUSB0, '
-     'socket://host:port, or rfc2217://host:port; "plc ports" lists the devices'),
+     'socket://host:port or rfc2217://host:port; "plc ports" lists the devices'),
 ])
 def test_exact_text(path: Path, column: str, text: str, expected: str) -> None:
     assert faults(path, column, text) == [f'FILE:2:1 ({column}): {expected}']

@@ -22,10 +22,10 @@ import socket
 import threading
 import time
 
-from abdf1_ros.ports import device_server
+from abdf1_ros.ports import rfc2217_port
 from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
-from abdf1_ros.ports.device_server import Rfc2217Port
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.rfc2217_port import Rfc2217Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.device_server import DeviceServer
@@ -132,7 +132,7 @@ def test_server_that_refuses(ends: tuple[Rfc2217Port, socket.socket]) -> None:
 def test_server_that_does_not_answer(
         ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch, answer: bytes,
         text: str) -> None:
-    monkeypatch.setattr(device_server, '_NEGOTIATION_TIMEOUT', 0.05)
+    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.05)
     port, server = ends
     server.sendall(answer)
     with pytest.raises(OSError, match=text):
@@ -141,7 +141,7 @@ def test_server_that_does_not_answer(
 
 def test_connection_to_a_server_that_does_not_answer_is_closed(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device_server, '_NEGOTIATION_TIMEOUT', 0.05)
+    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.05)
     with socket.create_server(('127.0.0.1', 0)) as server:
         with pytest.raises(OSError) as error:  # it keeps the port from being thrown away
             open_port(PortSettings(f'rfc2217://127.0.0.1:{server.getsockname()[1]}'))

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Serial ports of device servers, over TCP: plain, and with RFC 2217.
+Serial ports of device servers, ``rfc2217://host:port``.
 
 RFC 2217 sets speed and character format of the far port by telnet options (RFC 854, 856 and 858).
 This is a client for one connection. It keeps a suboption of some bytes at most, whatever the
@@ -28,19 +28,12 @@ import math
 import socket
 import struct
 import time
-from typing import Any
-from urllib.parse import urlsplit
 
 from abdf1_ros.ports.descriptor import DescriptorPort
-from abdf1_ros.ports.ownership import OwnedConnection
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.socket_port import connected
 
-_CONNECT_TIMEOUT = 5.0
 _NEGOTIATION_TIMEOUT = 3.0
-
-# After so many seconds without an answer from the far host a TCP connection counts as lost. The
-# limit of the operating system is a quarter of an hour.
-_SILENCE_LIMIT = 5
 
 
 class _Telnet(IntEnum):
@@ -87,15 +80,9 @@ _NEGOTIATIONS = (_Telnet.WILL, _Telnet.WONT, _Telnet.DO, _Telnet.DONT)
 _MOST_SUBOPTION = 300
 
 
-def open_socket(settings: PortSettings) -> DescriptorPort:
-    """Connect to ``socket://host:port``; raises OSError."""
-    connection = _connect(settings.name)
-    return DescriptorPort(connection.fileno(), connection.close)
-
-
-def open_rfc2217(settings: PortSettings) -> DescriptorPort:
-    """Connect to ``rfc2217://host:port`` and set its serial port; raises OSError."""
-    connection = _connect(settings.name)
+def open_port(settings: PortSettings) -> DescriptorPort:
+    """Connect to a device server and set its serial port; raises OSError."""
+    connection = connected(settings.name)
     port = Rfc2217Port(connection)
     try:
         port.negotiate(settings)
@@ -103,40 +90,6 @@ def open_rfc2217(settings: PortSettings) -> DescriptorPort:
         port.close()
         raise
     return port
-
-
-def _connect(url: str) -> socket.socket:
-    parts = urlsplit(url)
-    try:
-        found = socket.getaddrinfo(parts.hostname, parts.port, type=socket.SOCK_STREAM)
-    except UnicodeError:
-        raise OSError(f'{parts.hostname} is not the name of a host') from None
-    errors = []
-    for family, _, _, _, address in found:
-        try:
-            return _connected(family, address)
-        except OSError as error:
-            errors.append(error)
-    raise errors[-1]
-
-
-def _connected(family: int, address: tuple[Any, ...]) -> socket.socket:
-    connection = OwnedConnection(family, address)
-    try:
-        connection.settimeout(_CONNECT_TIMEOUT)
-        connection.connect(address)
-        # Without the first option a short frame waits until the one before it has been
-        # acknowledged by TCP. The last one is for bytes that we send, the others are for a line
-        # on which we only listen.
-        for option, value in (
-                (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
-                (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
-            connection.setsockopt(socket.IPPROTO_TCP, option, value)
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    except OSError:
-        connection.close()
-        raise
-    return connection
 
 
 class Rfc2217Port(DescriptorPort):

@@ -1,0 +1,72 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Serial ports of device servers, over plain TCP: ``socket://host:port``."""
+
+from __future__ import annotations
+
+import socket
+from typing import Any
+from urllib.parse import urlsplit
+
+from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.ownership import OwnedConnection
+from abdf1_ros.ports.settings import PortSettings
+
+_CONNECT_TIMEOUT = 5.0
+
+# After so many seconds without an answer from the far host a TCP connection counts as lost. The
+# limit of the operating system is a quarter of an hour.
+_SILENCE_LIMIT = 5
+
+
+def open_port(settings: PortSettings) -> DescriptorPort:
+    """Connect to a device server; raises OSError."""
+    connection = connected(settings.name)
+    return DescriptorPort(connection.fileno(), connection.close)
+
+
+def connected(url: str) -> socket.socket:
+    """Return a connection to the host and port of a URL; raises OSError."""
+    parts = urlsplit(url)
+    try:
+        found = socket.getaddrinfo(parts.hostname, parts.port, type=socket.SOCK_STREAM)
+    except UnicodeError:
+        raise OSError(f'{parts.hostname} is not the name of a host') from None
+    errors = []
+    for family, _, _, _, address in found:
+        try:
+            return _connection(family, address)
+        except OSError as error:
+            errors.append(error)
+    raise errors[-1]
+
+
+def _connection(family: int, address: tuple[Any, ...]) -> socket.socket:
+    connection = OwnedConnection(family, address)
+    try:
+        connection.settimeout(_CONNECT_TIMEOUT)
+        connection.connect(address)
+        # Without the first option a short frame waits until the one before it has been
+        # acknowledged by TCP. The last one is for bytes that we send, the others are for a line
+        # on which we only listen.
+        for option, value in (
+                (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
+                (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    except OSError:
+        connection.close()
+        raise
+    return connection
