@@ -67,6 +67,9 @@ class Listener(ValueListener, Protocol):
     def happened(self, event: Event) -> None:
         """Take a numbered error or notice."""
 
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Take note that a heartbeat was read which we have not written, a second time or not."""
+
     def station_changed(self, station: Station) -> None:
         """Take note that a station has become active or inactive."""
 
@@ -122,7 +125,8 @@ class Driver:
             () if settings.read_only else self.mappings, self.stations, self._writes, writing,
             network.cmd_timeout / 1000,
             lambda write: self._served.store(write.mapping, write.raw), report,
-            self._listener.unreadable)
+            self._listener.unreadable, self._listener.foreign_value)
+        self._readings.read_back = self.interlocks.read_back
         self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.health,
                               self._reads, self._tasks)

@@ -36,6 +36,12 @@ _LEAST_ZERO = 0.5
 # A stopped executor does not wake the link, so the link looks by itself every so many seconds.
 _GLANCE = 0.1
 
+# A second value that is not ours within so many seconds is another writer, not a download.
+_CONFLICT_TIME = 60.0
+
+_SHIFTS = 7
+_GOLDEN = 0.618  # its multiples lie evenly between whole numbers
+
 
 class BeatState(Enum):
     """What the PLC is to see: 0, or a value that counts."""
@@ -44,24 +50,29 @@ class BeatState(Enum):
     SHOWN = '0 stands, for the PLC to see it'
     COUNTS = 'counts'
     HELD = '0, while it must not count'
+    CONFLICT = '0, as another writer writes this word'
 
 
 class BeatEvent(Enum):
     """What changes the state."""
 
+    OPENED = auto()
     CONTACT = auto()
+    OTHER_WRITER = auto()
     ZERO_CONFIRMED = auto()
     SEEN = auto()
     HOLD = auto()
     RELEASE = auto()
 
 
+_ALWAYS = {BeatEvent.OPENED: BeatState.CONTACT, BeatEvent.CONTACT: BeatState.CONTACT,
+           BeatEvent.OTHER_WRITER: BeatState.CONFLICT}
 _NEXT = {
-    BeatState.CONTACT: {BeatEvent.CONTACT: BeatState.CONTACT,
-                        BeatEvent.ZERO_CONFIRMED: BeatState.SHOWN},
-    BeatState.SHOWN: {BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.SEEN: BeatState.COUNTS},
-    BeatState.COUNTS: {BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.HOLD: BeatState.HELD},
-    BeatState.HELD: {BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.RELEASE: BeatState.COUNTS},
+    BeatState.CONTACT: {**_ALWAYS, BeatEvent.ZERO_CONFIRMED: BeatState.SHOWN},
+    BeatState.SHOWN: {**_ALWAYS, BeatEvent.SEEN: BeatState.COUNTS},
+    BeatState.COUNTS: {**_ALWAYS, BeatEvent.HOLD: BeatState.HELD},
+    BeatState.HELD: {**_ALWAYS, BeatEvent.RELEASE: BeatState.COUNTS},
+    BeatState.CONFLICT: {**_ALWAYS, BeatEvent.CONTACT: BeatState.CONFLICT},
 }
 
 
@@ -93,6 +104,9 @@ class HeartbeatRow:
         self._period = mapping.period / 1000
         self._is_confirmed = False
         self._next = -math.inf
+        self._foreign_at = -math.inf
+        self._zeros = 0  # written again, where another writer goes on
+        self._extra_zero = 0.0  # s
 
     def _go(self, event: BeatEvent) -> None:
         self.state = _NEXT[self.state][event]
@@ -112,9 +126,9 @@ class HeartbeatRow:
         """Tell whether the PLC has confirmed 0."""
         return self.value == 0 and self._is_confirmed
 
-    def begin(self, now: float) -> None:
+    def begin(self, now: float, event: BeatEvent = BeatEvent.CONTACT) -> None:
         """Start again with 0: the PLC may be another one by now (rule 2)."""
-        self._go(BeatEvent.CONTACT)
+        self._go(event)
         self._is_confirmed, self.is_first_try = False, True
         self._next = self.due = now
 
@@ -154,7 +168,7 @@ class HeartbeatRow:
             self._go(BeatEvent.RELEASE)
         if self.is_under_way:
             self.due = math.inf
-        elif self.state is BeatState.HELD:
+        elif self.state in (BeatState.HELD, BeatState.CONFLICT):
             self.due = math.inf if self.is_at_rest else self._next if self.value == 0 else now
         elif self.state is not BeatState.COUNTS:
             self.due = self._next
@@ -164,6 +178,32 @@ class HeartbeatRow:
         else:
             self.due = min(self._next, self.topics_until(messages)) if self.value else self._next
         return self.due <= now and self.state is not BeatState.SHOWN
+
+    def read_back(self, value: int, started: float, now: float) -> str:
+        """
+        Compare a value that was read from ``started`` on; return what is told of another's.
+
+        Only between the confirmation of ours and the next count one knows what it has to be. The
+        first is taken for a download, a second one for another writer: 0 then stays (rule 19).
+        """
+        is_known = self._is_confirmed and not self.is_under_way
+        if not is_known or started < (self.confirmed or 0.0) or value == self.value:
+            return ''
+        text = f'{value} was read where {self.value} was written'
+        is_again = now - self._foreign_at < _CONFLICT_TIME
+        was_known, self._foreign_at = self.state is BeatState.CONFLICT, now
+        self.begin(now, BeatEvent.OTHER_WRITER if is_again else BeatEvent.CONTACT)
+        if was_known:
+            # At another moment of the other's period each time, for it to see the 0 before it
+            # counts on.
+            self._zeros += 1
+            self._next = self.due = now + self._period * (0.5 + self._zeros * _GOLDEN % 1)
+            return ''
+        if is_again:
+            return f'another program writes this word: {text}'
+        # If two bridges counted from 1 at the same time, neither would see the other any more.
+        self._extra_zero = self._period * (1 + int(1000 * now) % _SHIFTS)
+        return text
 
     @property
     def wants_zero(self) -> bool:
@@ -189,4 +229,5 @@ class HeartbeatRow:
         self._is_confirmed, self.confirmed = True, now
         if self.value == 0 and self.state is BeatState.CONTACT:
             self._go(BeatEvent.ZERO_CONFIRMED)
-            self._next = now + max(self._period, _LEAST_ZERO)
+            self._next = now + max(self._period, _LEAST_ZERO) + self._extra_zero
+            self._extra_zero = 0.0

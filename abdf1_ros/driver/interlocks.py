@@ -29,7 +29,7 @@ import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.fallbacks import FallbackCause, FallbackRow
-from abdf1_ros.driver.heartbeats import HeartbeatRow
+from abdf1_ros.driver.heartbeats import BeatEvent, BeatState, HeartbeatRow
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes import WriteQueue
 from abdf1_ros.driver.writing import WriteJob, WritesUnderWay
@@ -111,14 +111,15 @@ class Interlocks:
 
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
     row into our own table; ``report`` gets the result of each fallback that was written, ``tell``
-    why a PLC does not take one. Only ``executor_ran``, ``wind_down`` and ``resume`` may be called
-    from another thread.
+    why a PLC does not take one, ``warn`` that a heartbeat is not ours. Only ``executor_ran``,
+    ``wind_down`` and ``resume`` may be called from another thread.
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
                  writes: WriteQueue, writing: WritesUnderWay, cmd_timeout: float,
                  store: Callable[[Write], None], report: Callable[[WriteResult], None],
-                 tell: Callable[[Mapping, str], None]) -> None:
+                 tell: Callable[[Mapping, str], None],
+                 warn: Callable[[Mapping, str, bool], None]) -> None:
         self.heartbeats = [HeartbeatRow(mapping) for mapping in mappings if mapping.heartbeat]
         self.fallbacks = [FallbackRow(mapping, cmd_timeout)
                           for mapping in mappings if mapping.fallback]
@@ -139,7 +140,7 @@ class Interlocks:
         self._writing = writing
         self._store = store
         self._report = report
-        self._tell = tell
+        self._tell, self._warn = tell, warn
         self._due = math.inf
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
@@ -190,7 +191,7 @@ class Interlocks:
     def begin(self, now: float) -> None:
         """Take note that the port has been opened: a first contact with everybody (rule 2)."""
         for plc in self._plcs.values():
-            self._contact(plc, now)
+            self._contact(plc, now, BeatEvent.OPENED)
         for row in () if self._has_begun else self.fallbacks:
             row.make_due(FallbackCause.START, now)
         self._has_begun = True
@@ -201,9 +202,10 @@ class Interlocks:
         if station in self._plcs:
             self._contact(self._plcs[station], now)
 
-    def _contact(self, plc: _Plc, now: float, *, always: bool = False) -> None:
+    def _contact(self, plc: _Plc, now: float, event: BeatEvent = BeatEvent.CONTACT, *,
+                 always: bool = False) -> None:
         for beat in plc.heartbeats:
-            beat.begin(now)
+            beat.begin(now, event)
         for row in plc.fallbacks if self._has_begun else ():
             if always:
                 row.make_due(FallbackCause.RUN, now)
@@ -218,6 +220,17 @@ class Interlocks:
             was_running, plc.is_running = plc.is_running, is_running
             if is_running and was_running is False:
                 self._contact(plc, now, always=True)
+
+    def read_back(self, mapping: Mapping, words: bytes, started: float) -> None:
+        """Compare a heartbeat that was read from ``started`` on (clock value, s) (rule 19)."""
+        beat = next((beat for beat in self.heartbeats if beat.mapping is mapping), None)
+        if beat is None:
+            return
+        value = int(mapping.codec.decode(words)[0])
+        text = beat.read_back(value, started, self._writing.line.now)
+        if text:
+            self._warn(mapping, text, beat.state is BeatState.CONFLICT)
+        self._plan(self._plc(beat))
 
     def message_came(self, write: Write) -> None:
         """Take note of a message that was accepted (rule 3 d)."""

@@ -75,6 +75,8 @@ class ReadJob(Job):
         self._reply_sizes = block.reply_sizes()
         self.reply_size = self._reply_sizes[0]
         self.slices = [block.slice_of(point.mapping) for point in points]
+        self.heartbeats = [(mapping, block.slice_of(mapping)) for mapping in block.mappings
+                           if mapping.heartbeat]
         self.due = 0.0
         self.interval: float | None = None
         self.longest: float | None = None

@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import math
 from typing import Protocol
 
@@ -61,13 +61,16 @@ class Readings:
     """
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
-    ``listener`` is told. ``read_backs`` compares what was read with unconfirmed writes.
+    ``listener`` is told. ``read_backs`` compares what was read with unconfirmed writes,
+    ``read_back`` with heartbeats.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
                  planner: Planner, stations: ActiveStationList, line: LineTime,
                  listener: ValueListener, read_backs: ReadBacks) -> None:
-        blocks = planner.plan(mappings)
+        self.read_back: Callable[[Mapping, bytes, float], None] | None = None
+        blocks = planner.plan(mapping for mapping in mappings
+                              if not (settings.read_only and mapping.heartbeat))
         self.points = _points(network, mappings, blocks, settings)
         self.guards = Guards(self.points.values())
         self.reads = Reads(stations)
@@ -86,7 +89,7 @@ class Readings:
 
     def _job(self, block: Block) -> ReadJob:
         longest = longest_transaction(self._network) + _TURNS_OF_A_READ * block_time(block)
-        points = [self.points[mapping] for mapping in block.mappings]
+        points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
         return ReadJob(block, points, self._line, self._packet_ended, longest)
 
     def _packet_ended(self, job: ReadJob, error: Exception | None) -> None:
@@ -117,6 +120,9 @@ class Readings:
         now = self._line.now
         self._read_backs.read(job.block, data, job.started, now)
         self.guards.values_read(job.points, job.slices, data, now)
+        if self.read_back is not None:
+            for mapping, place in job.heartbeats:
+                self.read_back(mapping, data[place], job.started)
         has_recovered, period = False, job.block.period
         for point, place in zip(job.points, job.slices, strict=True):
             has_recovered |= point.error is not None

@@ -101,7 +101,7 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
     expected, wait = intervals(blocks, own_load=own_load), longest_wait(blocks)
     return {mapping: stale_after * max(period_of(mapping, default_period),
                                        expected[block.period]) + wait
-            for block in blocks for mapping in block.mappings}
+            for block in blocks for mapping in block.mappings if mapping.polls}
 
 
 def period_of(mapping: Mapping, default_period: float) -> float:

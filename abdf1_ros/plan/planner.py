@@ -138,10 +138,10 @@ class Planner:
         self._costs: dict[tuple[Dialect, FileType], list[float]] = {}
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
-        """Return the blocks that serve every mapping that reads."""
+        """Return the blocks that serve every mapping that reads, and read heartbeats back."""
         areas: defaultdict[StationArea, list[_Demand]] = defaultdict(list)
         for mapping in mappings:
-            if mapping.polls:
+            if mapping.polls or mapping.heartbeat:
                 areas[_station_area(mapping)].append(
                     _Demand(mapping, _span(mapping), self._period(mapping)))
         plans = [self._plan_area(area, group, math.inf) for area, group in areas.items()]
@@ -201,7 +201,9 @@ class Planner:
     def _period(self, mapping: Mapping) -> float:
         if mapping.period is None:
             return self._default_period
-        return mapping.period / 1000
+        seconds = mapping.period / 1000
+        # A heartbeat is read back between two counts, wherever in between another writer writes.
+        return seconds / 2 if mapping.heartbeat else seconds
 
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
                    poll_cycle: float) -> list[Block]:

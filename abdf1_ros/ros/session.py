@@ -235,6 +235,11 @@ class BridgeSession:
         self.notes.info(
             mapping.tag, f'{_where(mapping)}: published again after {seconds:.1f} s')
 
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Log that a heartbeat is not the one that we have written (rule 19)."""
+        log = self.notes.error if is_conflict else self.notes.warning
+        log(mapping.tag, f'{_where(mapping)}: {text}')
+
     def happened(self, event: Event) -> None:
         """Log a numbered event and remember it for the diagnostics."""
         if self._is_left_over(event):

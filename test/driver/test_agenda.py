@@ -82,7 +82,8 @@ class Bench:
                         lambda station, error: None, lambda station, identity, asked: None)
         checks.begin(0.0)
         interlocks = Interlocks((), self.stations, self.writes, writing, 1.0, lambda write: None,
-                                self.results.append, lambda mapping, reason: None)
+                                self.results.append, lambda mapping, reason: None,
+                                lambda mapping, text, is_conflict: None)
         self.agenda = Agenda(
             self.stations, interlocks, self.writes, checks, self.reads, self.tasks)
         self.reads.replace((), jobs, 0.0)

@@ -24,12 +24,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.guards import RunGuard
-from abdf1_ros.driver.heartbeats import LARGEST
+from abdf1_ros.driver.heartbeats import BeatState, LARGEST
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
+from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -161,7 +163,9 @@ def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> No
 def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
     cell = Cell(beat_row())
     cell.run(0.5)
-    cell.bench.driver.interlocks.heartbeats[0].value = LARGEST - 1
+    beat = cell.bench.driver.interlocks.heartbeats[0]
+    beat.value = LARGEST - 1
+    store(cell.plc, 'N10:0', [beat.value])
     since = cell.now
     cell.run(0.7)
     assert cell.written('N10:0', since)[:3] == [LARGEST, 1, 2]
@@ -738,6 +742,119 @@ def test_rule_15_start_is_told_when_the_program_has_had_its_time_to_count() -> N
     cell.run(0.4)
     assert (len(withheld(cell)), point.withholdings) == (1, 1)
     assert point.freshness(cell.now) is Freshness.WITHHELD
+
+
+class Bridges:
+    """Bridges with a heartbeat in the same word of a PLC, each on a port of its own."""
+
+    def __init__(self, *periods: int) -> None:
+        table = DataTable(PlcType.PLC5)
+        table.create(parse_address('N10:0', PlcType.PLC5), 4)
+        self.word, self.table = parse_address('N10:0', PlcType.PLC5), table
+        self.benches = []
+        for period in periods:
+            bench = DriverBench([beat_row(period)], network=Network(
+                baud=19200, timeout=200, cmd_timeout=500))
+            bench.connect(SimulatedPlc(1, table, Checksum.CRC, bench.clock))
+            self.benches.append(bench)
+        self.running = list(self.benches)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass for those that run."""
+        for _ in range(round(seconds / 0.005)):
+            for bench in self.running:
+                bench.driver.interlocks.executor_ran(bench.clock())
+                bench.run(0.005)
+
+    def store(self, value: int) -> None:
+        """Let somebody else write the word."""
+        self.table.write(self.word, value.to_bytes(2, 'little'))
+
+    def states(self) -> list[BeatState]:
+        """Return what each bridge makes of its row."""
+        return [bench.driver.interlocks.heartbeats[0].state for bench in self.benches]
+
+    def told(self) -> list[bool]:
+        """Return what the first has told: whether it was a conflict."""
+        return [is_conflict for _, _, is_conflict in self.benches[0].listener.foreign]
+
+    @property
+    def value(self) -> int:
+        """Return the word."""
+        return int.from_bytes(self.table.read(self.word, 1), 'little')
+
+
+@pytest.mark.parametrize('shift', [0.0, 0.11, 0.26, 0.4])
+@pytest.mark.parametrize('periods', [(500, 500), (500, 700), (200, 2000), (2000, 300)])
+def test_rule_19_two_bridges_end_with_0_and_say_who(
+        periods: tuple[int, int], shift: float) -> None:
+    cell = Bridges(*periods)
+    cell.running = cell.benches[:1]
+    cell.run(2.0 + shift)
+    cell.running = cell.benches
+    cell.run(20 * max(periods) / 1000)
+    assert cell.states() == 2 * [BeatState.CONFLICT]
+    for bench in cell.benches:
+        assert [conflict for _, _, conflict in bench.listener.foreign] == [False, True]
+        text = bench.listener.foreign[-1][1]
+        assert text.startswith('another program writes this word: ')
+        assert bench.driver.interlocks.heartbeats[0].why_not(bench.clock())
+    cell.running = cell.benches[1:]  # nobody takes over what the other leaves
+    cell.run(10.0)
+    assert cell.value == 0
+
+
+def test_rule_19_first_foreign_value_is_a_download_and_a_first_contact() -> None:
+    cell = Bridges(500)
+    cell.run(3.0)
+    for _ in range(2):
+        cell.store(888)
+        cell.run(0.6)
+        assert cell.value == 0
+        cell.run(5.4)
+        assert 0 < cell.value < 12
+        assert cell.states() == [BeatState.COUNTS]
+        cell.run(61.0)
+    assert cell.told() == [False, False]
+    cell.run(1.0)
+
+
+def test_rule_19_second_foreign_value_stays_until_the_port_is_opened_again() -> None:
+    cell = Bridges(500)
+    cell.run(3.0)
+    for value in (888, 889):
+        cell.store(value)
+        cell.run(5.0)
+    assert (cell.told(), cell.value, cell.states()) == ([False, True], 0, [BeatState.CONFLICT])
+    text = cell.benches[0].listener.foreign[-1][1]
+    assert text.startswith('another program writes this word: 889 was read where ')
+    cell.store(890)
+    cell.run(100.0)
+    assert cell.value == 0
+    cell.benches[0].driver.interlocks.contact(1, cell.benches[0].clock())
+    cell.run(2.0)
+    assert cell.value == 0
+    cell.benches[0].lose_port()
+    cell.benches[0].open()
+    cell.run(3.0)
+    assert cell.value > 1
+    assert cell.told() == [False, True]
+
+
+@pytest.mark.parametrize('polling', POLLING_MODES)
+def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -> None:
+    cell = Cell(beat_row(100), speed_row(), make_mapping('N10:1', period=100), polling=polling)
+    speed = cell.bench.driver.mappings[1]
+    cell.publish(speed, 3, times=300)
+    for number in range(20):
+        cell.bench.at(2.0 + number, lambda number=number: setattr(  # type: ignore[misc]
+            cell, 'is_late', number % 3 == 1))
+        cell.bench.at(2.5 + number, lambda number=number: cell.refused.update(  # type: ignore
+            {'N10:0'} if number % 2 else set()) or cell.refused.intersection_update(
+                {'N10:0'} if number % 2 else set()))
+    cell.run(30.0)
+    assert cell.bench.listener.foreign == []
+    assert cell.word('N10:0') > 5
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:

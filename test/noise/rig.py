@@ -155,6 +155,9 @@ class DriverEnd:
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Do nothing: no row has Publish_While."""
 
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Do nothing: no row is a heartbeat."""
+
     def written(self, result: WriteResult) -> None:
         """Hand on a result."""
         content = self._texts.pop(result.value)

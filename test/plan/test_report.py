@@ -147,7 +147,7 @@ def test_period_that_another_baud_rate_can_keep() -> None:
 
 def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     rows = [make_mapping('N7:0', length=2, period=100, tag='speed'),
-            make_mapping('N10:0', 'Heartbeat', tag='beat', period=100, heartbeat=Heartbeat())]
+            make_mapping('N10:0', 'Heartbeat', tag='beat', period=300, heartbeat=Heartbeat())]
     report = report_of(*rows)
     assert report_of(rows[0]).load < 1 < report.load
     needed = report.needed_baud()

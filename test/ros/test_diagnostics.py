@@ -64,6 +64,9 @@ class Listener:
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Take the end of a withholding."""
 
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Take another value of a heartbeat."""
+
     def written(self, result: WriteResult) -> None:
         """Take a result."""
 

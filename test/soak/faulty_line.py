@@ -93,6 +93,9 @@ class Ear:
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Do nothing: no row has Publish_While."""
 
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Do nothing: no row is a heartbeat."""
+
     def written(self, result: WriteResult) -> None:
         """Count the result of a write."""
         self.results += 1

@@ -52,6 +52,7 @@ class Recorder:
         self.results: list[WriteResult] = []
         self.reasons: list[tuple[str, str]] = []
         self.ends: list[tuple[str, float]] = []
+        self.foreign: list[tuple[float, str, bool]] = []
         self.events: list[Event] = []
         self.changes: list[tuple[int, bool]] = []
 
@@ -67,6 +68,10 @@ class Recorder:
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Keep when a withholding ended."""
         self.ends.append((mapping.tag, seconds))
+
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Keep that somebody else has written a heartbeat."""
+        self.foreign.append((self._clock(), text, is_conflict))
 
     def written(self, result: WriteResult) -> None:
         """Keep the result of a write."""

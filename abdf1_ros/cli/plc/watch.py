@@ -120,6 +120,9 @@ class Watch:
     def written(self, result: WriteResult) -> None:
         """Do nothing: nothing is written."""
 
+    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Do nothing: no row is a heartbeat."""
+
     def happened(self, event: Event) -> None:
         """Do nothing: the reason of a failed read tells enough."""
 
