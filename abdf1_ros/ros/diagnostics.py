@@ -31,6 +31,7 @@ from abdf1_ros.pccc.status import status_text
 from abdf1_ros.ports.link_thread import LinkThread, RELEASED
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import Problem
+from abdf1_ros.ros.interlock_status import InterlockStatus
 from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
 from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
@@ -76,8 +77,7 @@ class Diagnostics:
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
     faults of the rows that the map was read without, ``map_name`` is what the file is called.
-    ``changed_files`` are the names of files that have changed since they were read. ``crowded``
-    are topics with a Fallback and more than one publisher.
+    ``changed_files`` are the names of files that have changed since they were read.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
@@ -94,7 +94,7 @@ class Diagnostics:
         self._last_events: dict[int | None, Moment] = {}
         self._writes = WriteLog()
         self.changed_files: list[str] = []
-        self.crowded: tuple[str, ...] = ()
+        self.interlocks = InterlockStatus(driver)
         self._baseline = dict.fromkeys(driver.counters.by_mnemonic(), 0)
         self._rate = LoadMeter()
         self._sections = [
@@ -102,36 +102,12 @@ class Diagnostics:
             Section('counters', port, self._judge_counters, lambda now: self._counters()),
             *(self._station_section(station, port) for station in driver.stations),
             Section('mappings', port, self._judge_mappings, self._mapping_values),
-            Section('writes', port, self._judge_writes, self._write_values),
+            Section('writes', port, self._writes.judge, self._writes.values),
         ]
+        if driver.interlocks:
+            self._sections.append(
+                Section('interlocks', port, self.interlocks.judge, self.interlocks.values))
         self._node_name = node_name
-
-    def _judge_writes(self, now: float) -> Judgement:
-        """Return the level of writes; a heartbeat that does not count is a WARN."""
-        level, text = self._writes.judge(now)
-        interlocks = self._driver.interlocks
-        at_rest = [row.mapping.tag for row in interlocks.heartbeats if row.why_not(now)]
-        due = [row.mapping.tag for row in interlocks.fallbacks if row.cause is not None]
-        notes = [f'{", ".join(tags)}: {what}' for tags, what in (
-            (at_rest, 'heartbeat does not count'), (due, 'fallback value is due'),
-            (self.crowded, 'more than one publisher')) if tags]
-        return (max(level, WARN), '; '.join([text, *notes])) if notes else (level, text)
-
-    def _write_values(self, now: float) -> dict[str, str]:
-        """Return counts, and the state of each heartbeat and fallback."""
-        values = self._writes.values(now)
-        for beat in self._driver.interlocks.heartbeats:
-            age = '' if beat.confirmed is None else f', {now - beat.confirmed:.1f} s ago'
-            reason = beat.why_not(now)
-            state = f'does not count: {reason}' if reason else 'counts'
-            values[beat.mapping.tag] = f'heartbeat {beat.value}{age}; {state}'
-        for row in self._driver.interlocks.fallbacks:
-            state = 'a message stands' if not row.stands else 'the fallback value stands'
-            if row.cause is not None:
-                state = f'the fallback value is due ({row.cause.value})'
-                state += f': {row.refusal}' if row.refusal else ''
-            values[row.mapping.tag] = state
-        return values
 
     def attach(self, link: LinkThread, opener: PortOpener) -> None:
         """Set the thread whose port is reported, and what opens it."""
@@ -151,6 +127,7 @@ class Diagnostics:
     def written(self, result: WriteResult, now: float) -> None:
         """Count a write."""
         self._writes.add(result, now)
+        self.interlocks.written(result, now)
 
     def lost(self, topic: str, count: int, now: float) -> None:
         """Count messages to a write topic that never came."""

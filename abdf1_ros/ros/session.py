@@ -316,11 +316,11 @@ class BridgeSession:
         self._tell_speed(self.driver.machine.rate.seen)
         for text in self._types.look(now):
             self.notes.warning('types of topics', text)
-        diagnostics.crowded = self._interlocks.look(now)
+        crowded = diagnostics.interlocks.crowded = self._interlocks.look(now)
         self._tell_news('publishers', [
             f'~/write/{topic} has more than one publisher: its fallback value is not written '
             'while any of them goes on (a forgotten "ros2 topic pub -r"?)'
-            for topic in diagnostics.crowded], self.notes.warning)
+            for topic in crowded], self.notes.warning)
         self._tell_news('types of PLCs', diagnostics.wrong_types(), self.notes.warning)
         self._tell_deaf_stations(diagnostics.deaf_stations(now))
         echo = diagnostics.echo_text()

@@ -28,7 +28,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.fallbacks import FallbackCause
 from abdf1_ros.driver.heartbeats import BeatState
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome, ReadPoint, WriteResult
+from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -497,13 +497,28 @@ def test_fallback_value_is_no_message_and_usual_at_start_and_end(
 def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
         make_bench: Callable[..., Bench]) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
-    assert bench.says('writes')[1].endswith('alive: heartbeat does not count')
+    assert bench.says('interlocks')[1].endswith('alive: heartbeat does not count')
     beat = bench.driver.interlocks.heartbeats[0]
     beat.confirmed, beat.state = NOW, BeatState.COUNTS
-    assert bench.says('writes', NOW + 1.5) == (OK, 'OK: 0 of 0 writes confirmed')
-    assert bench.says('writes', NOW + 1.6)[0] == WARN
-    assert details(bench.status('writes', NOW + 4))['alive'] == \
-        'heartbeat 0, 4.0 s ago; does not count: not confirmed for 4.0 s'
+    assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
+    assert details(bench.status('interlocks', NOW + 1.5))['station 1'] == \
+        'heartbeat counts since 1.5 s'
+    assert bench.says('interlocks', NOW + 1.6)[0] == WARN
+    values = details(bench.status('interlocks', NOW + 4))
+    assert values['alive'] == 'heartbeat 0, 4.0 s ago; does not count: not confirmed for 4.0 s'
+    assert values['station 1'] == 'not in control: not confirmed for 4.0 s'
+    assert values['bound of alive'].startswith('PLC timer presets ')
+
+
+def test_last_fallback_value_of_a_station_is_told_with_its_cause(
+        make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('speed,Write,N10:1,1,PLC5,')
+    row, = bench.driver.mappings
+    assert 'line_a: interlocks' not in [status.name for status in bench.diagnostics.statuses(NOW)]
+    told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value, NOW)
+    bench.diagnostics.written(told, NOW)
+    assert bench.diagnostics.interlocks.values(NOW + 2)['station 1 last fallback'] == \
+        'speed: timeout (2.0 s ago)'
 
 
 def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> None:

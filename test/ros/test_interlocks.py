@@ -218,9 +218,9 @@ def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
 def test_rule_17_two_publishers_of_a_fallback_row_are_a_warning(cell: Cell) -> None:
     cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
     cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
-    status = until_status(cell.diagnostics, 'writes', WARN)
+    status = until_status(cell.diagnostics, 'interlocks', WARN)
     cell.until(lambda: 'speed: more than one publisher' in until_status(
-        cell.diagnostics, 'writes', WARN).message, 'the warning')
+        cell.diagnostics, 'interlocks', WARN).message, 'the warning')
     assert 'heartbeat' in details(status)['beat']
 
 
@@ -260,7 +260,7 @@ def test_rule_21_an_echo_is_no_plc(tmp_path: Path) -> None:
             assert COMES_BACK in until_status(diagnostics, 'link', ERROR).message
             assert 'inactive' in until_status(diagnostics, 'station 1', ERROR).message
             until_status(diagnostics, 'mappings', ERROR)
-            status = until_status(diagnostics, 'writes', WARN)
+            status = until_status(diagnostics, 'interlocks', WARN)
             assert 'beat: heartbeat does not count' in status.message
             node.end()
     assert [list(inbox) for inbox in heard] == [[], [], [], []]

@@ -219,7 +219,7 @@ def test_second_publisher_is_found_again(
         while len(publishers) < 2:
             publishers.append(
                 bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe'))
-        until_status(bench.diagnostics, 'writes', WARN,
+        until_status(bench.diagnostics, 'interlocks', WARN,
                      lambda status: 'recipe: more than one publisher' in status.message)
     assert capfd.readouterr().err.count(CROWD) == 2
 

@@ -222,8 +222,9 @@ def _mappings(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
 
 
 def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
-    for status in _section(snapshot, 'writes'):
-        yield _summary('writes', status)
+    for name in ('writes', 'interlocks'):
+        for status in _section(snapshot, name):
+            yield _summary(name, status)
     for result in snapshot.results:
         value, latency = (result.values.get(key, '?') for key in ('value', 'latency_ms'))
         yield from _wrapped(f'{now - result.received:.1f} s ago: {result.tag} {value} '

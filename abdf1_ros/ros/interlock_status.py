@@ -1,0 +1,103 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The status ``interlocks``: which PLC has a heartbeat that counts, and why another has none."""
+
+from __future__ import annotations
+
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.fallbacks import FallbackRow
+from abdf1_ros.driver.heartbeats import HeartbeatRow
+from abdf1_ros.driver.points import Outcome, WriteResult
+from abdf1_ros.plan.interlocks import Bound, Times
+from abdf1_ros.ros.status import Judgement, milliseconds, Moment, OK, WARN, with_age
+
+
+class InterlockStatus:
+    """
+    What is told of the heartbeats and fallbacks of a driver; asked ten times a second.
+
+    ``crowded`` are topics with a Fallback and more than one publisher.
+    """
+
+    def __init__(self, driver: Driver) -> None:
+        self.crowded: tuple[str, ...] = ()
+        self._beats = driver.interlocks.heartbeats
+        self._fallbacks = driver.interlocks.fallbacks
+        self._bounds = [*Times(driver.network, driver.mappings, driver.blocks).bounds()]
+        self._since: dict[str, float] = {}  # by tag of the heartbeat
+        self._last: dict[int, Moment] = {}  # fallback value by station
+
+    def written(self, result: WriteResult, now: float) -> None:
+        """Remember a fallback value that was written."""
+        if result.outcome is Outcome.FALLBACK:
+            self._last[result.mapping.station] = f'{result.mapping.tag}: {result.detail}', now
+
+    def judge(self, now: float) -> Judgement:
+        """Return WARN where a heartbeat does not count or a fallback is due."""
+        at_rest = [beat.mapping.tag for beat in self._beats if self._why_not(beat, now)]
+        due = [row.mapping.tag for row in self._fallbacks if row.cause is not None]
+        notes = [f'{", ".join(tags)}: {what}' for tags, what in (
+            (at_rest, 'heartbeat does not count'), (due, 'fallback value is due'),
+            (self.crowded, 'more than one publisher')) if tags]
+        counting = len(self._beats) - len(at_rest)
+        text = f'{counting} of {len(self._beats)} heartbeats count'
+        return (WARN, '; '.join([text, *notes])) if notes else (OK, text)
+
+    def _why_not(self, beat: HeartbeatRow, now: float) -> str:
+        reason = beat.why_not(now)
+        if reason:
+            self._since.pop(beat.mapping.tag, None)
+        else:
+            self._since.setdefault(beat.mapping.tag, now)
+        return reason
+
+    def values(self, now: float) -> dict[str, str]:
+        """Return the state of each PLC, of each heartbeat and fallback, and their bounds."""
+        stations: dict[int, str] = {}
+        for beat in self._beats:
+            reason, number = self._why_not(beat, now), beat.mapping.station
+            if reason:
+                stations[number] = f'not in control: {reason}'
+            else:
+                since = now - self._since[beat.mapping.tag]
+                stations.setdefault(number, f'heartbeat counts since {since:.1f} s')
+        return {
+            **{f'station {number}': text for number, text in stations.items()},
+            **{f'station {number} last fallback': with_age(moment, now)
+               for number, moment in self._last.items()},
+            **{beat.mapping.tag: self._beat(beat, now) for beat in self._beats},
+            **{row.mapping.tag: _fallback(row) for row in self._fallbacks},
+            **{f'bound of {bound.mapping.tag}': _bound(bound) for bound in self._bounds}}
+
+    def _beat(self, beat: HeartbeatRow, now: float) -> str:
+        age = '' if beat.confirmed is None else f', {now - beat.confirmed:.1f} s ago'
+        reason = self._why_not(beat, now)
+        return f'heartbeat {beat.value}{age}; ' \
+            + (f'does not count: {reason}' if reason else 'counts')
+
+
+def _fallback(row: FallbackRow) -> str:
+    if row.cause is None:
+        return row.state.value
+    return f'{row.state.value} ({row.cause.value})' + (f': {row.refusal}' if row.refusal else '')
+
+
+def _bound(bound: Bound) -> str:
+    if bound.presets is not None:
+        return 'PLC timer presets {} and {}, time base 0.01 s'.format(*bound.presets)
+    if bound.seconds is None:
+        return 'none: the master of the line decides'
+    usual = f', {milliseconds(bound.usual)} where no frame gets lost' if bound.usual else ''
+    return f'written after {milliseconds(bound.seconds)} at most{usual}'
