@@ -22,6 +22,7 @@ from pathlib import Path
 import time
 from typing import Any
 
+from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
@@ -542,3 +543,10 @@ def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
     assert bench.says('writes', NOW + 10) == (OK, 'OK: 2 of 3 writes confirmed')
     assert details(bench.status('writes', NOW + 10))['last failure'] == \
         'level unknown whether written: no reply (10.0 s ago)'
+
+
+def test_monitor_looks_for_values_that_there_are(bench: Bench) -> None:
+    columns = {key for *_, key in plant._COLUMNS} - {'state'}
+    assert {*view._LINK_KEYS, *columns, 'last error'} <= details(bench.status('link')).keys()
+    assert {*view._STATION_KEYS} <= details(bench.status('station 1')).keys()
+    assert 'total' in details(bench.status('mappings'))
