@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import re
+
 
 def printable(text: str) -> str:
     """
@@ -34,3 +36,9 @@ def printable(text: str) -> str:
 def value_text(value: float) -> str:
     """Return a value as text, with as many digits as a float32 has."""
     return str(value) if isinstance(value, int) else f'{value:.7g}'
+
+
+def by_number(name: str) -> list[tuple[int, str]]:
+    """Return a key that sorts names as people do: line2 before line10."""
+    return [(int(part) if part.isdecimal() else 0, part)
+            for part in re.split('([0-9]+)', name)]

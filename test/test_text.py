@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.text import printable
+from abdf1_ros.text import by_number, printable
 from hypothesis import given, strategies
 import pytest
 
@@ -47,3 +47,9 @@ def test_any_text_is_one_visible_line(text: str) -> None:
     assert shown.isprintable() and len(shown.splitlines()) <= 1
     assert shown.encode().decode() == shown
     assert printable(shown) == shown
+
+
+def test_names_are_sorted_by_their_numbers() -> None:
+    names = ['line10', 'line2', 'Line1', 'line2b', 'hall/3/press', 'hall/20/press', '7', 'x', '']
+    assert sorted(names, key=by_number) == [
+        '', '7', 'Line1', 'hall/3/press', 'hall/20/press', 'line2', 'line2b', 'line10', 'x']

@@ -54,7 +54,7 @@ from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, Network
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.text import printable
+from abdf1_ros.text import by_number, printable
 
 EXIT_FAULTY = 2
 EXIT_INTERRUPTED = 130
@@ -137,7 +137,7 @@ def _report(found: Findings, options: argparse.Namespace) -> Report | None:
 
 def pairs(folder: Path) -> list[tuple[str, Path, Path]]:
     """
-    Return name, net and map file of each line below a folder, by name.
+    Return name, net and map file of each line below a folder, by name: line2 before line10.
 
     The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder
     NAME. One of them may be missing.
@@ -145,15 +145,15 @@ def pairs(folder: Path) -> list[tuple[str, Path, Path]]:
     ends = 'net.csv', 'map.csv'
     starts = {str(path.relative_to(folder))[:-len(ends[0])]
               for path in folder.rglob('*.csv') if path.name.endswith(ends)}
-    return [(start.rstrip('/_') or folder.name, folder / f'{start}net.csv',
-             folder / f'{start}map.csv') for start in sorted(starts)]
+    return [(start.rstrip('/_-. ') or folder.name, folder / f'{start}net.csv',
+             folder / f'{start}map.csv') for start in sorted(starts, key=by_number)]
 
 
 def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     """Return a line or an object for each line of a plant, and whether none has an error."""
     contents: dict[str, Any] = {}
     texts = []
-    is_good = True
+    bad = warned = 0
     owners: dict[str, str] = {}
     for name, net, map_file in pairs(Path(options.net)):
         found = examine(str(net), str(map_file), options.default_period / 1000)
@@ -163,14 +163,19 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
             if owner != name:
                 found.problems.append(Problem(str(net), f'{port} is the port of {owner} too'))
         report = _report(found, options)
-        is_good = is_good and not found.problems
+        bad += bool(found.problems)
+        warned += not found.problems and report is not None and bool(report.remarks())
         contents[name] = _content(found, report)
         texts.append(_summary(name, found, report))
-    if not contents:
-        is_good = False
+    if contents:
+        good = len(contents) - bad
+        texts.append(f'{len(contents)} lines: {good} good ({warned} of them with warnings), '
+                     f'{bad} with errors')
+    else:
         texts.append(f'{printable(options.net)}: no files NAME_net.csv and NAME_map.csv, nor '
                      'folders with net.csv and map.csv')
-    return json.dumps({'lines': contents}, indent=2) if options.json else '\n'.join(texts), is_good
+    text = json.dumps({'lines': contents}, indent=2) if options.json else '\n'.join(texts)
+    return text, bool(contents) and not bad
 
 
 def _summary(name: str, found: Findings, report: Report | None) -> str:

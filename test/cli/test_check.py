@@ -293,8 +293,20 @@ def test_folder_has_a_line_of_text_for_each_pair(
     write_csv(tmp_path / 'notes.csv', 'a', ['b'])
     assert main([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press']
+    assert [line.partition(':')[0] for line in lines] == [
+        'glue', 'hall/paint', 'press', '3 lines']
+    assert lines[-1] == '3 lines: 3 good (0 of them with warnings), 0 with errors'
     assert lines[0].startswith('glue: 1 rows, port /dev/ttyS0, poll cycle ')
+
+
+def test_lines_stand_in_the_order_of_their_numbers(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ('line10_', 'line2.', 'line1-'):
+        write_csv(tmp_path / f'{name}net.csv', NET_HEADER, [GOOD_NET])
+        write_csv(tmp_path / f'{name}map.csv', MAP_HEADER, [GOOD_ROW])
+    main([str(tmp_path)])
+    *lines, total = capsys.readouterr().out.splitlines()
+    assert [line.partition(':')[0] for line in lines] == ['line1', 'line2', 'line10']
 
 
 def test_error_of_one_pair_is_named_and_the_others_are_told(
@@ -317,7 +329,7 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(
     assert main([str(tmp_path)]) == 2
     errors = [line for line in capsys.readouterr().out.splitlines() if 'error' in line]
     assert errors == [f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port '
-                      'of paint too']
+                      'of paint too', '3 lines: 2 good (0 of them with warnings), 1 with errors']
 
 
 def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,7 +27,7 @@ import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_status
 from abdf1_ros.cli.monitor.view import cut, SILENCE, Status, Style, TextLine
-from abdf1_ros.text import printable
+from abdf1_ros.text import by_number, printable
 from diagnostic_msgs.msg import DiagnosticArray
 
 _WORDS = {Style.GOOD: 'OK', Style.WARNING: 'WARN', Style.BAD: 'ERROR'}
@@ -95,7 +95,7 @@ class PlantWatch(Listening):
 def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[TextLine]:
     """Return two lines of heading, and one for each bridge, whose ``section`` is its name."""
     found = sorted(((line.worst(now), line) for line in lines),
-                   key=lambda pair: (_RANKS.index(pair[0].style), pair[1].name))
+                   key=lambda pair: (_RANKS.index(pair[0].style), by_number(pair[1].name)))
     counts = Counter(status.style for status, _ in found)
     told = ', '.join(f'{counts[style]} {_WORDS[style]}' for style in reversed(_RANKS)
                      if counts[style])
