@@ -48,6 +48,7 @@ class Family:
     its counters are not emulated; they are at every address where ``counters_anywhere``.
     ``is_spoken_by_all`` tells that PLCs of other families know its commands too.
     ``file_search`` finds out which files a PLC has, None where they cannot be looked for.
+    ``clock`` is the first of six words: year, month, day, hour, minute, second.
     """
 
     addressing: Addressing
@@ -63,6 +64,7 @@ class Family:
     max_echo: int = MAX_ECHO
     is_spoken_by_all: bool = False
     file_search: FileSearch | None = None
+    clock: str = ''
 
     @property
     def plc_type(self) -> PlcType:

@@ -29,6 +29,7 @@ from pathlib import Path
 import sys
 
 from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
+from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION, make_parser, RADIXES
 from abdf1_ros.cli.plc.session import Session
@@ -133,7 +134,7 @@ def _line(options: argparse.Namespace) -> Network:
     network = network_of(options)
     is_half = network.mode != MODES['full']
     options.is_assumed = is_half and options.station is None
-    if options.is_assumed and options.command == 'write':
+    if options.is_assumed and (options.command == 'write' or getattr(options, 'set', False)):
         raise ConfigurationError([Problem(
             '--station', 'say which station to write to: a half-duplex line may have several')])
     if options.station is None:
@@ -238,7 +239,12 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
         _print_values(mapping, data.read(session, mapping))
     except Abdf1Error as error:
         _failed(options, session, error, str(mapping.address))
-    question = f'write {writing.value} to {mapping.address} of station {mapping.station}'
+    return _is_wanted(
+        f'write {writing.value} to {mapping.address} of station {mapping.station}')
+
+
+def _is_wanted(question: str) -> bool:
+    """Ask for a confirmation where there is a terminal."""
     if not sys.stdin.isatty():
         print(f'would {printable(question)}')
         return False
@@ -449,6 +455,30 @@ def _ports(options: argparse.Namespace) -> int:
     return 0
 
 
+def _clock(options: argparse.Namespace) -> int:
+    place = ''
+    with Session(_line(options), via=options.via) as session:
+        try:
+            clock = Clock(session, options.station, _family(options, session)[0])
+            place = clock.address
+            if not options.set:
+                print(f'station {options.station}: {told(*clock.read())}')
+                return 0
+            if not options.yes and not _is_wanted(
+                    f'set the clock of station {options.station} ({clock.address})'):
+                _complain('nothing was written; --yes writes')
+                return EXIT_USAGE
+            clock.write()
+            time, ahead = clock.read()
+        except Abdf1Error as error:
+            return _failed(options, session, error, place)
+    print(f'station {options.station}: {told(time, ahead)}')
+    if abs(ahead) <= TAKEN:
+        return 0
+    _complain('it has not taken the time, though it has confirmed the write')
+    return EXIT_FAILED
+
+
 def _files(options: argparse.Namespace) -> int:
     mappings = load_mappings(options.map)[0] if options.map else []
     with Session(_line(options), via=options.via) as session:
@@ -495,6 +525,7 @@ def _extent(entry: DataFile) -> str:
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
     'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files,
+    'clock': _clock,
     'import': _import}
 
 

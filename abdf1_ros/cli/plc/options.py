@@ -134,6 +134,14 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
                         'files 1 --net net.csv', 'files 1 --map --net net.csv',
                         'files 1 --map map.csv --net net.csv'))
     _add_import(commands)
+    clock = add('clock', "tell a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
+                'clock 1 --set --yes --net net.csv')
+    _add_station(clock)
+    clock.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
+                       help='default: the PLC is asked what it is')
+    clock.add_argument('--set', action='store_true',
+                       help="write this computer's local time; a terminal is asked")
+    clock.add_argument('--yes', action='store_true', help='set it without a question')
     commands.add_parser('ports', help='list serial ports and adapters',
                         description='List serial ports and adapters.')
     return parser

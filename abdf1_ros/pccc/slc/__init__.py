@@ -40,4 +40,4 @@ FAMILY = Family(
     SlcCommands, identity.decode, identity.encode, DESCRIBED, MEANINGS,
     by_processor=BY_PROCESSOR, served_counters=identity.served_counters,
     max_echo=236,  # of an SLC 5/03 and later (M 7-8)
-    file_search=SlcFileSearch())
+    file_search=SlcFileSearch(), clock='S:37')  # 1747-RM001G B-54

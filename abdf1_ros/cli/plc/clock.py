@@ -1,0 +1,73 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The clock of a PLC: shown with its drift, and set."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import steps
+from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.steps import AddressedValues
+from abdf1_ros.pccc.values import ValueType
+
+TAKEN = timedelta(seconds=3)
+"""A clock that is further away right after it was set has not taken the time."""
+
+
+class Clock:
+    """Year, month, day, hour, minute and second of a station; FormatError where none is known."""
+
+    def __init__(self, session: Session, station: int, plc_type: PlcType) -> None:
+        if not family_of(plc_type).clock:
+            raise FormatError(f'is a {plc_type.value}, whose clock is not known')
+        self._session, self._station = session, station
+        self._words = AddressedValues.of(
+            family_of(plc_type).clock, plc_type, 6, ValueType.UINT16)
+
+    @property
+    def address(self) -> str:
+        """Return the first of its words."""
+        return str(self._words.address)
+
+    def read(self) -> tuple[datetime, timedelta]:
+        """Return its time, and how far it is ahead of this computer's local time."""
+        begun = datetime.now()
+        values = self._session.ask(self._station, steps.read(self._words))
+        ended = datetime.now()
+        try:
+            found = datetime(*values)
+        except ValueError:
+            raise FormatError(f'has no time: {self.address} holds '
+                              f'{" ".join(map(str, values))}') from None
+        return found, found - (begun + (ended - begun) / 2)
+
+    def write(self) -> None:
+        """Set it to this computer's local time, to the second."""
+        now = datetime.now()
+        values = now.year, now.month, now.day, now.hour, now.minute, now.second
+        self._session.ask(self._station, steps.write(self._words, values))
+
+
+def told(time: datetime, ahead: timedelta) -> str:
+    """Return a time and its drift for people."""
+    seconds = round(ahead.total_seconds())
+    if abs(seconds) <= 1:
+        return f'{time}, as this computer'
+    side = 'ahead of' if seconds > 0 else 'behind'
+    return f'{time}, {timedelta(seconds=abs(seconds))} {side} this computer'

@@ -1,0 +1,106 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The clock of simulated PLCs: shown, set, and what stands in the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from pathlib import Path
+import time
+
+from abdf1_ros.cli.plc.clock import told
+from abdf1_ros.cli.plc.command import main
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+import pytest
+from support.commands import call
+from support.driver_bench import simulated_plc, store
+from support.plc_line import plc_line
+
+WORDS = {1: 'S:37', 2: 'S:18'}
+Output = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def plcs() -> tuple[SimulatedPlc, ...]:
+    return (simulated_plc(1, 'SLC', time.monotonic, ('S:0', 64)),
+            simulated_plc(2, 'PLC5', time.monotonic, ('S:0', 32)),
+            simulated_plc(3, 'PLC2', time.monotonic, ('000', 32)),
+            simulated_plc(4, 'SLC', time.monotonic, ('S:0', 30)))
+
+
+@pytest.fixture
+def port(tmp_path: Path, plcs: tuple[SimulatedPlc, ...]) -> Iterator[str]:
+    with plc_line(tmp_path / 'line', *plcs) as name:
+        yield name
+
+
+def set_clock(plc: SimulatedPlc, when: datetime) -> None:
+    store(plc, WORDS[plc.station], [*when.timetuple()[:6]])
+
+
+@pytest.mark.parametrize('station', [1, 2])
+def test_time_and_drift(port: str, plcs: tuple[SimulatedPlc, ...], station: int,
+                        capsys: Output) -> None:
+    set_clock(plcs[station - 1], datetime.now() - timedelta(days=1, hours=2))
+    said = call(main, capsys, 'clock', str(station), '--port', port)
+    assert said.status == 0
+    assert ' 1 day, 2:00:0' in said.lines[0] and 'behind this computer' in said.lines[0]
+
+
+@pytest.mark.parametrize('station', [1, 2])
+def test_clock_is_set_when_that_is_wanted(port: str, plcs: tuple[SimulatedPlc, ...],
+                                          station: int, capsys: Output) -> None:
+    before = datetime(2001, 2, 3, 4, 5, 6)
+    set_clock(plcs[station - 1], before)
+    args = ('clock', str(station), '--set', '--port', port)
+    said = call(main, capsys, *args)
+    assert (said.status, said.lines) == (
+        2, [f'would set the clock of station {station} ({WORDS[station]})'.replace('S:', 'S2:')])
+    assert str(before) in call(main, capsys, 'clock', str(station), '--port', port).lines[0]
+    said = call(main, capsys, *args, '--yes')
+    assert said.status == 0, said
+    assert said.lines[0].endswith('as this computer')
+
+
+def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:
+    said = call(main, capsys, 'clock', '1', '--port', port)
+    assert (said.status, said.err) == (
+        1, 'plc: S2:37 of station 1: has no time: S2:37 holds 0 0 0 0 0 0\n')
+
+
+def test_family_without_a_known_clock(port: str, capsys: Output) -> None:
+    said = call(main, capsys, 'clock', '3', '--port', port)
+    assert (said.status, said.err) == (
+        1, 'plc: station 3: is a PLC2, whose clock is not known\n')
+
+
+def test_refused_write_is_told(port: str, capsys: Output) -> None:
+    said = call(main, capsys, 'clock', '4', '--set', '--yes', '--port', port)
+    assert said.status == 1
+    assert said.err.startswith('plc: S2:37 of station 4: STS 50: address not there, or memory')
+
+
+def test_station_is_named_where_several_may_be(port: str, capsys: Output) -> None:
+    said = call(main, capsys, 'clock', '--set', '--yes', '--port', port)
+    assert (said.status, 'say which station to write to' in said.err) == (2, True)
+
+
+@pytest.mark.parametrize(('seconds', 'text'), [
+    (0.4, 'as this computer'), (-1.2, 'as this computer'),
+    (90, '0:01:30 ahead of this computer'), (-3600, '1:00:00 behind this computer')])
+def test_drift_in_words(seconds: float, text: str) -> None:
+    assert told(datetime(2026, 1, 2, 3, 4, 5), timedelta(seconds=seconds)) == \
+        f'2026-01-02 03:04:05, {text}'
