@@ -40,6 +40,7 @@ setup(
         (f'share/{PACKAGE}/config/sros2', ['config/sros2/policy.xml']),
         (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
         (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
+        (f'share/{PACKAGE}/examples/testing', sorted(glob('examples/testing/*.py'))),
         (f'lib/{PACKAGE}', sorted(glob('examples/*.py'))),  # where "ros2 run" finds them
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
         (f'share/{PACKAGE}/wireshark', ['wireshark/abdf1.lua']),

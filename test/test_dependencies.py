@@ -50,7 +50,7 @@ def imported(folder: str) -> set[str]:
                 found |= {alias.name.split('.')[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                 found.add(node.module.split('.')[0])
-    return found - sys.stdlib_module_names - {'abdf1_ros'}
+    return found - sys.stdlib_module_names - {'abdf1_ros', 'pytest'}
 
 
 def test_rosdep_knows_every_key() -> None:
@@ -64,6 +64,12 @@ def test_rosdep_knows_every_key() -> None:
 @pytest.mark.parametrize('folder', ['abdf1_ros', 'launch'])
 def test_users_get_what_is_imported(folder: str) -> None:
     assert {BRINGS.get(module, module) for module in imported(folder)} <= keys('exec_depend')
+
+
+def test_only_the_fixture_for_tests_imports_pytest() -> None:
+    using = [path.name for path in (ROOT / 'abdf1_ros').rglob('*.py')
+             if 'import pytest' in path.read_text(encoding='utf-8')]
+    assert using == ['testing.py']
 
 
 def test_users_get_no_more_than_is_imported() -> None:

@@ -92,6 +92,8 @@ ROOMS = (
     Room(('paths.py', 'signals.py'), 'where installed files lie; the end that a signal asks for',
          (), is_pure=False),
     Room(('ros',), 'the ROS node: parameters, messages, diagnostics, log', is_pure=False),
+    Room(('testing.py',), 'a pytest fixture: simulated PLCs, a bridge, and who looks at both',
+         is_pure=False),
     Room(('cli', '__main__.py'), 'the commands, one file or folder each', is_pure=False),
 )
 

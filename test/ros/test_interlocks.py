@@ -18,11 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+import signal
 import time
 from typing import Any
 
+from abdf1_ros import testing
 from abdf1_ros.df1.echo import COMES_BACK
-from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.ros.node import BridgeNode
 import pytest
 from std_msgs.msg import Int16MultiArray
@@ -34,7 +35,6 @@ from support.ros import (
     ERROR,
     Inbox,
     Observer,
-    Plcs,
     Process,
     ros_args,
     until_status,
@@ -42,63 +42,57 @@ from support.ros import (
     write_csv,
 )
 
-NET = ('NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout', ['1,1,500,115200,100'])
-MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Requires,'
-       'Requires_Timeout,Publish_While,Heartbeat_Timeout', [
-           'beat,Heartbeat,N10:0,1,SLC,100,,,,,,',
-           'speed,Write,N10:1,1,SLC,,7,400,,,,',
-           'doors,Read,N7:0,1,SLC,50,,,,,RUN,'])
-SIMULATOR = ('Station,PLC_Type,Address,Length,Values,Motion,Period', [
-    '1,SLC,S:0,8,,,', '1,SLC,N7:0,4,5,,', '1,SLC,N10:0,4,,,'])
+NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,500,115200,100\n'
+MAP = """\
+Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Publish_While
+speed,Write,N10:1,1,SLC,,7,400,
+doors,Read,N7:0,1,SLC,50,,,RUN
+beat,Heartbeat,N10:0,1,SLC,100,,,
+"""
+SIMULATOR = """\
+Station,PLC_Type,Address,Length,Values,Motion,Period
+1,SLC,S:0,8,,,
+1,SLC,N7:0,4,5,,
+1,SLC,N10:0,4,,,
+"""
 
 # s; a message to the bridge, a command on the line, and a look at the PLC take it at the most.
 WAY = 0.25
 
 
-class Cell:
-    """A bridge with a heartbeat, a PLC, and who looks at both."""
+class Cell(testing.SimulatedCell):
+    """A bridge with a heartbeat, in this process, a PLC, and who looks at both."""
+
+    observer = Observer
 
     def __init__(self, folder: Path, *assignments: str) -> None:
-        self.observer = Observer()
-        self.plcs = Plcs(write_csv(folder / 'simulator.csv', *SIMULATOR))
-        self._folder = folder
-        self._assignments = assignments
+        super().__init__(folder, SIMULATOR, MAP, NET, parameters=assignments)
+        self.map = folder / 'map.csv'
 
-    def __enter__(self) -> Cell:
-        self.observer.__enter__()
-        self.plcs.__enter__()
-        self.results = self.observer.results()
-        self.diagnostics = self.observer.diagnostics(self.plcs.port)
-        net = write_csv(self._folder / 'net.csv', *NET)
-        self.map = write_csv(self._folder / 'map.csv', *MAP)
-        self.node = BridgeNode(
-            context=self.observer.context, use_global_arguments=False, cli_args=ros_args(
-                f'net_file:={net}', f'map_file:={self.map}', f'port:={self.plcs.port}',
-                *self._assignments))
-        self.observer.executor.add_node(self.node)
+    def start(self) -> None:
+        """Start the bridge."""
+        self.results = self.ros.results()
+        self.diagnostics = self.ros.diagnostics(self.plcs.port)
+        self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
+                               cli_args=ros_args(*self._assignments))
+        self.ros.executor.add_node(self.node)
         self.node.start()
-        return self
 
-    def __exit__(self, *exception: object) -> None:
-        if self.node in self.observer.executor.get_nodes():
-            self.stop()
-        self.plcs.__exit__(*exception)
-        self.observer.__exit__(*exception)
-
-    def stop(self) -> None:
-        """End the bridge in order."""
-        self.observer.executor.remove_node(self.node)
-        self.node.stop()
-        self.node.destroy_node()
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """End the bridge in order, if it runs."""
+        if self.node in self.ros.executor.get_nodes():
+            self.ros.executor.remove_node(self.node)
+            self.node.stop()
+            self.node.destroy_node()
+        return 0
 
     def word(self, address: str) -> int:
         """Return a word of the PLC."""
-        table = self.plcs[1].table
-        return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
+        return self.plcs.word(address)
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Wait for something; the executor runs meanwhile."""
-        self.observer.until(lambda: condition() or None, what)
+        self.ros.until(lambda: condition() or None, what)
 
     def until_counting(self) -> None:
         """Wait until the heartbeat counts."""
@@ -106,7 +100,7 @@ class Cell:
 
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Call a service of the bridge."""
-        return self.observer.call(kind, f'/abdf1/{name}', request)
+        return self.ros.call(kind, f'/abdf1/{name}', request)
 
 
 @pytest.fixture
@@ -129,7 +123,7 @@ def test_rule_2_fallback_at_the_start_goes_before_the_count(cell: Cell) -> None:
 
 def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
     cell.until_counting()
-    cell.observer.executor.remove_node(cell.node)
+    cell.ros.executor.remove_node(cell.node)
     watch = Stopwatch()
     last, changed = cell.word('N10:0'), 0.0
 
@@ -141,7 +135,7 @@ def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
 
     cell.until(stands, 'a heartbeat that stands still')
     assert changed < 1.0 + 0.1 + WAY  # max(Period, 1 s) and one beat
-    cell.observer.executor.add_node(cell.node)
+    cell.ros.executor.add_node(cell.node)
     last = cell.word('N10:0')
     cell.until(lambda: cell.word('N10:0') > last, 'a heartbeat that counts again')
 
@@ -149,7 +143,7 @@ def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
 def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path) -> None:
     with Cell(tmp_path, 'use_sim_time:=true') as cell:
         cell.until_counting()
-        speed = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+        speed = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
         speed.publish(Int16MultiArray(data=[3]))
         cell.until(lambda: cell.word('N10:1') == 3, 'the value')
         cell.until(lambda: fallbacks(cell.results) == ['start', 'timeout'], 'the fallback')
@@ -157,10 +151,10 @@ def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path
 
 def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
     cell.until_counting()
-    publisher = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    publisher = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
     publisher.publish(Int16MultiArray(data=[42]))
     cell.until(lambda: cell.word('N10:1') == 42, 'the command')
-    cell.stop()
+    cell.end()
     assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
 
 
@@ -179,18 +173,17 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
 
 def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
     cell.until_counting()
-    header, rows = MAP
-    write_csv(cell.map, header, [row for row in rows if not row.startswith('beat')])
+    cell.map.write_text(MAP[:MAP.index('beat')], encoding='utf-8')
     assert cell.call(Trigger, 'reload', Trigger.Request()).success
     assert cell.word('N10:0') == 0
-    write_csv(cell.map, header, rows)
+    cell.map.write_text(MAP, encoding='utf-8')
     assert cell.call(Trigger, 'reload', Trigger.Request()).success
     cell.until_counting()
 
 
 def test_rule_8_fallback_comes_when_the_publisher_is_gone(cell: Cell) -> None:
     cell.until_counting()
-    publisher = cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    publisher = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
     watch, began = Stopwatch(), time.monotonic()
     publisher.publish(Int16MultiArray(data=[42]))
     cell.until(lambda: cell.word('N10:1') == 42, 'the command')
@@ -201,10 +194,10 @@ def test_rule_8_fallback_comes_when_the_publisher_is_gone(cell: Cell) -> None:
 
 
 def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
-    doors = cell.observer.listen(Int16MultiArray, '/abdf1/read/doors')
+    doors = cell.ros.listen(Int16MultiArray, '/abdf1/read/doors')
     assert doors.first().data[0] == 5
     cell.plcs.say('program 1')
-    status = cell.observer.until(lambda: next((
+    status = cell.ros.until(lambda: next((
         status for array in cell.diagnostics for status in array.status
         if status.name.endswith(': mappings') and 'withheld' in status.message), None),
         'a withheld row')
@@ -216,8 +209,8 @@ def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
 
 
 def test_rule_17_two_publishers_of_a_fallback_row_are_a_warning(cell: Cell) -> None:
-    cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
-    cell.observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+    cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
+    cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
     status = until_status(cell.diagnostics, 'interlocks', WARN)
     cell.until(lambda: 'speed: more than one publisher' in until_status(
         cell.diagnostics, 'interlocks', WARN).message, 'the warning')
@@ -227,11 +220,11 @@ def test_rule_17_two_publishers_of_a_fallback_row_are_a_warning(cell: Cell) -> N
 def test_rule_18_read_only_writes_nothing_and_says_so(
         tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with Cell(tmp_path, 'read_only:=true') as cell:
-        doors = cell.observer.listen(Int16MultiArray, '/abdf1/read/doors')
+        doors = cell.ros.listen(Int16MultiArray, '/abdf1/read/doors')
         doors.first()
         assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 0)
     said = capfd.readouterr().err
-    assert said.count('read_only: no heartbeat and no fallback value is written: beat, speed') == 1
+    assert said.count('read_only: no heartbeat and no fallback value is written: speed, beat') == 1
 
 
 ECHO_NET = ('Station,Mode,PLC_Type,Cmd_Timeout,Timeout,Baud', ['5,Peer,PLC5,500,50,115200'])

@@ -32,6 +32,7 @@ from abdf1_ros.ros.lines import chosen, LineName, main, sections
 from abdf1_ros.ros.node import BridgeNode
 from abdf1_ros.ros.parameter_files import check_parameter_files, parameter_files
 from abdf1_ros.signals import EndRequest
+from abdf1_ros.testing import Plcs
 import pytest
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Int16MultiArray
@@ -44,7 +45,6 @@ from support.ros import (
     get_parameters,
     Observer,
     OK,
-    Plcs,
     until_status,
     values_in,
     write_csv,

@@ -32,6 +32,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.node import BridgeNode, main
+from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.duration import Duration
@@ -56,7 +57,6 @@ from support.ros import (
     Inbox,
     Observer,
     OK,
-    Plcs,
     ros_args,
     until_status,
     values_in,

@@ -29,6 +29,7 @@ from abdf1_ros.ros.diagnostics import Diagnostics
 from abdf1_ros.ros.files import FileWatch
 from abdf1_ros.ros.graph import Graph
 from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.testing import Plcs
 import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
@@ -40,7 +41,6 @@ from support.ros import (
     find_status,
     Observer,
     OK,
-    Plcs,
     ros_args,
     until_status,
     values_in,

@@ -25,64 +25,31 @@ from collections.abc import Callable, Iterable, Sequence
 import os
 from pathlib import Path
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from typing import Any, TypeVar
+from typing import Any
 
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.slave import multidrop
+from abdf1_ros import testing
 from abdf1_ros.paths import config_file
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.messages import latched_qos
-from abdf1_ros.simulator.commands import execute
-from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
+from abdf1_ros.testing import EVERYTHING, PATIENCE
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters
-from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from support.forked import Forked
-
-
-def _claim_domain() -> tuple[int, socket.socket]:
-    """Return a domain that no other session on this machine has, and what keeps it ours."""
-    for number in range(os.getpid(), os.getpid() + 100):
-        domain = 1 + number % 100
-        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            claim.bind(f'\0abdf1_ros.test.domain.{domain}')  # a name in no file system
-        except OSError:
-            claim.close()
-        else:
-            return domain, claim
-    raise RuntimeError('all ROS domains are in use by other test sessions')
-
-
-_DOMAIN, _CLAIM = _claim_domain()
 
 # Read when the first context is made, here and in every child process.
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
-    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN),
     'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0',
     'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('dds.xml'))}
 
-EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-
-PATIENCE = 40.0  # s; what takes longer does not happen
-
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
-
-_Result = TypeVar('_Result')
 
 
 class Process:
@@ -191,27 +158,14 @@ class Process:
         assert 'Traceback' not in self.text, self.text
 
 
-class Inbox(list[Any]):
+class Inbox(testing.Messages):
     """The messages that a subscription has got, and the events that it has seen."""
 
     def __init__(self, observer: Observer, topic: str) -> None:
-        super().__init__()
-        self.topic = topic
-        self.subscription: Any = None
+        super().__init__(observer, topic)
         self.deadlines: list[Any] = []
         self.liveliness: list[Any] = []
         self.incompatible: list[Any] = []
-        self._observer = observer
-
-    def until(self, condition: Callable[[Any], bool], what: str) -> Any:
-        """Wait for a message that fulfils ``condition``; return it."""
-        return self._observer.until(
-            lambda: next((message for message in self if condition(message)), None),
-            lambda: f'{what} on {self.topic}; got {list(self)[-3:]}')
-
-    def first(self) -> Any:
-        """Wait for the first message."""
-        return self.until(lambda message: True, 'a message')
 
     def next(self) -> Any:  # noqa: A003
         """Wait for a message that is not here yet."""
@@ -228,33 +182,11 @@ def values_in(message: Any) -> list[float] | str:
     return message.data if isinstance(message.data, str) else list(message.data)
 
 
-class Observer:
+class Observer(testing.Observer):
     """A ROS node that looks at others from outside; also runs nodes that are added to it."""
-
-    def __init__(self, name: str = 'observer') -> None:
-        self.context = Context()
-        self.context.init(args=[])
-        self.node = Node(name, context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(self.node)
 
     def __enter__(self) -> Observer:
         return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.executor.shutdown()
-        self.node.destroy_node()
-        self.context.try_shutdown()
-
-    def until(self, condition: Callable[[], _Result | None],
-              what: str | Callable[[], str]) -> _Result:
-        """Spin until ``condition`` gives something true; return that."""
-        end = time.monotonic() + PATIENCE
-        while not (result := condition()):
-            if time.monotonic() > end:
-                raise AssertionError(f'waited for {what() if callable(what) else what}')
-            self.executor.spin_once(timeout_sec=0.05)
-        return result
 
     def listen(self, message_type: Any, topic: str, qos: QoSProfile | None = None) -> Inbox:
         """Subscribe; the default profile also gets what has been published before."""
@@ -285,12 +217,6 @@ class Observer:
         inbox.subscription = self.node.create_subscription(
             DiagnosticArray, '/diagnostics', take, EVERYTHING)
         return inbox
-
-    def publisher(self, message_type: Any, topic: str) -> Any:
-        """Return a publisher that a subscriber has been found for."""
-        publisher = self.node.create_publisher(message_type, topic, EVERYTHING)
-        self.until(publisher.get_subscription_count, f'a subscriber of {topic}')
-        return publisher
 
     def call(self, service_type: Any, name: str, request: Any) -> Any:
         """Call a service and return its response."""
@@ -329,43 +255,6 @@ def until_status(inbox: Inbox, name: str, level: bytes,
         return status.level == level and condition(status)
 
     return find_status(inbox.until(matches, f'{name} at level {level!r}'), name)
-
-
-class Plcs:
-    """
-    Simulated PLCs in this process, on a pseudo-terminal.
-
-    Its name goes away with it. The number of a terminal is soon another test's.
-    """
-
-    def __init__(self, data: Path) -> None:
-        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
-        self._line = PtyEndpoint(str(data.with_name('plcs')))
-        self.port = self._line.name
-        self.faults: list[Exception] = []
-        machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)
-        self._link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
-        self._link.start()
-
-    def __enter__(self) -> Plcs:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        if self._link.is_alive():
-            self.lose()
-        assert not self.faults
-
-    def __getitem__(self, station: int) -> SimulatedPlc:
-        return next(plc for plc in self._plcs if plc.station == station)
-
-    def lose(self) -> None:
-        """Take the line away, as when an adapter is unplugged."""
-        self._link.stop()
-        self._line.close()
-
-    def say(self, command: str) -> None:
-        """Carry out a command of the simulator."""
-        execute(command, self._plcs)
 
 
 def write_csv(path: Path, header: str, rows: Iterable[str]) -> Path:

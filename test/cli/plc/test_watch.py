@@ -27,10 +27,11 @@ from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.testing import Plcs
 import pytest
 from support.driver_bench import store
 from support.mappings import make_mapping
-from support.ros import Plcs, write_csv
+from support.ros import write_csv
 
 SPEED = make_mapping('N7:0', item=1)
 NAME = make_mapping('ST9:0', item=2)

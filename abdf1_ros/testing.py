@@ -1,0 +1,240 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Tests of a cell without its PLCs: simulated PLCs, a bridge on their line, and who looks at both.
+
+``pytest_plugins = ['abdf1_ros.testing']`` in a conftest.py brings the fixture ``abdf1_cell``; see
+docs/tutorials/testing.md. Importing this keeps all topics on this machine, in a ROS domain that no
+other session of tests here has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, suppress
+import os
+from pathlib import Path
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from typing import Any, TypeVar
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ros.messages import latched_qos
+from abdf1_ros.simulator.commands import execute
+from abdf1_ros.simulator.ladder import Ladder
+from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
+import pytest
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+
+PATIENCE = 40.0  # s; what takes longer does not happen
+EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+
+_Result = TypeVar('_Result')
+
+
+def _claim_domain() -> tuple[int, socket.socket]:
+    """Return a domain that no other session on this machine has, and what keeps it ours."""
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    for number in range(os.getpid(), os.getpid() + 100):
+        with suppress(OSError):  # another session has it
+            claim.bind(f'\0abdf1_ros.test.domain.{1 + number % 100}')  # a name in no file system
+            return 1 + number % 100, claim
+    raise RuntimeError('all ROS domains are in use by other test sessions')
+
+
+_DOMAIN, _CLAIM = _claim_domain()
+
+# Read when the first context is made, here and in every child process.
+os.environ |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN)}
+
+
+class Messages(list[Any]):
+    """The messages that a subscription has got."""
+
+    def __init__(self, observer: Observer, topic: str) -> None:
+        super().__init__()
+        self.topic = topic
+        self.subscription: Any = None
+        self._observer = observer
+
+    def until(self, condition: Callable[[Any], bool], what: str) -> Any:
+        """Wait for a message that fulfils ``condition``; return it."""
+        return self._observer.until(
+            lambda: next((message for message in self if condition(message)), None),
+            lambda: f'{what} on {self.topic}; got {list(self)[-3:]}')
+
+    def first(self) -> Any:
+        """Wait for the first message."""
+        return self.until(lambda message: True, 'a message')
+
+
+class Observer:
+    """A ROS node that looks at others from outside; also runs nodes that are added to it."""
+
+    def __init__(self, name: str = 'observer') -> None:
+        self.context = Context()
+        self.context.init(args=[])
+        self.node = Node(name, context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def __enter__(self) -> Observer:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def until(self, condition: Callable[[], _Result | None],
+              what: str | Callable[[], str]) -> _Result:
+        """Spin until ``condition`` gives something true; return that."""
+        end = time.monotonic() + PATIENCE
+        while not (result := condition()):
+            if time.monotonic() > end:
+                raise AssertionError(f'waited for {what() if callable(what) else what}')
+            self.executor.spin_once(timeout_sec=0.05)
+        return result
+
+    def listen(self, message_type: Any, topic: str, qos: QoSProfile | None = None) -> Messages:
+        """Subscribe; the default profile also gets what has been published before."""
+        inbox = Messages(self, topic)
+        inbox.subscription = self.node.create_subscription(
+            message_type, topic, inbox.append, qos or latched_qos())
+        return inbox
+
+    def publisher(self, message_type: Any, topic: str) -> Any:
+        """Return a publisher that a subscriber has been found for."""
+        publisher = self.node.create_publisher(message_type, topic, EVERYTHING)
+        self.until(publisher.get_subscription_count, f'a subscriber of {topic}')
+        return publisher
+
+
+class Plcs:
+    """
+    Simulated PLCs in this process, on a pseudo-terminal; ``data`` is a simulator CSV.
+
+    Its name goes away with it. The number of a terminal is soon another test's.
+    """
+
+    def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
+        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
+        for plc in self._plcs:
+            plc.lock = threading.Lock()
+            if plc.station in ladders:
+                plc.run_ladder(Ladder(plc.table))
+        self._line = PtyEndpoint(str(data.with_name('plcs')))
+        self.port = self._line.name
+        self.faults: list[Exception] = []
+        machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)
+        self._link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
+        self._link.start()
+
+    def __enter__(self) -> Plcs:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._link.is_alive():
+            self.lose()
+        assert not self.faults
+
+    def __getitem__(self, station: int) -> SimulatedPlc:
+        return next(plc for plc in self._plcs if plc.station == station)
+
+    def lose(self) -> None:
+        """Take the line away, as when an adapter is unplugged."""
+        self._link.stop()
+        self._line.close()
+
+    def say(self, command: str) -> None:
+        """Carry out a command of the simulator, such as ``delay 1 300`` or ``silent 1``."""
+        execute(command, self._plcs)
+
+    def word(self, address: str, station: int = 1) -> int:
+        """Return a word as it stands in a PLC, from 0 to 65535."""
+        self[station].advance()
+        table = self[station].table
+        return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
+
+    def set(self, address: str, *words: int, station: int = 1) -> None:  # noqa: A003
+        """Set words of a PLC, as its program does."""
+        table = self[station].table
+        table.write(parse_address(address, table.plc_type),
+                    b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
+
+
+class SimulatedCell:
+    """
+    Simulated PLCs, a bridge on their line as a process, and ``ros``, who looks at its topics.
+
+    ``data``, ``rows`` and ``net`` are the texts of a simulator CSV, a map CSV and a net CSV, which
+    go into ``folder``. ``ladders`` are stations that run the program of docs/heartbeats.md.
+    ``parameters`` are the bridge's, as ``'write_timeout:=1.0'``.
+    """
+
+    observer: type[Observer] = Observer
+
+    def __init__(self, folder: Path, data: str, rows: str,
+                 net: str = 'Com_Port,Baud,Timeout\n/dev/plc,115200,200', *,
+                 ladders: Sequence[int] = (), parameters: Sequence[str] = ()) -> None:
+        for name, text in (('data', data), ('map', rows), ('net', net)):
+            (folder / f'{name}.csv').write_text(text, encoding='utf-8')
+        self.plcs = Plcs(folder / 'data.csv', ladders)
+        self.ros = self.observer()
+        self._assignments = [f'net_file:={folder / "net.csv"}', f'map_file:={folder / "map.csv"}',
+                             f'port:={self.plcs.port}', *parameters]
+
+    def __enter__(self) -> SimulatedCell:
+        self.ros.__enter__()
+        self.plcs.__enter__()
+        self.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.end()
+        self.plcs.__exit__(*exception)
+        self.ros.__exit__(*exception)
+
+    def start(self) -> None:
+        """Start the bridge; also again, after its end."""
+        words = (word for text in self._assignments for word in ('-p', text))
+        self.bridge = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *words])
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """End the bridge by a signal, if it runs; return its exit status."""
+        if self.bridge.poll() is None:
+            self.bridge.send_signal(number)
+        return self.bridge.wait(PATIENCE)
+
+
+@pytest.fixture
+def abdf1_cell(tmp_path: Path) -> Iterator[Callable[..., SimulatedCell]]:
+    """Return what makes a ``SimulatedCell`` of texts; it ends with the test."""
+    with ExitStack() as stack:
+        yield lambda *texts, **options: stack.enter_context(
+            SimulatedCell(tmp_path, *texts, **options))

@@ -1,0 +1,64 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The fixture for tests of cells: the whole example, and the test that its tutorial shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import re
+from typing import Any
+
+from abdf1_ros.testing import abdf1_cell, SimulatedCell
+import pytest
+from support.ros_tools import SOURCE
+
+EXAMPLE = SOURCE / 'examples' / 'testing'
+TUTORIAL = (SOURCE / 'docs' / 'tutorials' / 'testing.md').read_text(encoding='utf-8')
+
+__all__ = ['abdf1_cell']
+
+
+def _run(text: str) -> dict[str, Any]:
+    names: dict[str, Any] = {}
+    exec(compile(text, 'example', 'exec'), names)
+    return names
+
+
+# Its tests, and its fixtures, become those of this module.
+globals().update({name: thing for name, thing in _run(
+    (EXAMPLE / 'test_press.py').read_text(encoding='utf-8')).items()
+    if name.startswith('test_') or name in ('cell', 'pressure')})
+
+
+def test_plugin_of_the_tutorial_is_that_of_the_example() -> None:
+    line = "pytest_plugins = ['abdf1_ros.testing']"
+    assert line in TUTORIAL
+    assert line in (EXAMPLE / 'conftest.py').read_text(encoding='utf-8')
+
+
+def test_test_of_the_tutorial_passes(abdf1_cell: Callable[..., SimulatedCell]) -> None:  # noqa: F811
+    block = re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[1]
+    _run(block)['test_pressure'](abdf1_cell)
+
+
+def test_what_never_happens_is_named(
+        abdf1_cell: Callable[..., SimulatedCell], monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
+    monkeypatch.setattr('abdf1_ros.testing.PATIENCE', 0.2)
+    data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
+    rows = 'Tag,Command,Address,Station,PLC_Type\npressure,Read,N7:0,1,SLC\n'
+    cell = abdf1_cell(data, rows)
+    with pytest.raises(AssertionError, match='waited for a word of 7'):
+        cell.ros.until(lambda: cell.plcs.word('N7:0') == 7, 'a word of 7')
+    monkeypatch.undo()
