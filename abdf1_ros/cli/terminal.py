@@ -24,6 +24,7 @@ import errno
 import io
 import os
 from pathlib import Path
+import shlex
 import shutil
 import signal
 import sys
@@ -131,11 +132,16 @@ def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
 
 
 def called(name: str) -> str:
-    """Return how a command of the package is called in this environment."""
-    if shutil.which(name):
-        return name
-    return f'ros2 run abdf1_ros {name}' if shutil.which('ros2') \
-        else f'{Path(sys.executable).name} -m abdf1_ros {name}'
+    """Return how a command of the package is called in this environment, to be pasted."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    if shutil.which('ros2') and any(
+            Path(prefix, 'lib', 'abdf1_ros', name).exists() for prefix in filter(None, prefixes)):
+        return f'ros2 run abdf1_ros {name}'
+    script = Path(sys.executable).with_name(name)
+    # Others have commands of these names too, such as Node.js.
+    if not script.is_file() or b'abdf1_ros' not in script.read_bytes()[:1000]:
+        return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
+    return name if shutil.which(name) == str(script) else shlex.quote(str(script))
 
 
 def advice_for(number: int | None) -> str:

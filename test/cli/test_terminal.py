@@ -21,11 +21,13 @@ from collections.abc import Iterator
 import errno
 import io
 import os
+from pathlib import Path
 import signal
 import sys
 
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.terminal import (
+    called,
     colour,
     command_parser,
     interruptible,
@@ -205,3 +207,24 @@ def test_option_that_may_be_meant(
     assert ending.value.code == 2
     assert capsys.readouterr().err == (f'tool read: error: unrecognized arguments: {meant}\n'
                                        '"tool read --help" tells what it takes\n')
+
+
+def test_commands_are_told_as_they_can_be_pasted(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    venv, workspace = tmp_path / 'a venv' / 'bin', tmp_path / 'install'
+    for path, text in ((venv / 'plc', 'from abdf1_ros'), (venv / 'python', ''),
+                       (tmp_path / 'ros' / 'ros2', ''), (workspace / 'lib/abdf1_ros/plc', '')):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding='utf-8')
+        path.chmod(0o755)
+    (venv / 'node').write_text('#!/usr/bin/env node', encoding='utf-8')  # that of Node.js
+    monkeypatch.setattr(sys, 'executable', str(venv / 'python'))
+    monkeypatch.setenv('PATH', '/nowhere')
+    monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
+    assert called('plc') == f"'{venv}/plc'"
+    assert called('node') == f"'{venv}/python' -m abdf1_ros node"
+    monkeypatch.setenv('PATH', f'{venv}:{tmp_path}/ros')
+    assert called('plc') == 'plc'
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{workspace}')
+    assert called('plc') == 'ros2 run abdf1_ros plc'
+    assert called('check') == f"'{venv}/python' -m abdf1_ros check"

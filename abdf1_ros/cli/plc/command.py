@@ -26,6 +26,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import errno
 from pathlib import Path
+import shlex
 import sys
 
 from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
@@ -395,19 +396,21 @@ def _init(options: argparse.Namespace) -> int:
     if found is None:
         return EXIT_FAILED
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}')
-    there = [found.presence]
-    if found.settings.mode == MODES['half']:
-        there = [seen for seen in presence.scan(found.network(network), options.stations)
-                 if seen.is_there]
+    # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
+    others = options.stations if found.settings.mode == MODES['half'] else \
+        [1] if found.presence.station == 0 else []
+    there = [seen for seen in presence.scan(found.network(network), others)
+             if seen.is_there] if others else []
+    there = there or [found.presence]
     for seen in there:
         print(f'station {seen.station}: {seen}')
     target.write(network, found, there)
+    net, map_file = shlex.quote(str(target.net)), shlex.quote(str(target.map))
     print(f'written: {target.net}, {target.map}\n'
           'how to go on: write the addresses that you need into map.csv, then\n'
-          f'  {called("plc")} watch S:0 --station {found.presence.station} --net {target.net}\n'
-          f'  {called("check")} {target.net} {target.map}\n'
-          f'  {called("node")} --ros-args -p net_file:={target.net} '
-          f'-p map_file:={target.map}')
+          f'  {called("plc")} watch S:0 --station {there[0].station} --net {net}\n'
+          f'  {called("check")} {net} {map_file}\n'
+          f'  {called("node")} --ros-args -p net_file:={net} -p map_file:={map_file}')
     return 0
 
 

@@ -24,8 +24,10 @@ import signal
 import subprocess
 import sys
 
+from abdf1_ros.cli.check import examine
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.plan.report import make_report
 import pytest
 from support.cases import for_all
 from support.commands import call, running_simulator, Said
@@ -398,6 +400,16 @@ def test_write_and_read_in_full_duplex(peer: str, capsys: pytest.CaptureFixture[
     line = ('--port', peer, *FULL_DUPLEX, '--station', '2')
     assert call(main, capsys, 'write', 'N7:10', '7', '--yes', *line).status == 0
     assert call(main, capsys, 'read', 'N7:10', *line).good_lines == ['N7:10 7']
+
+
+def test_init_does_not_call_a_full_duplex_port_0_that_answers_to_all(
+        peer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = call(main, capsys, 'init', '--port', peer, '--into', str(tmp_path))
+    assert said.status == 0 and 'watch S:0 --station 1 --net' in said.out
+    found = examine(str(tmp_path / 'net.csv'), str(tmp_path / 'map.csv'))
+    assert found.problems == [] and found.network is not None
+    assert [mapping.station for mapping in found.mappings] == [1]
+    assert make_report(found.network, found.mappings, 0.1).remarks() == []
 
 
 def test_scan_in_full_duplex_tells_what_it_cannot_know(

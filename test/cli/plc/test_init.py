@@ -93,6 +93,8 @@ def test_plc_that_falls_silent_after_it_was_found(
     monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', lambda *_: [])
     assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200']) == 0
     assert 'watch S:0 --station 1 --net' in capsys.readouterr().out
+    mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
+    assert [mapping.station for mapping in mappings] == [1]  # not a map for nobody
 
 
 def test_init_leaves_files_alone_that_are_there(
