@@ -29,9 +29,13 @@ from abdf1_ros.pccc.families import decode_identity, dialect_of, family_of, pars
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.status import check_status, is_address_fault, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
+
+# What libplctag's users report of an SLC 5/05 and of MicroLogix (its issues 121, 479 and 657).
+_PERHAPS_FLAT = ('some SLC and MicroLogix have inputs and outputs with Access Flat only, by the '
+                 'word of the whole image, as in I:5')
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +106,12 @@ def data_of(reply: Packet, address: Address) -> bytes:
     """Return the data of a good reply; RemoteError, in the words of the family, for any other."""
     if reply.sts == 0:
         return reply.data
-    return check_status(reply, family_of(address.plc_type).meanings)
+    try:
+        return check_status(reply, family_of(address.plc_type).meanings)
+    except RemoteError as error:
+        if address.addressing.slot_of(address) is None or not is_address_fault(error):
+            raise
+        raise RemoteError(error.sts, error.ext_sts, f'{error}; {_PERHAPS_FLAT}') from None
 
 
 def write(target: AddressedValues, values: Sequence[float] | str) -> Steps[None]:

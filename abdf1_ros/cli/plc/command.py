@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 import errno
 from pathlib import Path
@@ -351,6 +352,9 @@ def _detect(options: argparse.Namespace) -> int:
     there = found.presence
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
     settings = found.settings
+    with Session(found.network(network)) as session, suppress(LinkError):
+        if ways := presence.io_access(session, there):
+            print(f'inputs and outputs: Access {" or ".join(ways)}')
     whom = f'--station {there.station}' if settings.mode == MODES['half'] else '--peer'
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
     print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '

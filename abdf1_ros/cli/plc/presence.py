@@ -25,10 +25,14 @@ from abdf1_ros.cli.plc.line import free_station, MODES
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.families import accesses_of, dialect_of, parse_address
+from abdf1_ros.pccc.file_search import is_there
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
 
+_SLOTS_TRIED = 8
 _ECHO = bytes(range(1, 17))
 
 # A half-duplex station does not answer at all when a setting is wrong; so these come first.
@@ -105,6 +109,18 @@ def understands(session: Session, station: int) -> bool:
     except Abdf1Error:
         return False
     return True
+
+
+def io_access(session: Session, there: Presence) -> list[str]:
+    """Return with which Access inputs of an SLC or MicroLogix can be read; raises LinkError."""
+    kind = there.identity.plc_type if there.identity else None
+    ways = () if kind is None else accesses_of(kind)
+    if kind is None or Access.FLAT not in ways:
+        return []
+    return [way.value for way in ways if any(
+        session.ask(there.station, is_there(
+            parse_address(f'I:{element}', kind, way), dialect_of(kind, way)))
+        for element in range(_SLOTS_TRIED if way is Access.SLOT else 1))]
 
 
 def ping(session: Session, station: int) -> float:

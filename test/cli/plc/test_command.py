@@ -435,10 +435,11 @@ def test_detect_tries_in_order_and_stops_at_the_first_answer(
                     '500')
     assert said.status == 0, said.err
     assert said.lines[0].startswith('19200 baud, half duplex, BCC: station 2 SLC 5/03')
-    assert said.lines[1].startswith('next: ')
-    assert said.lines[1].endswith(
+    assert said.lines[1] == 'inputs and outputs: Access Slot or Flat'
+    assert said.lines[2].startswith('next: ')
+    assert said.lines[2].endswith(
         f'plc read N7:0 --station 2 --port {port} --baud 19200 --check BCC')
-    assert said.lines[2:] == [
+    assert said.lines[3:] == [
         'net.csv:', 'Station,Mode,Error_Code,Com_Port,Baud,Parity,Timeout',
         f'5,Master,BCC,{port},19200,None,300']
 
