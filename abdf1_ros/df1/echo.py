@@ -39,9 +39,6 @@ _MOST_EXPECTED = 64
 # servers are far away, and Timeout is short.
 _MOST_MISSING = 8
 
-# The first bytes of a frame, which tell it from an answer.
-_HEAD = 2
-
 _CONTROL_SIZE = 2
 
 
@@ -49,27 +46,19 @@ class LineEcho:
     """
     Know the echo of one line; ``is_heard`` tells that it gives back what is sent.
 
-    Where it is ``bytewise``, an echo that has been heard once is taken off byte by byte, so that
-    damage in it does no harm. That is for the master of a half-duplex line: nobody else speaks
-    while he does.
+    In half duplex everybody waits until what he has sent has come back, before he sends again.
     """
 
-    def __init__(self, bytewise: bool) -> None:
+    def __init__(self, is_half_duplex: bool) -> None:
         self.is_heard = False
-        self._is_bytewise = bytewise
+        self._is_half_duplex = is_half_duplex
         self._expected: deque[tuple[int, bytes]] = deque(maxlen=_MOST_EXPECTED)
-        self._at = 0  # bytewise: so much of the first of them has come
-
-    @property
-    def is_expected(self) -> bool:
-        """Tell whether something that was sent on a line with an echo has not come back."""
-        return self.is_heard and bool(self._expected)
 
     def sent(self, frame: bytes, end: int) -> None:
         """Take note of a frame on its way; ``end`` is the position of its last byte."""
-        if self._is_bytewise and not self.is_heard:
-            self._expected.clear()  # only a question tells, not the ACK before it
-        elif self._missing() >= _MOST_MISSING:
+        if self._is_half_duplex and not self.is_heard:
+            self._expected.clear()
+        elif sum(map(_is_message, self._expected)) >= _MOST_MISSING:
             self.is_heard = False
         self._expected.append((end, frame))
 
@@ -79,7 +68,7 @@ class LineEcho:
 
     def forget(self) -> None:
         """Expect nothing to come back."""
-        self.is_heard, self._at = False, 0
+        self.is_heard = False
         self._expected.clear()
 
     def is_ours(self, symbol: Symbol, has_left: Callable[[int], bool]) -> bool:
@@ -88,48 +77,23 @@ class LineEcho:
 
         ACK, NAK and ENQ are alike whoever sends them: they are ours only where an echo is known.
         """
-        if not self._expected or (self._is_bytewise and self.is_heard):
+        if not self._expected:
             return False
         beginning = beginning_of(symbol)
         number = next((number for number, (_, frame) in enumerate(self._expected)
                        if beginning and frame.startswith(beginning)), None)
         if number is None:
-            if symbol is Control.ACK and not self._is_bytewise:
-                self._is_acknowledged(has_left)
+            if symbol is Control.ACK:
+                while self._expected and has_left(self._expected[0][0]):
+                    self.is_heard &= not _is_message(self._expected.popleft())
             return False
-        passed = [self._expected.popleft()[1] for _ in range(number + 1)]
+        passed = [self._expected.popleft() for _ in range(number + 1)]
         if not isinstance(symbol, Control):
             self.is_heard = True
-        elif any(len(frame) > _CONTROL_SIZE for frame in passed):
+        elif any(map(_is_message, passed)):
             self.is_heard = False  # a message of ours would have come before it
         return self.is_heard
 
-    def _is_acknowledged(self, has_left: Callable[[int], bool]) -> None:
-        """Conclude from an ACK that what has left does not come back any more."""
-        while self._expected and has_left(self._expected[0][0]):
-            _, frame = self._expected.popleft()
-            if len(frame) > _CONTROL_SIZE:
-                self.is_heard = False
 
-    def _missing(self) -> int:
-        """Return how many messages have not come back yet."""
-        return sum(len(frame) > _CONTROL_SIZE for _, frame in self._expected)
-
-    def taken_off(self, data: bytes) -> bytes:
-        """
-        Return ``data`` without the echo, on a line that has one and is ``bytewise``.
-
-        The first two bytes of a frame tell it from an answer: what comes in their place shows that
-        the line does not echo any more. Damage in the rest is passed over.
-        """
-        while self._is_bytewise and self.is_expected and data:
-            frame, at = self._expected[0][1], self._at
-            if not data.startswith(frame[at:_HEAD][:len(data)]):
-                self.forget()
-                return frame[:at] + data
-            self._at = min(at + len(data), len(frame))
-            data = data[self._at - at:]
-            if self._at == len(frame):
-                self._expected.popleft()
-                self._at = 0
-        return data
+def _is_message(sent: tuple[int, bytes]) -> bool:
+    return len(sent[1]) > _CONTROL_SIZE

@@ -210,7 +210,7 @@ class Machine:
         self._line_free = -math.inf
         self._reply_size = 0
         self._last_heard = -math.inf
-        self._echo = LineEcho(bytewise=forget_on_send)
+        self._echo = LineEcho(duplex is Duplex.HALF)
         self._due = -math.inf  # the deadline, before a message was heard out
         self._message = _Incoming()
 
@@ -304,7 +304,6 @@ class Machine:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        data = self._echo.taken_off(data)
         if self._forget_on_send and (self._out or not self._is_listening):
             return  # it was said before what it would have to answer
         is_idle = self._resting or self.deadline is None
@@ -341,10 +340,6 @@ class Machine:
         if self._pending is not None:
             self._transmit(self._pending)
         else:
-            # A short rest after an ACK proves nothing: its echo may be held back.
-            if self._forget_on_send and self._echo.is_expected \
-                    and now >= self._line_free + MIN_RESPONSE_TIME:
-                self._echo.forget()
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
