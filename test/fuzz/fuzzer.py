@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
+import shlex
 import sys
 
 _TARGET = '--target='
@@ -39,7 +40,8 @@ def main() -> None:
     (name,) = (word.removeprefix(_TARGET) for word in sys.argv if word.startswith(_TARGET))
     with atheris.instrument_imports(include=['abdf1_ros']):
         target = importlib.import_module(f'fuzz.{name}')
-    sys.argv[0] = f'{sys.executable} {Path(__file__).resolve()}'  # a merge starts this anew
+    # A merge starts this anew.
+    sys.argv[0] = shlex.join([sys.executable, str(Path(__file__).resolve())])
     atheris.Setup(sys.argv, target.one_input)
     atheris.Fuzz()
 
