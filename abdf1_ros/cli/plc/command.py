@@ -408,7 +408,10 @@ def _init(options: argparse.Namespace) -> int:
     there = there or [found.presence]
     for seen in there:
         print(f'station {seen.station}: {seen}')
-    target.write(network, found, there)
+    with Session(found.network(network)) as session:
+        listed = {seen.station: files.listed(session, seen.station, seen.identity)
+                  for seen in there}
+    target.write(network, found, there, listed)
     net, map_file = shlex.quote(str(target.net)), shlex.quote(str(target.map))
     print(f'written: {target.net}, {target.map}\n'
           'how to go on: write the addresses that you need into map.csv, then\n'

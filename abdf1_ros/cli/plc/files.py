@@ -19,10 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.families import dialect_of, family_of, layout_of
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import Place, Problem
 from abdf1_ros.settings.mapping import Mapping
@@ -61,6 +62,16 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
         found = session.ask(station, search.look_for(number))
         if found is not None:
             yield found
+
+
+def listed(session: Session, station: int, identity: Identity | None) -> list[DataFile]:
+    """Return the files of the processor's own list, none where it has no list that is known."""
+    search = family_of(identity.plc_type).file_search if identity and identity.plc_type else None
+    steps = search.directory(identity.processor) if search and identity else None
+    try:
+        return session.ask(station, steps) if steps else []
+    except (RemoteError, LinkError, FormatError):
+        return []
 
 
 def outside(found: Sequence[DataFile], mappings: Sequence[Mapping], station: int,

@@ -16,14 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from abdf1_ros.cli.plc import files
 from abdf1_ros.cli.plc.data import processor_cell
 from abdf1_ros.cli.plc.detect import Found
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.presence import Presence
+from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.network import Network
 
@@ -66,11 +68,12 @@ class Files:
                 raise Problem(str(path), 'is there already and stays as it is; name another '
                                          'folder with --into')
 
-    def write(self, network: Network, found: Found, stations: Sequence[Presence]) -> None:
-        """Write both; raises OSError."""
+    def write(self, network: Network, found: Found, stations: Sequence[Presence],
+              listed: Mapping[int, Sequence[DataFile]]) -> None:
+        """Write both, with the files that stations have listed; raises OSError."""
         numbers = [presence.station for presence in stations]
         self.net.write_text(net_csv(network, found, numbers) + '\n', encoding='utf-8')
-        self.map.write_text(_HEAD + ''.join(map_rows(stations)), encoding='utf-8')
+        self.map.write_text(_HEAD + ''.join(map_rows(stations, listed)), encoding='utf-8')
 
 
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
@@ -82,8 +85,9 @@ def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
             + ','.join(map(str, row)))
 
 
-def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
-    """Yield a row that works and some rows as comments, for each station."""
+def map_rows(stations: Iterable[Presence],
+             listed: Mapping[int, Sequence[DataFile]]) -> Iterable[str]:
+    """Yield a row that works and some rows as comments, for each station and its files."""
     for presence in stations:
         number, identity = presence.station, presence.identity
         family = identity.plc_type if identity else None
@@ -100,3 +104,7 @@ def map_rows(stations: Iterable[Presence]) -> Iterable[str]:
         yield f'# interlocks_{number},Read,B3:0/0,{tail},8,250,{guard},,\n'
         yield f'# setpoint_{number},Write,N7:100,{tail},1,,,0,2000\n'
         yield f'# ros_alive_{number},Heartbeat,N7:101,{tail},,1000,,,\n'
+        for row in files.map_rows(listed.get(number, ()), number, family,
+                                  processor_cell(identity.processor)):
+            yield f'{row}\n' if row.startswith('#') else \
+                f'# {row.replace(",", f"_{number},", 1)},,,\n'

@@ -74,7 +74,10 @@ def test_rows_that_are_only_comments_are_good_rows_too(
             for line in path.read_text(encoding='utf-8').splitlines()]
     path.write_text('\n'.join(rows), encoding='utf-8')
     mappings, problems = load_mappings(str(path))
-    assert (len(mappings), problems) == (10, [])
+    assert (len(mappings), problems) == (15, [])
+    # What the SLC lists of its files; the PLC-5 has no such list.
+    assert [mapping.cell('Address') for mapping in mappings if mapping.station == 2][5:] == [
+        'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L11:0']
     guarded = [mapping.tag for mapping in mappings if mapping.publish_while is not None]
     assert guarded == ['interlocks_1', 'interlocks_2']
 
