@@ -67,34 +67,33 @@ class Agenda:
 
     def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
-        job = self._next(now, busy)
+        job = self._usual(now, busy) if self._interlocks is None else self._own_first(now, busy)
         if job is None or isinstance(job, JobTask):
             return job
-        return self._tasks.start(job, now)
+        return JobTask(self._tasks, job, now)
 
-    def _next(self, now: float, busy: Container[int]) -> Job | JobTask | None:
-        if self._interlocks is None:
-            return self._usual(now, busy)
-        if self._own_in_a_row < MAX_OWN_IN_A_ROW:
-            return self._own(now, busy) or self._usual(now, busy)
-        self._own_in_a_row = 0
-        return self._read(now, busy) or self._own(now, busy) or self._usual(now, busy)
-
-    def _own(self, now: float, busy: Container[int]) -> Job | None:
-        """Return a heartbeat or fallback; these do not count as writes in a row (rule 11)."""
+    def _own_first(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+        """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
+        is_reads_turn = self._own_in_a_row >= MAX_OWN_IN_A_ROW
+        self._own_in_a_row *= not is_reads_turn
+        if is_reads_turn and (read := self._read(now, busy)):
+            return read
         own = self._interlocks.next(now, busy) if self._interlocks else None
         self._own_in_a_row += own is not None
-        return own
+        return own or self._usual(now, busy)
 
     def _usual(self, now: float, busy: Container[int]) -> Job | JobTask | None:
-        if self._writes_in_a_row < MAX_WRITES_IN_A_ROW and (write := self._write(now, busy)):
+        has_writes = self._writes.waiting or self._tasks.waiting
+        if has_writes and self._writes_in_a_row < MAX_WRITES_IN_A_ROW \
+                and (write := self._write(now, busy)):
             return write
-        return self._check(now, busy) or self._refresh(now, busy) or self._read(now, busy) \
-            or self._write(now, busy)
+        job = self._checks.is_due(now) and self._check(now, busy) \
+            or self._interlocks and self._refresh(now, busy) or self._read(now, busy)
+        return job or has_writes and self._write(now, busy) or None
 
     def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a new write, or the next packet of one under way, in turns."""
-        under_way = self._tasks.waiting(busy)
+        under_way = self._tasks.first(busy)
         write = None
         if under_way is None or not self._has_begun_write:
             write = self._writes.next(now, busy)
@@ -106,22 +105,22 @@ class Agenda:
 
     def _check(self, now: float, busy: Container[int]) -> Job | None:
         """Return a check that is due; the turn of the reads comes after it."""
-        if not self._checks.is_due(now) or self._reads.is_due(self._last_check):
+        if self._reads.is_due(self._last_check):
             return None
         check = self._checks.next(now, busy, self._probe_from(now))
         if check is None:
             return None
         self._last_check = now
         self._last_probe_was_check |= check.is_probe
-        if self._writes:
+        if self._writes.waiting:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
 
     def _refresh(self, now: float, busy: Container[int]) -> Job | None:
         """Return a fallback that stands (rule 8); the turn of the reads comes after it."""
-        if self._interlocks is None or self._reads.is_due(self._last_refresh):
+        if self._reads.is_due(self._last_refresh):
             return None
-        own = self._interlocks.refresh(now, busy)
+        own = self._interlocks.refresh(now, busy) if self._interlocks else None
         if own is not None:
             self._last_refresh = now
         return own

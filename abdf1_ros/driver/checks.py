@@ -173,8 +173,9 @@ class Checks:
         return None if math.isinf(self._next_due) else self._next_due
 
     def is_due(self, now: float) -> bool:
-        for station in self._requests.take():
-            self._add_request(station, now)
+        if self._requests.items:
+            for station in self._requests.take():
+                self._add_request(station, now)
         return now >= self._next_due
 
     def next(self, now: float, busy: Container[int], probe_from: float  # noqa: A003

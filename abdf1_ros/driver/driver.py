@@ -229,7 +229,8 @@ class Driver:
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the command that has the line next, not for a ``busy`` station."""
-        self._sort_inbox(now)  # the machine has let expire what has waited too long
+        if self._inbox.items:
+            self._sort_inbox(now)  # the machine has let expire what has waited too long
         return self._agenda.next(now, busy)
 
     def next_due(self) -> float | None:
@@ -247,7 +248,7 @@ class Driver:
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
         return min(self._writes.next_expiry, self._tasks.next_expiry,
-                   self.interlocks.next_expiry(), self._read_backs.next_expiry)
+                   self.interlocks.next_expiry, self._read_backs.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
         if station.active:

@@ -100,11 +100,11 @@ class CounterGuard(Guard):
 
 
 class Guards:
-    """The guards of all rows with Publish_While."""
+    """The guards of all rows with Publish_While; ``counters`` has those of counters, by tag."""
 
     def __init__(self, points: Iterable[ReadPoint]) -> None:
         self._runs: dict[int, RunGuard] = {}
-        self._counters: dict[str, CounterGuard] = {}
+        self.counters: dict[str, CounterGuard] = {}
         for point in points:
             condition, station = point.mapping.publish_while, point.mapping.station
             if condition is None:
@@ -112,7 +112,7 @@ class Guards:
             if condition.tag is None:
                 self._runs.setdefault(station, RunGuard()).add(point)
             else:  # a tag is there once in the map
-                self._counters.setdefault(condition.tag, CounterGuard(condition.tag)).add(point)
+                self.counters.setdefault(condition.tag, CounterGuard(condition.tag)).add(point)
 
     def status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""
@@ -126,8 +126,7 @@ class Guards:
     def values_read(self, points: Sequence[ReadPoint], places: Sequence[slice], data: bytes,
                     now: float) -> None:
         """Give the counters among the words that were read to their guards."""
-        if self._counters:
-            for point, place in zip(points, places, strict=True):
-                counter = self._counters.get(point.mapping.tag)
-                if counter is not None:
-                    counter.read(data[place], now)
+        for point, place in zip(points, places, strict=True):
+            counter = self.counters.get(point.mapping.tag)
+            if counter is not None:
+                counter.read(data[place], now)

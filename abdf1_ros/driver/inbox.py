@@ -27,18 +27,18 @@ class Inbox(Generic[_Item]):
     """
     Hand items from any number of threads to the one that takes them, in order, each once.
 
-    A closed inbox takes nothing. There is no lock: every step is one atomic operation of a deque.
-    The items are never copied and then cleared: an item that another thread adds in between would
-    be lost.
+    ``items`` are those that wait. A closed inbox takes nothing. There is no lock: every step is
+    one atomic operation of a deque. The items are never copied and then cleared: an item that
+    another thread adds in between would be lost.
     """
 
     def __init__(self, is_open: bool = True) -> None:
-        self._items: deque[_Item] = deque()
+        self.items: deque[_Item] = deque()
         self._is_open = is_open
 
     def __len__(self) -> int:
         """Return how many items wait."""
-        return len(self._items)
+        return len(self.items)
 
     def open(self) -> None:  # noqa: A003
         """Take items from now on."""
@@ -51,23 +51,20 @@ class Inbox(Generic[_Item]):
 
     def put(self, item: _Item) -> bool:
         """Add an item; return False when the inbox is closed, and nobody will take it."""
-        self._items.append(item)
+        self.items.append(item)
         if self._is_open:
             return True
         # It was closed before, or just now: then the other thread may have taken the item.
         try:
-            self._items.remove(item)
+            self.items.remove(item)
         except ValueError:
             return True
         return False
 
     def take(self) -> Iterator[_Item]:
         """Yield and remove what waits, also what is added meanwhile."""
-        return self._each() if self._items else iter(())
-
-    def _each(self) -> Iterator[_Item]:
         while True:
             try:
-                yield self._items.popleft()
+                yield self.items.popleft()
             except IndexError:
                 return

@@ -112,7 +112,8 @@ class Interlocks:
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
     row into our own table; ``report`` gets the result of each fallback that was written, ``tell``
     why a PLC does not take one, ``warn`` that a heartbeat is not ours. Only ``executor_ran``,
-    ``wind_down`` and ``resume`` may be called from another thread.
+    ``wind_down`` and ``resume`` may be called from another thread. ``next_expiry`` is when a
+    fallback of our own table is due (clock value in s).
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
@@ -141,7 +142,7 @@ class Interlocks:
         self._store = store
         self._report = report
         self._tell, self._warn = tell, warn
-        self._due = math.inf
+        self._due = self.next_expiry = math.inf
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
         self._messages: dict[str, float] = {}
@@ -264,6 +265,7 @@ class Interlocks:
     def _plan(self, *plcs: _Plc) -> None:
         for plc in plcs:
             plc.plan()
+        self.next_expiry = self._ours.due if self._has_begun else math.inf
         self._due = min((plc.due for plc in self._plcs.values()), default=math.inf)
 
     # Who goes next
@@ -432,7 +434,7 @@ class Interlocks:
             return
         if self._is_ending and not self._are_all_due:
             self._make_all_due(now)
-        if now < self._ours.due:
+        if now < self.next_expiry:
             return
         youngest = self._writes.youngest()
         for row in self._ours.fallbacks:
@@ -441,7 +443,7 @@ class Interlocks:
                 self._store(write)
                 self._fallback_ended(row, write, Outcome.WRITTEN, now)
                 row.judge(now, -math.inf)
-        self._ours.plan()
+        self._plan(self._ours)
 
     def _make_all_due(self, now: float) -> None:
         for row in self.fallbacks:
@@ -452,10 +454,6 @@ class Interlocks:
             beat.due = now
         self._are_all_due = True
         self._plan(*self._plcs.values(), self._ours)
-
-    def next_expiry(self) -> float:
-        """Return when a fallback of our own table is due (clock value in s)."""
-        return self._ours.due if self._has_begun else math.inf
 
     def next_due(self) -> float:
         """Return when there is something to write (clock value in s), infinite for never."""

@@ -70,9 +70,10 @@ class JobTasks:
     """
     All jobs under way, and the transaction numbers of their commands.
 
-    ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts
-    the replies. ``char_time`` is seconds a character. ``next_expiry`` is when a waiting command
-    will have waited too long (clock value in s), infinite for never.
+    All are in ``under_way``; the next command of those in ``waiting`` waits to be sent.
+    ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts the
+    replies. ``char_time`` is seconds a character. ``next_expiry`` is when a waiting command will
+    have waited too long (clock value in s), infinite for never.
     """
 
     def __init__(self, station: int, first_tns: int, char_time: float = 0.0) -> None:
@@ -81,22 +82,17 @@ class JobTasks:
         self._station = station
         self._tns = first_tns
         self._last_tns: dict[int, int] = {}
-        self._tasks: set[JobTask] = set()
-        self._waiting: deque[JobTask] = deque()
+        self.under_way: set[JobTask] = set()
+        self.waiting: deque[JobTask] = deque()
         self.next_expiry = math.inf
 
     def start(self, job: Job, now: float) -> JobTask:
         """Return the task of a new job with its first command."""
-        task = JobTask(self, job, now)
-        self._tasks.add(task)
-        return task
+        return JobTask(self, job, now)
 
-    def waiting(self, busy: Container[int]) -> JobTask | None:
-        """Return a task whose next command waits to be sent, but not to a ``busy`` station."""
-        for task in self._waiting:
-            if task.station not in busy:
-                return task
-        return None
+    def first(self, busy: Container[int]) -> JobTask | None:
+        """Return the first that waits, but not for a ``busy`` station."""
+        return next((task for task in self.waiting if task.station not in busy), None)
 
     def take(self, task: JobTask, now: float) -> JobTask:
         """Return a waiting task that is now to be sent."""
@@ -106,42 +102,38 @@ class JobTasks:
 
     def expire(self, now: float) -> None:
         """End the jobs whose next command has waited too long."""
-        for task in [task for task in self._waiting if now >= task.expires]:
+        for task in [task for task in self.waiting if now >= task.expires]:
             self._stop_waiting(task)
             task.fail(CommandExpired())
 
     def _stop_waiting(self, task: JobTask) -> None:
-        self._waiting.remove(task)
-        self.next_expiry = min((task.expires for task in self._waiting), default=math.inf)
+        self.waiting.remove(task)
+        self.next_expiry = min((task.expires for task in self.waiting), default=math.inf)
 
     def fail(self, error: LinkError) -> None:
         """End every job with ``error``."""
-        for task in list(self._tasks):
+        for task in list(self.under_way):
             task.fail(error)
-        self._waiting.clear()
+        self.waiting.clear()
         self.next_expiry = math.inf
 
     def new_command(self, station: int, request: Request) -> Packet:
-        """Return the command for a request, with a transaction number of its own."""
+        """
+        Return the command for a request.
+
+        Its transaction number is never the one that this station had last.
+        """
         cmd, data = request
-        return Packet(station, self._station, cmd, 0, self._next_tns(station), data)
-
-    def advanced(self, task: JobTask) -> None:
-        """Take note that a task has its next command ready."""
-        self._waiting.append(task)
-        self.next_expiry = min(self.next_expiry, task.expires)
-
-    def ended(self, task: JobTask) -> None:
-        """Take note that a task is done."""
-        self._tasks.discard(task)
-
-    def _next_tns(self, station: int) -> int:
-        """Return the next transaction number, never the one this station had last."""
         self._tns = self._tns + 1 & 0xFFFF
         if self._tns == self._last_tns.get(station):
             self._tns = self._tns + 1 & 0xFFFF
         self._last_tns[station] = self._tns
-        return self._tns
+        return Packet(station, self._station, cmd, 0, self._tns, data)
+
+    def advanced(self, task: JobTask) -> None:
+        """Take note that a task has its next command ready."""
+        self.waiting.append(task)
+        self.next_expiry = min(self.next_expiry, task.expires)
 
 
 class JobTask:
@@ -157,6 +149,7 @@ class JobTask:
         self._tasks = tasks
         self._steps = job.steps(now)
         self.command = tasks.new_command(job.station, next(self._steps))
+        tasks.under_way.add(self)
 
     def reply(self, packet: Packet) -> None:
         """Take the reply and go on to the next request."""
@@ -176,12 +169,11 @@ class JobTask:
         except StopIteration:
             self._end(None)
             return
-        except Abdf1Error as error:
+        except Exception as error:
             self._end(error)
+            if not isinstance(error, Abdf1Error):
+                raise  # a bug
             return
-        except Exception as bug:
-            self._end(bug)
-            raise
         self.sent, self.reply_size = False, 0
         if self.job.patience:
             line_time = len(self.command.encode()) * self._tasks.char_time
@@ -190,5 +182,5 @@ class JobTask:
         self._tasks.advanced(self)
 
     def _end(self, error: Exception | None) -> None:
-        self._tasks.ended(self)
+        self._tasks.under_way.discard(self)
         self.job.ended(error)

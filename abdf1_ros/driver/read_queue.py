@@ -36,8 +36,8 @@ import math
 
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.points import ReadPoint
-from abdf1_ros.driver.transactions import words_of
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.steps import words_in
 from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
 from abdf1_ros.plan.planner import Block
 
@@ -58,9 +58,9 @@ class ReadJob(Job):
     station does not count. ``is_refresh`` tells that a write has changed words of the block, the
     last time at ``refreshed``. ``started`` is when the read under way or the last one began, and
     ``late`` was ``Machine.late`` then; its last packet was ``asked`` for. All packets of a read
-    have to come within ``longest_read`` seconds. ``is_to_repeat`` tells that the last read was
-    dropped. ``ticket`` is the number of its valid entry in the queue. ``take`` is told of the end
-    of each packet.
+    have to come within ``longest_read`` seconds. ``is_under_way`` tells that there are packets
+    already, and more to come, ``is_to_repeat`` that the last read was dropped. ``ticket`` is the
+    number of its valid entry in the queue. ``take`` is told of the end of each packet.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
@@ -71,9 +71,10 @@ class ReadJob(Job):
         self.points = tuple(points)
         # Needed at every read, and always the same.
         self._commands = block.commands()
+        self._dialect = block.dialect
         self.extent = block.extent
         self._reply_sizes = block.reply_sizes()
-        self.reply_size = self._reply_sizes[0]
+        self.reply_size, self.is_under_way = self._reply_sizes[0], False
         self.slices = [block.slice_of(point.mapping) for point in points]
         self.heartbeats = [(mapping, block.slice_of(mapping)) for mapping in block.mappings
                            if mapping.heartbeat]
@@ -92,18 +93,14 @@ class ReadJob(Job):
         self._last_done: float | None = None
         self._packets: list[bytes] = []
 
-    @property
-    def is_under_way(self) -> bool:
-        """Tell whether there are packets already, and more to come."""
-        return bool(self._packets)
-
     def steps(self, now: float) -> Steps[None]:
-        """Read one packet; raises LinkError, and like ``words_of``."""
+        """Read one packet; raises LinkError, and like ``words_in``."""
         self.asked, number = now, len(self._packets)
         if not number:
             self.started, self.late, self.is_to_repeat = now, self._line.late, False
         reply = yield self._commands[number]
-        self._packets.append(words_of(self.block, number, reply))
+        request = self.block.requests[number]
+        self._packets.append(words_in(reply, request.start, request.words, self._dialect))
 
     def ended(self, error: Exception | None) -> None:
         """Let the packet be made use of; after an error the next read begins anew."""
@@ -114,7 +111,7 @@ class ReadJob(Job):
     def data(self) -> bytes | None:
         """Return all words after the last packet, None before."""
         if len(self._packets) < len(self._commands):
-            self.reply_size = self._reply_sizes[len(self._packets)]
+            self.reply_size, self.is_under_way = self._reply_sizes[len(self._packets)], True
             return None
         data = b''.join(self._packets)
         self._forget()
@@ -142,7 +139,7 @@ class ReadJob(Job):
 
     def _forget(self) -> None:
         self._packets.clear()
-        self.reply_size = self._reply_sizes[0]
+        self.reply_size, self.is_under_way = self._reply_sizes[0], False
 
     def done(self, now: float) -> None:
         """Take note of a good read."""
@@ -182,7 +179,9 @@ class ReadQueue:
 
     def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
         """Forget ``old`` jobs and add ``new`` ones, all due at once."""
-        added = list(new)
+        added, old = list(new), list(old)
+        for job in old:
+            job.ticket = 0  # of no entry
         self.jobs.difference_update(old)
         self.jobs.update(added)
         self._poll_cycle = poll_cycle(job.block for job in self.jobs)
@@ -190,13 +189,15 @@ class ReadQueue:
             self.put(job, now)
 
     def put(self, job: ReadJob, due: float) -> None:
-        """Let a job wait until it is due at ``due`` (clock value in s)."""
+        """Let a job wait until it is due at ``due`` (clock value in s), unless it was replaced."""
+        if job not in self.jobs:
+            return
         job.due, job.ticket = due, next(self._tickets)
         heap = self._heaps.setdefault(job.block.period, [])
         heapq.heappush(heap, (due, job.ticket, job))
         if len(heap) > _MOST_ENTRIES * len(self.jobs):
             # A refresh of a slow read leaves an old entry, which would stay until it had been due.
-            heap[:] = filter(self._counts, heap)
+            heap[:] = (entry for entry in heap if entry[1] == entry[2].ticket)
             heapq.heapify(heap)
 
     def take(self, now: float) -> ReadJob | None:
@@ -235,13 +236,8 @@ class ReadQueue:
         """Return the heaps that begin with a job that is due, each with a valid entry."""
         heaps = []
         for heap in self._heaps.values():
-            while heap and not self._counts(heap[0]):
+            while heap and heap[0][1] != heap[0][2].ticket:
                 heapq.heappop(heap)
             if heap and heap[0][0] <= now:
                 heaps.append(heap)
         return heaps
-
-    def _counts(self, entry: _QueueEntry) -> bool:
-        """Tell whether this entry is its job's last one, and the job has not been replaced."""
-        _, ticket, job = entry
-        return ticket == job.ticket and job in self.jobs

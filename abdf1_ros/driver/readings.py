@@ -94,8 +94,13 @@ class Readings:
 
     def _packet_ended(self, job: ReadJob, error: Exception | None) -> None:
         try:
-            if error is None:
-                self._packet_read(job)
+            if error is None and (reason := job.why_too_old()):
+                job.begin_anew()
+                for point in job.points:
+                    point.fail(f'read again: {reason}')
+            elif error is None:
+                if (data := job.data()) is not None:
+                    self._read(job, data)
             elif isinstance(error, LinkError):
                 self.link_failed(job.station, job.points, error)
             elif isinstance(error, RemoteError):
@@ -106,20 +111,13 @@ class Readings:
         finally:
             self.reads.ended(job, self._line.now)
 
-    def _packet_read(self, job: ReadJob) -> None:
-        reason = job.why_too_old()
-        if reason:
-            job.begin_anew()
-            for point in job.points:
-                point.fail(f'read again: {reason}')
-        elif (data := job.data()) is not None:
-            self._read(job, data)
-
     def _read(self, job: ReadJob, data: bytes) -> None:
         """Update the points for which this read was made."""
         now = self._line.now
-        self._read_backs.read(job.block, data, job.started, now)
-        self.guards.values_read(job.points, job.slices, data, now)
+        if self._read_backs.next_expiry != math.inf:
+            self._read_backs.read(job.block, data, job.started, now)
+        if self.guards.counters:
+            self.guards.values_read(job.points, job.slices, data, now)
         if self.read_back is not None:
             for mapping, place in job.heartbeats:
                 self.read_back(mapping, data[place], job.started)

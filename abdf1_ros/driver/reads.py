@@ -69,8 +69,25 @@ class Reads:
             self._due.put(job, now)
 
     def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
-        """Return a probe if one may be sent, or else the next read that is due."""
-        return (self._aside and self._probe(now, busy)) or self._first(now, busy)
+        """
+        Return a probe if one may be sent, or else the next read that is due.
+
+        It is of a station that answers and is not ``busy``.
+        """
+        if self._aside and (job := self._probe(now, busy)):
+            return job
+        passed_over = []
+        while (job := self._due.take(now)) is not None:
+            if not self._stations[job.station].replies_in_time:
+                self._set_aside(job)
+            elif job.station in busy:
+                passed_over.append(job)
+            else:
+                job.is_probe = False
+                break
+        for other in passed_over:
+            self._due.put(other, other.due)
+        return job
 
     def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
@@ -88,21 +105,6 @@ class Reads:
         job.due, job.is_probe = now, True
         if jobs:
             self._aside[station] = jobs  # to the end: the next probe goes to another station
-        return job
-
-    def _first(self, now: float, busy: Container[int]) -> ReadJob | None:
-        """Return the next read that is due, of a station that answers and is not ``busy``."""
-        passed_over = []
-        while (job := self._due.take(now)) is not None:
-            if not self._stations[job.station].replies_in_time:
-                self._set_aside(job)
-            elif job.station in busy:
-                passed_over.append(job)
-            else:
-                job.is_probe = False
-                break
-        for other in passed_over:
-            self._due.put(other, other.due)
         return job
 
     def is_due(self, now: float) -> bool:

@@ -97,7 +97,7 @@ class Requests:
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command of the request under way, or the first of the next one."""
-        under_way = self._tasks.waiting(busy)
+        under_way = self._tasks.first(busy)
         if under_way is not None:
             return self._tasks.take(under_way, now)
         request = next(self._waiting.take(), None)

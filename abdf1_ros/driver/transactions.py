@@ -18,37 +18,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
+from abdf1_ros.df1.packet import BROADCAST, is_local_status
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
-from abdf1_ros.pccc.steps import data_of, words_in
-from abdf1_ros.pccc.values import Values
-from abdf1_ros.plan.planner import Block
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.pccc.steps import data_of
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')
-
-
-def words_of(block: Block, number: int, reply: Packet) -> bytes:
-    """
-    Return the words in the reply to one request of a block.
-
-    Raises RemoteError, or FormatError for a reply that cannot be used.
-    """
-    request = block.requests[number]
-    return words_in(reply, request.start, request.words, block.dialect)
-
-
-def read_block(block: Block) -> Steps[bytes]:
-    """Read all words of a block; raises LinkError, and like ``words_of``."""
-    data = b''
-    for number, command in enumerate(block.commands()):
-        data += words_of(block, number, (yield command))
-    return data
 
 
 def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
@@ -104,9 +83,3 @@ def _ended_early(write: Write, outcome: Outcome, now: float, done: int,
         return write.result(outcome, str(error), now, done, error)
     detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
     return write.result(Outcome.PARTLY, detail, now, done, error)
-
-
-def read_values(mapping: Mapping, block: Block) -> Steps[Values]:
-    """Read a block and return the raw values of one mapping; raises like ``read_block``."""
-    words = yield from read_block(block)
-    return mapping.codec.decode(words[block.slice_of(mapping)])

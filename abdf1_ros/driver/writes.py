@@ -61,11 +61,11 @@ class WriteQueue:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
 
-    ``report`` gets the results. ``tx_delay`` (s) comes before each transmission. A write to a
-    silent station is a probe; one that ``stations.probes`` does not admit ends unsent.
-    ``message_ended`` is called for each that had the line, ``message_expired`` for each that was
-    too old before. Another thread may only ask for the length. ``next_expiry`` is when ``expire``
-    has something to do (clock value in s).
+    They are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
+    transmission. A write to a silent station is a probe; one that ``stations.probes`` does not
+    admit ends unsent. ``message_ended`` is called for each that had the line, ``message_expired``
+    for each that was too old before. Another thread may only ask for the length. ``next_expiry``
+    is when ``expire`` has something to do (clock value in s).
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
@@ -78,12 +78,12 @@ class WriteQueue:
         self._report = report
         # It does not count as waiting: it comes before a probe, and before the command.
         self._slack = 2 * tx_delay
-        self._waiting: deque[Write] = deque()
+        self.waiting: deque[Write] = deque()
         self.next_expiry = math.inf
 
     def __len__(self) -> int:
         """Return how many wait."""
-        return len(self._waiting)
+        return len(self.waiting)
 
     def add(self, write: Write, now: float) -> None:
         """
@@ -96,17 +96,17 @@ class WriteQueue:
         """
         self.next_expiry = min(self.next_expiry, self._expiry(write))
         older = [] if write.is_pulse else [
-            old for old in self._waiting if old.mapping is write.mapping]
+            old for old in self.waiting if old.mapping is write.mapping]
         if not older:
-            self._waiting.append(write)
+            self.waiting.append(write)
             return
-        at = self._waiting.index(older[-1])
+        at = self.waiting.index(older[-1])
         is_overlapped = any(
-            map(write.overlaps, itertools.islice(self._waiting, at + 1, None)))
+            map(write.overlaps, itertools.islice(self.waiting, at + 1, None)))
         if len(older) > 1 or not is_overlapped:
-            self._waiting.remove(older[-1])
+            self.waiting.remove(older[-1])
             self._report(older[-1].result(Outcome.SUPERSEDED, '', now))
-        self._waiting.insert(len(self._waiting) if is_overlapped else at, write)
+        self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
 
     def next(self, now: float, busy: Container[int] = ()) -> MessageJob | None:  # noqa: A003
         """
@@ -115,13 +115,11 @@ class WriteQueue:
         Writes to stations in ``busy`` keep waiting, and so do writes of words that are being
         written: the packets of two writes must not mix.
         """
-        if not self._waiting:
-            return None
         self.expire(now)
         write = self._first_free(busy)
         if write is None:
             return None
-        self._waiting.remove(write)
+        self.waiting.remove(write)
         self._writing.begin(write)
         return MessageJob(write, self._writing, self, self._slack)
 
@@ -135,7 +133,7 @@ class WriteQueue:
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that does not have to wait."""
         held_up: set[int] = set()
-        for write in self._waiting:
+        for write in self.waiting:
             station = write.mapping.station
             if station in busy or station in held_up:
                 continue
@@ -151,7 +149,7 @@ class WriteQueue:
         By the ``id`` of the mapping, of messages that wait or are under way.
         """
         found: dict[int, float] = {}
-        for write in itertools.chain(self._waiting, self._writing.under_way):
+        for write in itertools.chain(self.waiting, self._writing.under_way):
             if write.mapping.fallback is not None and not write.is_own:
                 key = id(write.mapping)
                 found[key] = max(write.requested, found.get(key, -math.inf))
@@ -160,10 +158,10 @@ class WriteQueue:
     def expire(self, now: float) -> None:
         """End the writes that are not to be sent any more."""
         self.next_expiry = math.inf
-        for write in list(self._waiting):
+        for write in list(self.waiting):
             reason = self._reject_reason(write, now)
             if reason:
-                self._waiting.remove(write)
+                self.waiting.remove(write)
                 self._report(write.result(Outcome.NOT_SENT, reason, now))
                 self.message_expired(write)
             else:
@@ -176,9 +174,9 @@ class WriteQueue:
 
     def drop(self, reason: str, now: float, mapping: Mapping | None = None) -> None:
         """End the waiting writes, of one mapping or all, without sending them."""
-        dropped = [write for write in self._waiting if mapping in (None, write.mapping)]
+        dropped = [write for write in self.waiting if mapping in (None, write.mapping)]
         for write in dropped:
-            self._waiting.remove(write)
+            self.waiting.remove(write)
             self._report(write.result(Outcome.NOT_SENT, reason, now))
 
     def _expiry(self, write: Write) -> float:

@@ -57,16 +57,16 @@ def test_job_is_one_command_after_the_other() -> None:
     job, tasks = TwoRequests(), JobTasks(OURS, 0x10)
     task = tasks.start(job, NOW)
     assert task.command == Packet(1, OURS, 0x0F, 0, 0x11, b'a')
-    assert tasks.waiting(()) is None  # whoever has started it sends it
+    assert tasks.first(()) is None  # whoever has started it sends it
     task.sent = True
     task.reply(task.command.reply(b'one'))
-    assert (tasks.waiting((1,)), tasks.waiting((2,))) == (None, task)
+    assert (tasks.first((1,)), tasks.first((2,))) == (None, task)
     assert tasks.take(task, NOW) is task
-    assert tasks.waiting(()) is None
+    assert tasks.first(()) is None
     assert (task.command, task.sent) == (Packet(1, OURS, 0x0F, 0, 0x12, b'b'), False)
     task.reply(task.command.reply(b'two'))
     assert (job.replies, job.errors) == ([b'one', b'two'], [None])
-    assert (tasks.transactions, tasks.waiting(())) == (2, None)
+    assert (tasks.transactions, tasks.first(())) == (2, None)
 
 
 def test_size_of_the_reply_is_that_of_the_first_command() -> None:
@@ -95,7 +95,7 @@ def test_all_jobs_end_with_the_port() -> None:
     first.reply(first.command.reply(b'one'))
     tasks.fail(PortLost('unplugged'))
     assert [str(error) for job in jobs for error in job.errors] == ['port lost: unplugged'] * 2
-    assert tasks.waiting(()) is None
+    assert tasks.first(()) is None
 
 
 def test_error_in_a_job_ends_it() -> None:
@@ -110,7 +110,7 @@ def test_error_in_a_job_ends_it() -> None:
         task.reply(task.command.reply())
     tasks.fail(PortLost('unplugged'))  # there is nothing left to be ended
     assert [type(error) for error in job.errors] == [ZeroDivisionError]
-    assert tasks.waiting(()) is None
+    assert tasks.first(()) is None
 
 
 def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> None:
@@ -159,4 +159,4 @@ def test_job_ends_whose_next_command_has_waited_too_long(after: float, errors: i
     task.reply(task.command.reply())
     tasks.expire(task.expires + after)
     assert [str(error) for error in job.errors] == ['too old to be sent'] * errors
-    assert (tasks.waiting(()) is None) == bool(errors)
+    assert (tasks.first(()) is None) == bool(errors)

@@ -20,19 +20,14 @@ from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.driver.transactions import (
-    carry_out,
-    read_block,
-    read_values,
-    REWRITTEN,
-)
+from abdf1_ros.driver.transactions import carry_out, REWRITTEN
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.dialect import Request, Steps
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.pccc.steps import echo, identify
-from abdf1_ros.plan.line_model import LineModel
-from abdf1_ros.plan.planner import Block, Planner
-from abdf1_ros.settings.network import Network
+from abdf1_ros.pccc.slc.dialect import SlcDialect
+from abdf1_ros.pccc.steps import echo, identify, words_in
 import pytest
 from support.mappings import make_mapping
 
@@ -61,36 +56,6 @@ def converse(steps: Steps[object],
         except StopIteration as end:
             return requests, end.value
     raise AssertionError(f'it wants more: {requests}')
-
-
-def block_of(text: str, length: int, plc: str = 'SLC') -> Block:
-    network = Network()
-    model = LineModel(network.checksum, network.duplex, network.timing)
-    block, = Planner(model, 1.0).plan([make_mapping(text, length=length, plc=plc)])
-    return block
-
-
-def test_block_of_two_packets() -> None:
-    block = block_of('N7:0', 130)  # an SLC gives 118 words at a time
-    first, second = bytes(range(236)), bytes(range(24))
-    requests, data = converse(
-        read_block(block), [reply(first), reply(second)])
-    assert requests == block.commands()
-    assert data == first + second
-
-
-def test_values_of_one_mapping() -> None:
-    block = block_of('N7:3', 2)
-    _, values = converse(read_values(block.mappings[0], block), [reply(b'\x01\x00\xff\xff')])
-    assert list(values) == [1, -1]  # type: ignore[call-overload]
-
-
-@pytest.mark.parametrize('answer, error', [
-    (reply(sts=0x50), RemoteError), (reply(b'\1'), FormatError), (CommandTimeout(), LinkError)])
-def test_read_that_fails(answer: Packet | LinkError, error: type[Exception]) -> None:
-    block = block_of('N7:3', 2)
-    with pytest.raises(error):
-        converse(read_values(block.mappings[0], block), [answer])
 
 
 def unsent() -> LinkError:
@@ -240,5 +205,5 @@ def test_echo_of_something_else() -> None:
 def test_refusal_of_a_long_read_names_the_column_that_makes_it_shorter() -> None:
     for length, hint in ((42, True), (41, False)):
         with pytest.raises(RemoteError) as caught:
-            converse(read_block(block_of('N7:0', length)), [reply(sts=0x10)])
+            words_in(reply(sts=0x10), parse_address('N7:0', PlcType.SLC), length, SlcDialect())
         assert str(caught.value).endswith('name it in the column Processor') is hint
