@@ -34,7 +34,6 @@ ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = 'docs/reference'
 
 PARTS: dict[tuple[str, str], Callable[[], str]] = {
-    ('README.md', 'addresses'): tables.addresses,
     ('CONTRIBUTING.md', 'rooms'): tables.rooms,
     ('docs/architecture.md', 'drawing'): drawing.mermaid,
     ('wireshark/abdf1.lua', 'tables'): dissector.lua,
@@ -44,6 +43,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ('docs/protocol/commands.md', 'commands'): tables.commands,
     (f'{REFERENCE}/files.md', 'net'): tables.net_fields,
     (f'{REFERENCE}/files.md', 'map'): tables.map_columns,
+    (f'{REFERENCE}/addresses.md', 'addresses'): tables.addresses,
     (f'{REFERENCE}/addresses.md', 'members'): tables.members,
     (f'{REFERENCE}/addresses.md', 'packets'): tables.packets,
     (f'{REFERENCE}/parameters.md', 'parameters'): tables.parameters,
