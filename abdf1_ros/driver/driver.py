@@ -34,6 +34,7 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.heartbeats import LARGEST
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
@@ -125,7 +126,8 @@ class Driver:
             () if settings.read_only else self.mappings, self.stations, self._writes, writing,
             network.cmd_timeout / 1000,
             lambda write: self._served.store(write.mapping, write.raw), report,
-            self._listener.unreadable, self._listener.foreign_value)
+            self._listener.unreadable, self._listener.foreign_value,
+            1 + settings.first_tns % LARGEST)
         self._readings.read_back = self.interlocks.read_back
         self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.health,

@@ -83,13 +83,14 @@ class HeartbeatRow:
     ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
     one. ``reason`` says why it does not count, empty while it does. ``refusal`` says why the last
     write was not confirmed, ``tried`` when that was sent. ``due`` is when the row has to be looked
-    at (clock values in s).
+    at (clock values in s). It counts from ``first`` on.
     """
 
-    def __init__(self, mapping: Mapping) -> None:
+    def __init__(self, mapping: Mapping, first: int = 1) -> None:
         assert mapping.heartbeat is not None
         assert mapping.period is not None
         self.mapping = mapping
+        self._before_first = first - 1
         self.state = BeatState.CONTACT
         self.value = 0
         self.confirmed: float | None = None
@@ -216,7 +217,8 @@ class HeartbeatRow:
         if self.wants_zero:
             self.value, self._is_confirmed = 0, False
         elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
-            self.value, self._is_confirmed = self.value % LARGEST + 1, False
+            before = self.value or self._before_first
+            self.value, self._is_confirmed = before % LARGEST + 1, False
         self._next = now + self._period
         return Write(self.mapping, [self.value], now)
 

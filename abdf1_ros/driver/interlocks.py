@@ -111,17 +111,19 @@ class Interlocks:
 
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
     row into our own table; ``report`` gets the result of each fallback that was written, ``tell``
-    why a PLC does not take one, ``warn`` that a heartbeat is not ours. Only ``executor_ran``,
-    ``wind_down`` and ``resume`` may be called from another thread. ``next_expiry`` is when a
-    fallback of our own table is due (clock value in s).
+    why a PLC does not take one, ``warn`` that a heartbeat is not ours. Heartbeats count from
+    ``first_beat`` on: two bridges that began together would not see each other if both did from 1.
+    Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
+    ``next_expiry`` is when a fallback of our own table is due (clock value in s).
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
                  writes: WriteQueue, writing: WritesUnderWay, cmd_timeout: float,
                  store: Callable[[Write], None], report: Callable[[WriteResult], None],
                  tell: Callable[[Mapping, str], None],
-                 warn: Callable[[Mapping, str, bool], None]) -> None:
-        self.heartbeats = [HeartbeatRow(mapping) for mapping in mappings if mapping.heartbeat]
+                 warn: Callable[[Mapping, str, bool], None], first_beat: int = 1) -> None:
+        self.heartbeats = [HeartbeatRow(mapping, first_beat)
+                           for mapping in mappings if mapping.heartbeat]
         self.fallbacks = [FallbackRow(mapping, cmd_timeout)
                           for mapping in mappings if mapping.fallback]
         self._ours = _Plc(-1)  # the rows of our own table
