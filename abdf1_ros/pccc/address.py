@@ -53,11 +53,12 @@ class Addressing(ABC):
     """
     How the places of one family's data table are written and counted.
 
-    ``files`` are the file types that it can have. ``has_sections`` tells whether each type has
-    file numbers of its own.
+    ``title`` is what people call it, ``files`` are the file types that it can have.
+    ``has_sections`` tells whether each type has file numbers of its own.
     """
 
     plc_type: ClassVar[PlcType]
+    title: ClassVar[str]
     files: ClassVar[Mapping[FileType, Layout]]
     has_sections: ClassVar[bool] = False
 

@@ -112,9 +112,10 @@ def dialect_of(plc_type: PlcType, access: Access | None = None,
     ways = tuple(family.dialects)
     if access is not None and access not in ways:
         right = ', '.join(entry.value for entry in ways)
-        raise FormatError(f'Access of a {plc_type.value} is {right}, not {access.value}')
+        raise FormatError(
+            f'Access of a {family.addressing.title} is {right}, not {access.value}')
     if processor is None:
         return family.dialects[access or ways[0]]
     if not family.by_processor:
-        raise FormatError(f'a {plc_type.value} has no Processor')
+        raise FormatError(f'a {family.addressing.title} has no Processor')
     return family.by_processor[processor]

@@ -53,7 +53,6 @@ _OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch'}
 class FileAddressing(Addressing):
     """What the addresses of both families have in common."""
 
-    title: ClassVar[str]
     last_file: ClassVar[int]
 
     def parse(self, text: str, access: Access | None = None) -> Address:

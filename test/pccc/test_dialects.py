@@ -71,9 +71,9 @@ def test_every_family_has_a_dialect_for_every_access_it_serves(family: PlcType) 
 
 
 @pytest.mark.parametrize(('family', 'access', 'right'), [
-    (PlcType.PLC5, Access.SLOT, 'PLC5 is Typed, WordRange, not Slot'),
-    (PlcType.PLC3, Access.TYPED, 'PLC3 is WordRange, not Typed'),
-    (PlcType.PLC2, Access.FLAT, 'PLC2 is Unprotected, Protected, CIF, not Flat'),
+    (PlcType.PLC5, Access.SLOT, 'PLC-5 is Typed, WordRange, not Slot'),
+    (PlcType.PLC3, Access.TYPED, 'PLC-3 is WordRange, not Typed'),
+    (PlcType.PLC2, Access.FLAT, 'PLC-2 is Unprotected, Protected, CIF, not Flat'),
     (PlcType.SLC, Access.CIF, 'SLC is Slot, Flat, not CIF')])
 def test_access_of_another_family(family: PlcType, access: Access, right: str) -> None:
     with pytest.raises(FormatError, match=f'^Access of a {right}$'):
@@ -159,7 +159,7 @@ def test_every_named_bit_is_set_alone(place: tuple[PlcType, Access]) -> None:
 
 
 def test_processor_is_for_an_slc_only() -> None:
-    with pytest.raises(FormatError, match='^a PLC5 has no Processor$'):
+    with pytest.raises(FormatError, match='^a PLC-5 has no Processor$'):
         dialect_of(PlcType.PLC5, None, Processor.SLC_5_03)
 
 

@@ -53,6 +53,7 @@ class ToyAddressing(Addressing):
     """Words in hexadecimal."""
 
     plc_type = TOY
+    title = 'Toy'
     files = {FileType.BINARY: Layout()}
 
     def parse(self, text: str, access: Access | None = None) -> Address:

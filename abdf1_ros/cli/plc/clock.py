@@ -34,11 +34,11 @@ class Clock:
     """Year, month, day, hour, minute and second of a station; FormatError where none is known."""
 
     def __init__(self, session: Session, station: int, plc_type: PlcType) -> None:
-        if not family_of(plc_type).clock:
-            raise FormatError(f'is a {plc_type.value}, whose clock is not known')
+        family = family_of(plc_type)
+        if not family.clock:
+            raise FormatError(f'is a {family.addressing.title}, whose clock is not known')
         self._session, self._station = session, station
-        self._words = AddressedValues.of(
-            family_of(plc_type).clock, plc_type, 6, ValueType.UINT16)
+        self._words = AddressedValues.of(family.clock, plc_type, 6, ValueType.UINT16)
 
     @property
     def address(self) -> str:

@@ -45,9 +45,10 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
     ``show`` gets a text about the file being asked for, ``warn`` why a list is not used. Raises
     FormatError for a family whose files cannot be looked for, and LinkError.
     """
-    search = family_of(plc_type).file_search
+    family = family_of(plc_type)
+    search = family.file_search
     if search is None:
-        raise FormatError(f'a {plc_type.value} has no files that can be looked for')
+        raise FormatError(f'a {family.addressing.title} has no files that can be looked for')
     steps = search.directory(processor)
     if steps is not None:
         try:

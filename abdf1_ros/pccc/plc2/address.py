@@ -42,6 +42,7 @@ _BIT_FORM = re.compile(r'[#$]?(?P<word>\d{3})(?P<bit>\d{2})', re.ASCII)
 
 class _Plc2Addressing(Addressing):
     plc_type = PlcType.PLC2
+    title = 'PLC-2'
     files = FILES
 
     def parse(self, text: str, access: Access | None = None) -> Address:

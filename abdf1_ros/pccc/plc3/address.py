@@ -65,28 +65,62 @@ _LEVELS = re.compile(r'E(\d{1,5}(?:\.\d{1,5}){5})(?:/(\d{1,3}))?', re.ASCII)
 
 class _Plc3Addressing(Addressing):
     plc_type = PlcType.PLC3
+    title = 'PLC-3'
     files = FILES
     has_sections = True
 
     def parse(self, text: str, access: Access | None = None) -> Address:
         """Read an address; an error says what would be right."""
         text = text.strip().upper()
-        levels = _LEVELS.fullmatch(text)
-        if levels is not None:
-            return Address(self, *_from_levels(levels[1].split('.'), levels[2]))
+        if levels := _LEVELS.fullmatch(text):
+            return self._at_levels(levels[1].split('.'), levels[2])
         match = _LETTERS.fullmatch(text)
         if match is None:
             raise AddressSyntaxError(
                 'write type, file, ":", word, as in N7:0 or B10:5/03, or E3.1.8.10.0.5')
-        kind = _kind(match['type'])
-        file = _file(match['file'], kind)
-        number = _number(match['number'], kind)
-        member, bit = match['member'], match['bit']
+        kind = next((entry for entry in SECTIONS if entry.value == match['type']), None)
+        if kind is None:
+            known = ', '.join(entry.value for entry in SECTIONS)
+            raise AddressSyntaxError(
+                f'{match["type"]} is not a file type of a PLC-3; file types: {known}')
+        if match['file'] is None and kind not in _NO_FILE_NEEDED:
+            raise AddressSyntaxError(f'give the file number, as in {kind.value}7:0')
+        return self._place(kind, int(match['file'] or 0), match['number'], match['member'],
+                           match['bit'])
+
+    def _at_levels(self, levels: list[str], bit: str | None) -> Address:
+        area, context, section, file, structure, word = map(int, levels)
+        if (area, context) != (DATA_TABLE, CONTEXT):
+            raise AddressRangeError(f'only the data table, E{DATA_TABLE}.{CONTEXT}, can be read')
+        kind = BY_SECTION.get(section)
+        if kind is None:
+            known = ', '.join(f'{number} ({entry.value})' for number, entry in BY_SECTION.items())
+            raise AddressRangeError(f'section {section} is not known; sections: {known}')
+        if not kind.is_structure:
+            if structure:
+                raise AddressRangeError(f'section {section} has no structures; write 0 for it')
+            return self._place(kind, file, levels[-1], None, bit)
+        if word >= FILES[kind].words:
+            raise AddressRangeError('words of a timer or counter are 0, 1 and 2')
+        return self._place(kind, file, levels[-2], levels[-1], bit)
+
+    def _place(self, kind: FileType, file: int, number: str, member: str | None,
+               bit: str | None) -> Address:
+        if kind.is_structure and file:
+            raise AddressRangeError(f'the {kind.value} file of a PLC-3 is file 0')
+        if file > _LAST_FILE:
+            raise AddressRangeError(f'files run from 0 to {_LAST_FILE}')
+        if kind.is_io and set(number) & set('89'):
+            raise AddressSyntaxError('words of the I/O image are octal, as in I:017')
+        element, last = int(number, 8 if kind.is_io else 10), self.last_element(kind)
+        if element > last:
+            shown = f'{last:o} (octal)' if kind.is_io else str(last)
+            raise AddressRangeError(f'elements of {kind.value} run from 0 to {shown}')
         if kind.is_structure:
-            return Address(self, kind, file, number, *_member(kind, member, bit))
+            return Address(self, kind, file, element, *_part(kind, member, bit))
         if member:
             raise AddressSyntaxError(f'words of {kind.value} files have no members')
-        return Address(self, kind, file, number, 0, _bit(bit))
+        return Address(self, kind, file, element, 0, _bit(bit))
 
     def show(self, address: Address) -> str:
         kind, file = address.file_type, address.file
@@ -107,76 +141,13 @@ class _Plc3Addressing(Addressing):
 ADDRESSING = _Plc3Addressing()
 
 
-def _from_levels(levels: list[str],
-                 bit: str | None) -> tuple[FileType, int, int, int, int | None]:
-    """Return file type, file, element, word in the element, and bit."""
-    area, context, section, file, structure = map(int, levels[:-1])
-    if (area, context) != (DATA_TABLE, CONTEXT):
-        raise AddressRangeError(f'only the data table, E{DATA_TABLE}.{CONTEXT}, can be read')
-    kind = BY_SECTION.get(section)
-    if kind is None:
-        known = ', '.join(f'{number} ({entry.value})' for number, entry in BY_SECTION.items())
-        raise AddressRangeError(f'section {section} is not known; sections: {known}')
-    _check_file(file, kind)
-    if kind.is_structure:
-        _check_number(structure, kind)
-        word = int(levels[-1])
-        if word >= FILES[kind].words:
-            raise AddressRangeError('words of a timer or counter are 0, 1 and 2')
-        return kind, file, structure, word, _bit(bit)
-    if structure:
-        raise AddressRangeError(f'section {section} has no structures; write 0 for it')
-    return kind, file, _number(levels[-1], kind), 0, _bit(bit)
-
-
-def _kind(letters: str) -> FileType:
-    kind = next((entry for entry in SECTIONS if entry.value == letters), None)
-    if kind is None:
-        known = ', '.join(entry.value for entry in SECTIONS)
-        raise AddressSyntaxError(f'{letters} is not a file type of a PLC-3; file types: {known}')
-    return kind
-
-
-def _file(text: str | None, kind: FileType) -> int:
-    if text is None:
-        if kind not in _NO_FILE_NEEDED:
-            raise AddressSyntaxError(f'give the file number, as in {kind.value}7:0')
-        return 0
-    file = int(text)
-    _check_file(file, kind)
-    return file
-
-
-def _check_file(file: int, kind: FileType) -> None:
-    if kind.is_structure and file:
-        raise AddressRangeError(f'the {kind.value} file of a PLC-3 is file 0')
-    if file > _LAST_FILE:
-        raise AddressRangeError(f'files run from 0 to {_LAST_FILE}')
-
-
-def _number(text: str, kind: FileType) -> int:
-    if kind.is_io and set(text) & set('89'):
-        raise AddressSyntaxError('words of the I/O image are octal, as in I:017')
-    number = int(text, 8 if kind.is_io else 10)
-    _check_number(number, kind)
-    return number
-
-
-def _check_number(number: int, kind: FileType) -> None:
-    last = ADDRESSING.last_element(kind)
-    if number > last:
-        shown = f'{last:o} (octal)' if kind.is_io else str(last)
-        raise AddressRangeError(f'elements of {kind.value} run from 0 to {shown}')
-
-
-def _member(kind: FileType, member: str | None, bit: str | None) -> tuple[int, int | None]:
+def _part(kind: FileType, member: str | None, bit: str | None) -> tuple[int, int | None]:
     """Return word and bit of a part of a timer or counter."""
     members = FILES[kind].members
     if member is None and bit is None:
         raise AddressSyntaxError(f'say which word, as in {kind.value}:0.ACC')
-    place = members.get(member or 'CTL')
-    if member and member.isdigit():
-        place = next((entry for entry in members.values() if entry.word == int(member)), None)
+    place = next((entry for name, entry in members.items()
+                  if (member or 'CTL') in (name, str(entry.word))), None)
     if place is None:
         raise AddressSyntaxError(f'{member} is not a member; members of {kind.value}: '
                                  f'{", ".join(members)}')

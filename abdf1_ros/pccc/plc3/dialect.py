@@ -23,21 +23,16 @@ from abdf1_ros.pccc.word_range.commands import WordBitWrite
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 
 
-class _Plc3Range:
-    """The extended address and the bit write."""
-
-    files = FILES
-    # Flag and section, three bytes each for file, structure and word (M 13-5..13-8).
-    address_size = 11
-
-    def address(self, address: Address) -> ExtendedAddress:
-        section = SECTIONS[address.file_type]
-        if address.file_type.is_structure:
-            return ExtendedAddress(section, address.file, address.element, address.word)
-        return ExtendedAddress(section, address.file, 0, address.element)
-
-    def write_bits(self, address: Address, set_bits: int, reset_bits: int) -> bytes:
-        return WordBitWrite(self.address(address), set_bits, reset_bits).encode()
+def _address(address: Address) -> ExtendedAddress:
+    section = SECTIONS[address.file_type]
+    if address.file_type.is_structure:
+        return ExtendedAddress(section, address.file, address.element, address.word)
+    return ExtendedAddress(section, address.file, 0, address.element)
 
 
-PLC3 = WordRangeDialect(_Plc3Range())
+def _bit_write(address: Address, set_bits: int, reset_bits: int) -> bytes:
+    return WordBitWrite(_address(address), set_bits, reset_bits).encode()
+
+
+# Flag and section, three bytes each for file, structure and word (M 13-5..13-8).
+PLC3 = WordRangeDialect(FILES, 11, _address, _bit_write)

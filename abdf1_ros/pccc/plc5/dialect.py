@@ -107,20 +107,15 @@ def _most_words(file_type: FileType, room: int) -> int:
     return min(count, plc5.MAX_INTEGERS) * layout.words
 
 
-class _Plc5Range:
-    """Read-modify-write for bits, as with typed commands."""
+def _range_address(address: Address) -> plc5.SystemAddress:
+    return plc5.SystemAddress(address.file, address.element, address.word or None)
 
-    files = FILES
-    # Mask, file and element in three bytes each, sub-element (M 13-10..13-12).
-    address_size = 8
 
-    def address(self, address: Address) -> plc5.SystemAddress:
-        return plc5.SystemAddress(address.file, address.element, address.word or None)
-
-    def write_bits(self, address: Address, set_bits: int, reset_bits: int) -> bytes:
-        change = plc5.BitSet(self.address(address), ~(set_bits | reset_bits) & 0xFFFF, set_bits)
-        return plc5.ReadModifyWrite((change,)).encode()
+def _bit_write(address: Address, set_bits: int, reset_bits: int) -> bytes:
+    change = plc5.BitSet(_range_address(address), ~(set_bits | reset_bits) & 0xFFFF, set_bits)
+    return plc5.ReadModifyWrite((change,)).encode()
 
 
 PLC5_TYPED = Plc5Dialect()
-PLC5_WORD_RANGE = WordRangeDialect(_Plc5Range())
+# Mask, file and element in three bytes each, sub-element (M 13-10..13-12).
+PLC5_WORD_RANGE = WordRangeDialect(FILES, 8, _range_address, _bit_write)

@@ -20,6 +20,8 @@ A MicroLogix 1100 and 1400 have been seen to send a 25th, which no manual explai
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from abdf1_ros.pccc import link_counters as names
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import (
@@ -41,30 +43,33 @@ SIZE = 24
 
 FULL_DUPLEX_PORT = 0x34
 HALF_DUPLEX_PORT = 0x36
-SLC_5_03 = 0x49
 
-# Byte 4; the codes from 78 on are those that drivers in the field know.
-_MODELS = {
-    0x18: 'SLC 5/01', 0x1A: 'SLC 500 fixed', 0x25: 'SLC 5/02', SLC_5_03: 'SLC 5/03',
-    0x5B: 'SLC 5/04', 0x58: 'MicroLogix 1000', 0x78: 'SLC 5/05',
-    0x88: 'MicroLogix 1200', 0x89: 'MicroLogix 1500 LSP', 0x8C: 'MicroLogix 1500 LRP',
-    0x9C: 'MicroLogix 1100', 0x9F: 'MicroLogix 1400'}
 
-# What the name of a model begins with; 5/ and 1747 are any SLC 500.
-_NAMES = {
-    '5/01': 'SLC 5/01', '5/02': 'SLC 5/02', '5/03': 'SLC 5/03', '5/04': 'SLC 5/04',
-    '5/05': 'SLC 5/05', '500': 'SLC 500 fixed', '1761': 'MicroLogix 1000',
-    '1762': 'MicroLogix 1200', '1763': 'MicroLogix 1100', '1764': 'MicroLogix 1500',
-    '1766': 'MicroLogix 1400', '5/': '', '1747': ''}
+class _SlcModel(NamedTuple):
+    """Byte 4, what the name begins with, the model, and what the map file calls it."""
 
-# By what the name of a model begins with. The fixed ones take the packets of the 5/01 (M 7-17).
-_PROCESSORS = {
-    'SLC 5/01': Processor.SLC_5_01, 'SLC 500 fixed': Processor.SLC_5_01,
-    'SLC 5/02': Processor.SLC_5_02, 'SLC 5/03': Processor.SLC_5_03,
-    'SLC 5/04': Processor.SLC_5_04, 'SLC 5/05': Processor.SLC_5_05,
-    'MicroLogix 1000': Processor.ML1000, 'MicroLogix 1100': Processor.ML1100,
-    'MicroLogix 1200': Processor.ML1200, 'MicroLogix 1400': Processor.ML1400,
-    'MicroLogix 1500': Processor.ML1500}
+    code: int
+    start: str
+    model: str
+    processor: Processor
+
+
+# The codes from 78 on are those that drivers in the field know, 9F is recorded. The fixed ones
+# take the packets of the 5/01 (M 7-17).
+_MODELS = (
+    _SlcModel(0x18, '5/01', 'SLC 5/01', Processor.SLC_5_01),
+    _SlcModel(0x1A, '500', 'SLC 500 fixed', Processor.SLC_5_01),
+    _SlcModel(0x25, '5/02', 'SLC 5/02', Processor.SLC_5_02),
+    _SlcModel(0x49, '5/03', 'SLC 5/03', Processor.SLC_5_03),
+    _SlcModel(0x5B, '5/04', 'SLC 5/04', Processor.SLC_5_04),
+    _SlcModel(0x78, '5/05', 'SLC 5/05', Processor.SLC_5_05),
+    _SlcModel(0x58, '1761', 'MicroLogix 1000', Processor.ML1000),
+    _SlcModel(0x9C, '1763', 'MicroLogix 1100', Processor.ML1100),
+    _SlcModel(0x88, '1762', 'MicroLogix 1200', Processor.ML1200),
+    _SlcModel(0x9F, '1766', 'MicroLogix 1400', Processor.ML1400),
+    _SlcModel(0x89, '1764', 'MicroLogix 1500 LSP', Processor.ML1500),
+    _SlcModel(0x8C, '1764', 'MicroLogix 1500 LRP', Processor.ML1500))
+_ANY_SLC = ('5/', '1747')  # names of any SLC 500 begin so
 
 MODES = {
     0x00: Mode.REMOTE_DOWNLOAD, 0x01: Mode.REMOTE_PROGRAM, 0x03: Mode.REMOTE_SUSPEND,
@@ -102,12 +107,12 @@ def decode(data: bytes) -> Identity | None:
     if len(data) < SIZE or data[1] != EXTENDED:
         return None
     code, name = data[3], name_in(data[5:16])
-    model, remarks = _model(code, name)
+    model, processor, remarks = _model(code, name)
     if not model:
         return Identity(None, name or f'processor 0x{code:02X}', *release(data[4]), name=name,
                         interface=data[2])
     mode, mode_text = mode_of(MODES, data[18] & 0x1F)
-    error, processor = word_at(data, 16), _processor(model)
+    error = word_at(data, 16)
     halted = bool(data[19] & MAJOR_ERROR_HALTED)
     faults = (f'{major_error(error)}, processor halted',) if halted else ()
     remarks += named({
@@ -135,25 +140,22 @@ def served_counters(is_full_duplex: bool, is_master: bool) -> CounterLayout:
     return MASTER_COUNTERS if is_master else SLAVE_COUNTERS
 
 
-def _processor(model: str) -> Processor | None:
-    return next((processor for start, processor in _PROCESSORS.items()
-                 if model.startswith(start)), None)
-
-
-def _model(code: int, name: str) -> tuple[str, tuple[str, ...]]:
+def _model(code: int, name: str) -> tuple[str, Processor | None, tuple[str, ...]]:
     """
-    Return the model, empty for one of another family, and what is odd about it.
+    Return the model, empty for one of another family, its processor, and what is odd about it.
 
     Codes of newer processors come from drivers in the field only, so where the code and the
     name disagree the name counts.
     """
-    by_code = _MODELS.get(code, '')
-    by_name = next((model or name for start, model in _NAMES.items() if name.startswith(start)),
-                   '')
-    if not by_name or by_code.startswith(by_name):
-        return by_code, ()
-    return by_name, named({
-        f'its processor code 0x{code:02X} is that of a {by_code}': len(by_code)})
+    by_code = next((known for known in _MODELS if known.code == code), None)
+    by_name = next((known for known in _MODELS if name.startswith(known.start)), None)
+    if by_code and (by_name is None and not name.startswith(_ANY_SLC)
+                    or by_name and by_name.processor is by_code.processor):
+        return by_code.model, by_code.processor, ()
+    remarks = (f'its processor code 0x{code:02X} is that of a {by_code.model}',) if by_code else ()
+    if by_name:
+        return by_name.model.removesuffix(' LSP'), by_name.processor, remarks
+    return (name, None, remarks) if name.startswith(_ANY_SLC) else ('', None, ())
 
 
 def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
@@ -163,14 +165,12 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
 
     Fields for memory and programs, which it does not have, are 0.
     """
-    model = next(name for name, known in _PROCESSORS.items() if known is (processor or USUAL))
-    code = next(code for code, name in _MODELS.items() if name.startswith(model))
-    name = next(start for start, known in _NAMES.items() if known == model)
-    is_micrologix = model.startswith('MicroLogix')
+    known = next(known for known in _MODELS if known.processor is (processor or USUAL))
+    is_micrologix = known.model.startswith('MicroLogix')
     port = FULL_DUPLEX_PORT if is_full_duplex else HALF_DUPLEX_PORT
     error = _MINOR_ERROR_LEFT if is_faulted else 0
     state = code_of(MODES, mode) | _ALWAYS_SET * is_micrologix
-    return (bytes((0, EXTENDED, port, code, 0))
-            + (f'{name}-LEC' if is_micrologix else name).encode().ljust(11)
+    return (bytes((0, EXTENDED, port, known.code, 0))
+            + (known.start + '-LEC' * is_micrologix).encode().ljust(11)
             + error.to_bytes(2, 'little')
             + bytes((state, MAJOR_ERROR_HALTED * is_faulted, 0, 0, 0, _NO_OWNER)))

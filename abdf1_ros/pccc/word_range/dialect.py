@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import exactly, Request, Transfer
@@ -31,50 +31,37 @@ from abdf1_ros.pccc.word_range.commands import (
 )
 
 
-class RangeFamily(Protocol):
-    """What differs between PLC-3 and PLC-5: files, address, and the bit write."""
-
-    @property
-    def files(self) -> Mapping[FileType, Layout]:
-        """Return its file types."""
-
-    @property
-    def address_size(self) -> int:
-        """Return the bytes of its longest address."""
-
-    def address(self, address: Address) -> WireAddress:
-        """Return the address as it stands in a command."""
-
-    def write_bits(self, address: Address, set_bits: int, reset_bits: int) -> bytes:
-        """Return FNC and parameters."""
-
-
+@dataclass(slots=True, eq=False)
 class WordRangeDialect:
     """
     Word range read and write; several packets of one transfer carry their offset in it.
 
-    Structures are the words they are stored as, floats travel high word first (M 13-17).
+    Structures are the words they are stored as, floats travel high word first (M 13-17). The
+    families differ in ``files``, ``address_size`` (bytes of the longest address), how an address
+    stands in a command, and the bit write, which is FNC and parameters for a word and the bits to
+    set and to reset.
     """
 
-    writes_bits = True
-
-    def __init__(self, family: RangeFamily) -> None:
-        self._family = family
+    files: Mapping[FileType, Layout]
+    address_size: int
+    to_line: Callable[[Address], WireAddress]
+    bit_write: Callable[[Address, int, int], bytes]
+    writes_bits: bool = True
 
     def max_read(self, file_type: FileType) -> int:
-        words = self._family.files[file_type].words
+        words = self.files[file_type].words
         return word_range.MAX_READ // 2 // words * words
 
     sure_read = max_read
 
     def max_write(self, file_type: FileType) -> int:
-        words = self._family.files[file_type].words
-        return (word_range.MAX_WRITE - self._family.address_size) // 2 // words * words
+        words = self.files[file_type].words
+        return (word_range.MAX_WRITE - self.address_size) // 2 // words * words
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         whole = transfer or Transfer(address, words)
         return word_range.CMD, WordRangeRead(
-            self._family.address(whole.start), 2 * words, address.offset - whole.start.offset,
+            self.to_line(whole.start), 2 * words, address.offset - whole.start.offset,
             whole.words).encode()
 
     def reply_size(self, address: Address, words: int) -> int:
@@ -87,9 +74,9 @@ class WordRangeDialect:
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
         whole = transfer or Transfer(address, len(data) // 2)
         return word_range.CMD, WordRangeWrite(
-            self._family.address(whole.start), in_line_order(address, data),
+            self.to_line(whole.start), in_line_order(address, data),
             address.offset - whole.start.offset, whole.words).encode()
 
     def write_bits(self, address: Address, mask: int, bits: int) -> Request:
         """Return a request that changes bits of one word."""
-        return word_range.CMD, self._family.write_bits(address, bits & mask, ~bits & mask)
+        return word_range.CMD, self.bit_write(address, bits & mask, ~bits & mask)
