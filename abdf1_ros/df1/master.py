@@ -43,7 +43,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
 from abdf1_ros.df1.link import LinkStatus, NO_STATUS
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Step
-from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, Talk
+from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -85,7 +85,7 @@ class HalfDuplexMaster:
                 due = source.next_due()
                 yield Step(None, None if due is None else max(due - now, 0.0))
 
-    def carry_out(self, task: Task) -> Talk:
+    def carry_out(self, task: Task) -> Procedure:
         """Send the command of a task and end it; a broadcast has no reply but our own."""
         command = task.command
         number = self._stations.via(command.dst)  # on this line (M 3-7)
@@ -110,7 +110,7 @@ class HalfDuplexMaster:
             else:
                 self._line.complete(task, reply, keeps_others_waiting=True)
 
-    def _collect_for_slave(self, number: int, command: Packet) -> Talk:
+    def _collect_for_slave(self, number: int, command: Packet) -> Procedure:
         """Poll for the reply to a command that was passed on (M 3-8)."""
         station = self._stations[command.dst]
         try:
@@ -143,7 +143,7 @@ class HalfDuplexMaster:
             if is_over and not may_be_next:
                 raise CommandTimeout
 
-    def _give_up(self, number: int) -> Talk:
+    def _give_up(self, number: int) -> Procedure:
         """Count and report a reply that did not come in time (S0, counter 2545)."""
         self._line.accounting.late(number, keeps_others_waiting=True)
         if self._settings.nak_on_command_timeout:

@@ -41,6 +41,7 @@ from abdf1_ros.df1.machine import (
     LISTEN_ON,
     Machine,
     MIN_RESPONSE_TIME,
+    Procedure,
     Silence,
     Step,
 )
@@ -77,8 +78,6 @@ _MOMENT = 0.0001
 # A pause of so many characters, plus the time that the equipment may hold bytes back, ends a
 # message that has broken off.
 _QUIET_CHARACTERS = 10
-
-Talk = Generator[Step, Heard, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +172,7 @@ class MasterLine:
         self.note(expected, self._last_code, station=number)
         return expected
 
-    def probe(self, number: int) -> Talk:
+    def probe(self, number: int) -> Procedure:
         """
         Poll an inactive station once (S0, "Active Station List").
 
@@ -370,7 +369,7 @@ class MasterLine:
         self._report(wrong_message(packet, number))
 
     def forward(self, busy: Container[int] = (),
-                collect: Callable[[int, Packet], Talk] | None = None
+                collect: Callable[[int, Packet], Procedure] | None = None
                 ) -> Generator[Step, Heard, Packet | None]:
         """
         Deliver one message to be passed on, not to a ``busy`` station; return it if delivered.

@@ -88,8 +88,6 @@ _ENQ_LIMIT = 3
 # While a response is waited for, overdue commands are looked for so often (s).
 _TICK = 0.25
 
-Hearing = Generator[Step, Heard, None]
-
 
 @dataclass(frozen=True, slots=True)
 class PeerSettings:
@@ -194,7 +192,7 @@ class FullDuplexPeer:
         known = [moment for moment in moments if moment is not None]
         return max(0.0, min(known) - self._machine.now) if known else None
 
-    def _send_command(self, task: Task) -> Hearing:
+    def _send_command(self, task: Task) -> Procedure:
         number = task.command.dst
         key = number, task.command.tns
         entry = self._outstanding[key] = Outstanding(task)
@@ -217,7 +215,7 @@ class FullDuplexPeer:
             self._note(Message.ERR_INACTIVE_STATION, number, station=number)
             task.fail(StationInactive(number))
 
-    def _send_reply(self, reply: Packet) -> Hearing:
+    def _send_reply(self, reply: Packet) -> Procedure:
         self._accounting.sent(reply)
         delivered = yield from self._transfer(reply, lambda: False, is_probe=False)
         if self._accepted is not None and self._accepted.key == reply.key_of_command:
@@ -307,7 +305,7 @@ class FullDuplexPeer:
         """Return the last byte that was heard since a moment, 0 for none."""
         return silence.last_byte if self._machine.now - silence.seconds > begun else 0
 
-    def _listen(self, seconds: float = _LATE_RESPONSE) -> Hearing:
+    def _listen(self, seconds: float = _LATE_RESPONSE) -> Procedure:
         """Only receive for a while; responses that come now are late and count for nothing."""
         end = max(self._machine.now, self._machine.free_at) + seconds
         symbol = yield from self._next(end)
@@ -326,7 +324,7 @@ class FullDuplexPeer:
         left = self._left(end)
         return (yield Step(b'', min(left, _TICK))) if left > 0 else Silence()
 
-    def _answer(self, symbol: Symbol) -> Hearing:
+    def _answer(self, symbol: Symbol) -> Procedure:
         """Send the response to a symbol, and make use of the message that it brings."""
         response = self._hear(symbol)
         if self._machine.tx_delay:  # the response has to wait for that, the message need not

@@ -50,7 +50,6 @@ from abdf1_ros.df1.master_line import (
     MasterLine,
     MasterSettings,
     MOST_QUEUED,
-    Talk,
 )
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
@@ -180,7 +179,7 @@ class StandardPollingMaster:
         """Tell whether an entry of a list is polled; our own is not a station of the line."""
         return number == self._settings.station or self._stations[number].active
 
-    def _scan(self, source: TaskSource) -> Talk:
+    def _scan(self, source: TaskSource) -> Procedure:
         self._priority.turn(self._machine.now)
         for number in self._priority.stations:
             if self._is_active(number):
@@ -190,7 +189,7 @@ class StandardPollingMaster:
         if self._polling.in_sequence and self._settings.station not in self._listed:
             yield from self._send_commands(source)
 
-    def _visit_group(self, source: TaskSource) -> Talk:
+    def _visit_group(self, source: TaskSource) -> Procedure:
         """Poll the next group of the normal list; at its end, one inactive station."""
         normal = self._normal
         if normal.position == 0:
@@ -207,7 +206,7 @@ class StandardPollingMaster:
             normal.position = 0
             yield from self._visit_inactive(normal, source)
 
-    def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Talk:
+    def _visit_inactive(self, polled: _PollList, source: TaskSource) -> Procedure:
         """Poll one inactive station of a list, if the share of probes allows."""
         number = polled.inactive(self._is_active)
         is_too_early = self._machine.now < self._stations.probes.next
@@ -226,7 +225,7 @@ class StandardPollingMaster:
             self._unproven.add(number)
         self._stations.polled_in_vain(begun, self._machine.now)
 
-    def _visit(self, number: int, source: TaskSource) -> Talk:
+    def _visit(self, number: int, source: TaskSource) -> Procedure:
         """Send what waits, then poll one active station; at our own number only send."""
         if number == self._settings.station:
             yield from self._send_commands(source)
@@ -259,13 +258,13 @@ class StandardPollingMaster:
         sizes = [entry.task.reply_size for _, entry in self._waiting_for(number)]
         return sizes[0] if len(sizes) == 1 else 0
 
-    def _pace(self, begun: float) -> Talk:
+    def _pace(self, begun: float) -> Procedure:
         """Poll a line without a real speed, such as TCP, not faster than its Baud setting."""
         rest = begun + _POLL_CHARACTERS * self._machine.char_time - self._machine.now
         if rest > 0:
             yield Step(None, rest)
 
-    def _answered(self, number: int, answer: Control | Frame) -> Talk:
+    def _answered(self, number: int, answer: Control | Frame) -> Procedure:
         """Take the answer of a station to a poll."""
         packet = None
         if isinstance(answer, Frame):
@@ -318,11 +317,11 @@ class StandardPollingMaster:
         if entry is not None:
             entry.task.fail(error)
 
-    def _between_polls(self, source: TaskSource) -> Talk:
+    def _between_polls(self, source: TaskSource) -> Procedure:
         if not self._polling.in_sequence:
             yield from self._send_commands(source)
 
-    def _send_commands(self, source: TaskSource) -> Talk:
+    def _send_commands(self, source: TaskSource) -> Procedure:
         """Pass messages on, and send commands to stations without a reply outstanding."""
         self._given = {number: until for number, until in self._given.items()
                        if self._is_active(number) and self._machine.now < until}
@@ -343,7 +342,7 @@ class StandardPollingMaster:
                 return
             yield from self._send(task)
 
-    def _send(self, task: Task) -> Talk:
+    def _send(self, task: Task) -> Procedure:
         station = task.command.dst
         number = self._stations.via(station)
         if number == BROADCAST:

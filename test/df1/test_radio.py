@@ -1,0 +1,353 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Radio modem nodes: what they send, take and drop, and what becomes of it on the air."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import heapq
+from random import Random
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, Duplex, ENQ, message_frame, NAK
+from abdf1_ros.df1.machine import LineTiming, Machine
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.errors import CommandExpired, StationInactive
+from abdf1_ros.messages import Event
+import pytest
+from support.multidrop import CommandTasks
+from support.peers import CommandTask
+from support.virtual_line import char_time, VirtualLine
+
+US, PLC, OTHER = 5, 1, 2
+BAUD = 9600
+CMD_TIMEOUT = 1.0
+COMMAND = Packet(PLC, US, 0x0F, 0, 0x1034, b'\x68\x10\x02\x10')
+THEIRS = Packet(US, PLC, 0x0F, 0, 0x7710, b'\x67\x01')
+
+
+def framed(packet: Packet) -> bytes:
+    """Return a packet as it stands on the line."""
+    return message_frame(packet.encode(), Checksum.CRC)
+
+
+class Node(CommandTasks):
+    """A node with its machine, its commands, and what it has executed."""
+
+    def __init__(self, settings: RadioSettings, clock: Callable[[], float], seed: int = 1) -> None:
+        super().__init__(clock)
+        self.settings = settings
+        self.events: list[Event] = []
+        self.executed: Counter[tuple[int, int]] = Counter()
+        self.stations = ActiveStationList()
+        self.machine = Machine(lambda machine: self.link.run(self), checksum=Checksum.CRC,
+                               duplex=Duplex.FULL, timing=LineTiming(char_time(BAUD)))
+        self.link = RadioNode(self.machine, settings, self.stations, self._serve,
+                              self.events.append, Random(seed))
+
+    def _serve(self, command: Packet) -> Packet:
+        self.executed[command.src, command.tns] += 1
+        return command.reply(bytes((self.settings.station,)) + command.data)
+
+    def numbers(self) -> list[int]:
+        """Return the numbers of the events so far."""
+        return [event.message.number for event in self.events]
+
+
+class Bench(Node):
+    """A node whose line says what the test tells it."""
+
+    def __init__(self, **settings: object) -> None:
+        self.now = 100.0
+        super().__init__(RadioSettings(US, **settings), lambda: self.now)  # type: ignore
+        self.stations.add((PLC, OTHER))
+        self.machine.start(self.now)
+
+    def begin(self, command: Packet) -> CommandTask:
+        """Queue a command."""
+        task = self.add(command)
+        self.machine.wake(self.now)
+        return task
+
+    def hear(self, *data: bytes) -> None:
+        """Let bytes come."""
+        for part in data:
+            self.machine.receive_data(part, self.now)
+
+    def wait(self, seconds: float) -> list[bytes]:
+        """Let time pass; return what goes out."""
+        end, said = self.now + seconds, []
+        while (call := self.machine.next_call) is not None and call <= end:
+            self.now = max(self.now, call)
+            self.machine.handle_timeout(self.now)
+            if data := self.machine.data_to_send():
+                said.append(data)
+        self.now = end
+        return said
+
+
+def test_command_is_answered_by_its_reply_without_any_symbol() -> None:
+    bench = Bench()
+    task = bench.begin(COMMAND)
+    assert bench.wait(0.3) == [framed(COMMAND)]
+    bench.hear(framed(COMMAND.reply(b'\x07')))
+    assert task.result == COMMAND.reply(b'\x07')
+    assert bench.wait(60.0) == []
+    assert (bench.numbers(), bench.stations[PLC].replies) == ([2523], 1)
+
+
+@pytest.mark.parametrize('retries', [0, 1, 3])
+def test_command_without_reply_is_repeated_as_it_is_until_the_limit(retries: int) -> None:
+    bench = Bench(retries=retries)
+    task = bench.begin(COMMAND)
+    assert bench.wait(30.0) == [framed(COMMAND)] * (retries + 1)
+    assert isinstance(task.result, StationInactive)
+    assert not bench.stations[PLC].active
+    assert bench.numbers() == [*[2521] * retries, 2508, 2509]
+    again = bench.begin(COMMAND._replace(tns=7))
+    assert len(bench.wait(30.0)) == 1  # one try for a silent station
+    assert isinstance(again.result, StationInactive)
+
+
+def test_reply_to_an_earlier_try_ends_the_command() -> None:
+    bench = Bench()
+    task = bench.begin(COMMAND)
+    assert len(bench.wait(1.0 + 0.5)) == 2
+    bench.hear(framed(COMMAND.reply()), framed(COMMAND.reply()))
+    assert task.result == COMMAND.reply()
+    assert bench.wait(60.0) == []
+    assert bench.machine.counters.duplicate_messages == 1
+    assert bench.numbers() == [2521, 2523]
+
+
+def test_command_that_has_become_too_old_is_not_repeated() -> None:
+    bench = Bench()
+    task = bench.begin(COMMAND)
+    task.expires = bench.now + 0.6
+    assert len(bench.wait(30.0)) == 1
+    assert isinstance(task.result, CommandExpired) and task.result.sent
+    old = bench.add(COMMAND._replace(tns=8))
+    old.expires = bench.now + 0.001
+    bench.machine.wake(bench.now)
+    assert bench.wait(30.0) == []
+    assert isinstance(old.result, CommandExpired) and not old.result.sent
+
+
+def test_broadcast_goes_out_once_and_has_no_reply() -> None:
+    bench = Bench()
+    task = bench.begin(COMMAND._replace(dst=BROADCAST))
+    assert bench.wait(30.0) == [framed(COMMAND._replace(dst=BROADCAST))]
+    assert isinstance(task.result, Packet)
+
+
+def test_command_for_us_is_executed_once_and_its_repetition_answered_again() -> None:
+    bench = Bench()
+    reply = framed(THEIRS.reply(bytes((US,)) + THEIRS.data))
+    bench.hear(framed(THEIRS))
+    assert bench.wait(1.0) == [reply]
+    bench.hear(framed(THEIRS))
+    assert bench.wait(1.0) == [reply]
+    assert bench.executed == {(PLC, THEIRS.tns): 1}
+    bench.hear(framed(THEIRS), framed(THEIRS))  # the second is what a node has sent on
+    assert bench.wait(1.0) == [reply]
+    assert bench.executed == {(PLC, THEIRS.tns): 1}
+
+
+def test_sender_that_always_counts_zero_is_served_after_a_while() -> None:
+    bench = Bench()
+    for count in range(1, 4):
+        bench.hear(framed(THEIRS._replace(tns=0)))
+        bench.wait(11.0)
+        assert bench.executed == {(PLC, 0): count}
+
+
+def test_broadcast_is_executed_and_not_answered() -> None:
+    bench = Bench()
+    bench.hear(framed(THEIRS._replace(dst=BROADCAST)))
+    assert bench.wait(5.0) == []
+    assert bench.executed == {(PLC, THEIRS.tns): 1}
+
+
+@pytest.mark.parametrize('heard', [
+    framed(THEIRS._replace(dst=OTHER)), framed(THEIRS._replace(src=US)), ACK, NAK, ENQ,
+    framed(THEIRS)[:-1] + b'\0', b'noise', framed(THEIRS._replace(sts=1))])
+def test_what_is_not_for_us_is_dropped_in_silence(heard: bytes) -> None:
+    bench = Bench()
+    bench.hear(heard)
+    assert bench.wait(5.0) == []
+    assert not bench.executed
+
+
+def test_line_that_is_not_quiet_is_waited_for_but_not_for_ever() -> None:
+    bench = Bench()
+    bench.begin(COMMAND)
+    for _ in range(100):
+        if bench.wait(0.03):
+            break
+        bench.hear(b'\x55' * 20)
+    assert 2.0 <= bench.now - 100.0 <= 2.2
+
+
+def test_packets_between_nodes_of_the_table_are_sent_on_once() -> None:
+    bench = Bench(store_forward={PLC, OTHER, US})
+    packet = THEIRS._replace(dst=OTHER)
+    bench.hear(framed(packet), framed(packet))
+    assert bench.wait(1.0) == [framed(packet)]
+    bench.hear(framed(packet))  # by another one that sends on
+    bench.hear(framed(packet._replace(dst=3)), framed(packet._replace(src=US)),
+               framed(packet._replace(dst=BROADCAST)))
+    assert bench.wait(1.0) == []
+
+
+def test_broadcast_is_sent_on_where_the_table_has_255() -> None:
+    bench = Bench(store_forward={PLC, BROADCAST})
+    bench.hear(framed(THEIRS._replace(dst=BROADCAST)))
+    assert bench.wait(1.0) == [framed(THEIRS._replace(dst=BROADCAST))]
+    assert bench.executed == {(PLC, THEIRS.tns): 1}
+
+
+# Many nodes on the air
+
+
+@dataclass(slots=True)
+class Signal:
+    """What is on the air for one receiver."""
+
+    begin: float
+    end: float
+    is_spoiled: bool = False
+
+    def meets(self, begin: float, end: float) -> None:
+        """Be spoiled by what is on the air at the same time."""
+        self.is_spoiled |= self.begin < end and begin < self.end
+
+
+class Part(bytes):
+    """Bytes of a signal."""
+
+    signal: Signal
+
+
+class Air(VirtualLine):
+    """
+    A line on which ``reach`` tells who hears whom; two signals at a time spoil each other.
+
+    Nobody hears while he sends. A share ``loss`` of the signals is lost by itself.
+    """
+
+    def __init__(self, machines: Sequence[Machine], reach: Callable[[int, int], bool],
+                 loss: float, seed: int) -> None:
+        super().__init__(*machines, baud=BAUD, seed=seed)
+        self._reach = reach
+        self._loss = loss
+        self._signals: defaultdict[int, list[Signal]] = defaultdict(list)
+        self.sent: list[bytes] = []
+        for machine in machines:
+            self._spoil(machine)
+
+    def _spoil(self, machine: Machine) -> None:
+        receive = machine.receive_data
+
+        def receive_signal(data: bytes, now: float) -> None:
+            assert isinstance(data, Part)
+            receive(bytes(len(data)) if data.signal.is_spoiled else bytes(data), now)
+
+        machine.receive_data = receive_signal  # type: ignore[method-assign]
+
+    def _take(self, sender: int) -> None:
+        data = self._machines[sender].data_to_send()
+        self._look_at(sender)
+        if not data:
+            return
+        self.sent.append(data)
+        begin = max(self.now, self._free[sender])
+        end = self._free[sender] = begin + len(data) * self.char_time
+        for receiver in range(len(self._machines)):
+            if receiver == sender or self._reach(sender, receiver):
+                signal = Signal(begin, end, self._random.random() < self._loss)
+                for other in self._signals[receiver]:
+                    other.meets(begin, end)
+                    signal.meets(other.begin, other.end)
+                self._signals[receiver] = [
+                    other for other in self._signals[receiver] if other.end > self.now] + [signal]
+                if receiver != sender:
+                    self._arrive(data, signal, receiver)
+
+    def _arrive(self, data: bytes, signal: Signal, receiver: int) -> None:
+        """Let the first bytes be heard at once, so that others hold back, and the rest."""
+        for first, last in ((0, 4), (4, len(data))):
+            part = Part(data[first:last])
+            part.signal = signal
+            self._count += 1
+            here = signal.begin + last * self.char_time
+            heapq.heappush(self._arrivals, (here, self._count, receiver, part))
+
+
+def chain(sender: int, receiver: int) -> bool:
+    """Tell that only neighbours hear each other."""
+    return abs(sender - receiver) == 1
+
+
+def everybody(sender: int, receiver: int) -> bool:
+    """Tell that all hear each other."""
+    return True
+
+
+@pytest.mark.parametrize('reach', [chain, everybody])
+@pytest.mark.parametrize('count', [3, 5, 12])
+@pytest.mark.parametrize('loss', [0.0, 0.2])
+@pytest.mark.parametrize('seed', range(3))
+def test_nothing_is_executed_twice_nothing_is_wrong_and_everything_ends(
+        reach: Callable[[int, int], bool], count: int, loss: float, seed: int) -> None:
+    random = Random(f'{count} {loss} {seed}')
+    retries = 3
+    table = {*range(1, count + 1)} if reach is chain else set[int]()
+    nodes = [Node(RadioSettings(number, Checksum.CRC, retries, CMD_TIMEOUT, table),
+                  lambda: air.now, seed + number) for number in range(1, count + 1)]
+    air = Air([node.machine for node in nodes], reach, loss, seed)
+    air.start()
+    for node in nodes:
+        numbers = [other for other in range(1, count + 1) if other != node.settings.station]
+        node.stations.add(numbers)
+    tasks: list[CommandTask] = []
+    for number in range(20):
+        air.run_for(random.uniform(0.0, 2.0))
+        node = random.choice(nodes)
+        dst = random.choice([other.settings.station for other in nodes if other is not node])
+        command = Packet(dst, node.settings.station, 0x0F, 0, number, random.randbytes(8))
+        tasks.append(node.add(command))
+        air.wake(node.machine)
+    air.run(lambda: all(task.result is not None for task in tasks), 600.0)
+    air.run_for(30.0)
+    executed = Counter[tuple[int, int]]()
+    for node in nodes:
+        executed += node.executed
+    assert set(executed.values()) <= {1}
+    good = 0
+    for task in tasks:
+        command = task.command
+        if isinstance(task.result, Packet):
+            good += 1
+            assert task.result == command.reply(bytes((command.dst,)) + command.data)
+            assert executed[command.src, command.tns] == 1
+        assert air.sent.count(framed(command)) <= count + retries
+        reply = command.reply(bytes((command.dst,)) + command.data)
+        assert air.sent.count(framed(reply)) <= count + retries
+    if loss == 0.0 and count == 3:
+        assert good >= 15
