@@ -200,6 +200,11 @@ check-install: build ## Build, then see that what is installed starts
 
 endif
 
+.PHONY: image
+image: ## Build the image of deploy/Dockerfile, where there is a docker
+	@if docker info >/dev/null 2>&1; then docker build -f deploy/Dockerfile -t abdf1_ros .; \
+	else echo 'image: not built, as no docker runs here' | tee -a "$${NOTES:-/dev/null}"; fi
+
 .PHONY: clean
 clean: ## Remove what build, lint and test have made
 	rm -rf build install log dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -15,20 +15,24 @@
 """Package description for colcon (ament_python) and for pip."""
 
 from glob import glob
+from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
 PACKAGE = 'abdf1_ros'
 
+# Maintainer and addresses are filled in there alone; a release counts up both versions.
+MANIFEST = ElementTree.parse(Path(__file__).resolve().parent / 'package.xml').getroot()
+MAINTAINER = MANIFEST.find('maintainer')
+
 setup(
     name=PACKAGE,
     version='0.1.0',
     description='Bridge between Allen-Bradley PLCs and ROS topics over DF1',
-    url='https://github.com/abdf1-ros/abdf1_ros',
-    author='abdf1_ros maintainers',
-    author_email='maintainers@users.noreply.github.com',
-    maintainer='abdf1_ros maintainers',
-    maintainer_email='maintainers@users.noreply.github.com',
+    url=MANIFEST.find('url[@type="repository"]').text,
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get('email'),
     license='Apache-2.0',
     python_requires='>=3.11',
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
