@@ -137,11 +137,12 @@ def called(name: str) -> str:
     if shutil.which('ros2') and any(
             Path(prefix, 'lib', 'abdf1_ros', name).exists() for prefix in filter(None, prefixes)):
         return f'ros2 run abdf1_ros {name}'
-    script = Path(sys.executable).with_name(name)
-    # Others have commands of these names too, such as Node.js.
-    if not script.is_file() or b'abdf1_ros' not in script.read_bytes()[:1000]:
-        return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
-    return name if shutil.which(name) == str(script) else shlex.quote(str(script))
+    for script, words in ((shutil.which(name), name),
+                          (str(Path(sys.executable).with_name(name)), None)):
+        # Others have commands of these names too, such as Node.js.
+        if script and Path(script).is_file() and b'abdf1_ros' in Path(script).read_bytes()[:1000]:
+            return words or shlex.quote(script)
+    return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
 
 
 def advice_for(number: int | None) -> str:
