@@ -21,6 +21,10 @@ that topic on ~/write_results. It repeats the label of the message as "request",
 writers to one topic can tell their results apart. A text has no label: this program takes the
 first result that has its tag. So give a topic of texts one writer.
 
+With --station the command is sent only while the bridge says, in the status "interlocks" of
+/diagnostics, that its heartbeat counts at that station; otherwise it is told why not. The PLC has
+the last word: its program ignores commands until a person has reset.
+
 A command whose result does not come is neither done nor not done. Look at the read topic before
 you send it again; for a pulse, a second one may be the wrong one.
 
@@ -38,7 +42,7 @@ import time
 from typing import Any
 import uuid
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
@@ -55,6 +59,7 @@ examples:
   command_writer.py setpoint 21.5 --node /cell/line_1
   command_writer.py name 'Tank 4'
   command_writer.py lamps 1 --tags lamp_north lamp_south     two mappings, one topic
+  command_writer.py speed 40 --station 1                     while ROS is in control there
 """
 
 
@@ -70,6 +75,21 @@ class CommandWriter(Node):
         self.results: dict[str, DiagnosticStatus] = {}
         self._listener = self.create_subscription(
             DiagnosticStatus, f'{bridge}/write_results', self._take, 100)
+        self._interlocks = f'{bridge.lstrip("/")}: interlocks'
+        self._control: dict[str, str] = {}
+
+    def why_not_in_control(self, station: int, timeout: float) -> str:
+        """Return why the heartbeat does not count at a station, empty where it does."""
+        told = self.create_subscription(DiagnosticArray, '/diagnostics', self._take_control, 10)
+        self._spin_until(lambda: self._control, timeout)
+        self.destroy_subscription(told)
+        text = self._control.get(f'station {station}', 'the bridge has no heartbeat there')
+        return '' if text.startswith('heartbeat counts') else text.removeprefix('not in control: ')
+
+    def _take_control(self, array: DiagnosticArray) -> None:
+        for status in array.status:
+            if status.name == self._interlocks:
+                self._control = {pair.key: pair.value for pair in status.values}
 
     def connect(self, timeout: float) -> bool:
         """Find the bridge; whether it listens and we hear its results."""
@@ -139,6 +159,10 @@ def run(node: CommandWriter, options: argparse.Namespace) -> int:
         print(f'not written: {options.node} does not listen to write/{options.topic}'
               if node.has_bridge else f'not written: there is no node {options.node}')
         return NOT_WRITTEN
+    if options.station is not None and (
+            why := node.why_not_in_control(options.station, options.timeout)):
+        print(f'not written: ROS is not in control of station {options.station}: {why}')
+        return NOT_WRITTEN
     complete = node.write(options.values, options.timeout)
     for tag, result in node.results.items():
         latency = {pair.key: pair.value for pair in result.values}['latency_ms']
@@ -159,6 +183,8 @@ def main() -> int:
     parser.add_argument('values', nargs='+', help='all values of the mapping; for bits 0 and 1')
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
     parser.add_argument('--tags', nargs='+', help='of the mappings (default: the topic)')
+    parser.add_argument('--station', type=int,
+                        help='write only while the heartbeat counts at this station')
     parser.add_argument('--timeout', type=float, default=6.0,
                         help='seconds to wait for the bridge, then for the result; longer than '
                              'twice its write_timeout, for a write that is read back '

@@ -18,17 +18,18 @@ from __future__ import annotations
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.fallbacks import FallbackRow
-from abdf1_ros.driver.heartbeats import HeartbeatRow
+from abdf1_ros.driver.heartbeats import BeatState, HeartbeatRow
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.plan.interlocks import Bound, Times
-from abdf1_ros.ros.status import Judgement, milliseconds, Moment, OK, WARN, with_age
+from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
 
 
 class InterlockStatus:
     """
     What is told of the heartbeats and fallbacks of a driver; asked ten times a second.
 
-    ``crowded`` are topics with a Fallback and more than one publisher.
+    ``crowded`` are topics with a Fallback and more than one publisher; ``conflicts`` say what
+    another program has written over a heartbeat, by its tag.
     """
 
     def __init__(self, driver: Driver) -> None:
@@ -36,7 +37,8 @@ class InterlockStatus:
         self._beats = driver.interlocks.heartbeats
         self._fallbacks = driver.interlocks.fallbacks
         self._bounds = [*Times(driver.network, driver.mappings, driver.blocks).bounds()]
-        self._since: dict[str, float] = {}  # by tag of the heartbeat
+        self.conflicts: dict[str, str] = {}  # by tag of the heartbeat
+        self._since: dict[str, float] = {}
         self._last: dict[int, Moment] = {}  # fallback value by station
 
     def written(self, result: WriteResult, now: float) -> None:
@@ -45,7 +47,7 @@ class InterlockStatus:
             self._last[result.mapping.station] = f'{result.mapping.tag}: {result.detail}', now
 
     def judge(self, now: float) -> Judgement:
-        """Return WARN where a heartbeat does not count or a fallback is due."""
+        """Return WARN where a heartbeat does not count, ERROR where another program writes it."""
         at_rest = [beat.mapping.tag for beat in self._beats if self._why_not(beat, now)]
         due = [row.mapping.tag for row in self._fallbacks if row.cause is not None]
         notes = [f'{", ".join(tags)}: {what}' for tags, what in (
@@ -53,10 +55,13 @@ class InterlockStatus:
             (self.crowded, 'more than one publisher')) if tags]
         counting = len(self._beats) - len(at_rest)
         text = f'{counting} of {len(self._beats)} heartbeats count'
-        return (WARN, '; '.join([text, *notes])) if notes else (OK, text)
+        level = OK if not notes else ERROR if any(map(_is_taken, self._beats)) else WARN
+        return level, '; '.join([text, *notes])
 
     def _why_not(self, beat: HeartbeatRow, now: float) -> str:
         reason = beat.why_not(now)
+        if _is_taken(beat):
+            reason = self.conflicts.get(beat.mapping.tag, reason)
         if reason:
             self._since.pop(beat.mapping.tag, None)
         else:
@@ -86,6 +91,10 @@ class InterlockStatus:
         reason = self._why_not(beat, now)
         return f'heartbeat {beat.value}{age}; ' \
             + (f'does not count: {reason}' if reason else 'counts')
+
+
+def _is_taken(beat: HeartbeatRow) -> bool:
+    return beat.state is BeatState.CONFLICT
 
 
 def _fallback(row: FallbackRow) -> str:

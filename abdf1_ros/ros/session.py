@@ -238,6 +238,8 @@ class BridgeSession:
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
         """Log that a heartbeat is not the one that we have written (rule 19)."""
         log = self.notes.error if is_conflict else self.notes.warning
+        if is_conflict:
+            self.diagnostics.interlocks.conflicts[mapping.tag] = f'{mapping.address}: {text}'
         log(mapping.tag, f'{_where(mapping)}: {text}')
 
     def happened(self, event: Event) -> None:

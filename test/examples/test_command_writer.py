@@ -22,7 +22,7 @@ import sys
 import threading
 import time
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
 from support.commands import call
@@ -127,6 +127,13 @@ def answered(write: Write) -> Iterator[Answered]:
     """Return what writes 7 to lamps; its ``answer`` gives tag, text and value of each result."""
     with Observer() as observer:
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
+        diagnostics = observer.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        stations = {'station 1': 'heartbeat counts since 2.0 s',
+                    'station 2': 'not in control: no message of speed in time'}
+        status = DiagnosticStatus(name='fake: interlocks', values=[
+            KeyValue(key=key, value=value) for key, value in stations.items()])
+        observer.node.create_timer(
+            0.1, lambda: diagnostics.publish(DiagnosticArray(status=[status])))
         answers: list[Answer] = []
 
         def take(message: Int16MultiArray) -> None:
@@ -183,3 +190,13 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
 ])
 def test_text_of_a_result_decides_the_exit_status(message: str, status: int) -> None:
     assert runpy.run_path(str(EXAMPLE))['judge'](message) == status
+
+
+@pytest.mark.parametrize(('station', 'expected'), [
+    ('1', (0, ['lamps: written (1.0 ms)'])),
+    ('2', (1, ['not written: ROS is not in control of station 2: no message of speed in time'])),
+    ('3', (1, ['not written: ROS is not in control of station 3: the bridge has no heartbeat '
+               'there']))])
+def test_command_goes_only_to_a_plc_that_ros_is_in_control_of(
+        answered: Answered, station: str, expected: tuple[int, list[str]]) -> None:
+    assert answered(lambda data: [('lamps', 'written', OURS)], '--station', station) == expected

@@ -511,6 +511,17 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
     assert values['bound of alive'].startswith('PLC timer presets ')
 
 
+def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
+        make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
+    beat = bench.driver.interlocks.heartbeats[0]
+    beat.confirmed, beat.state = NOW, BeatState.CONFLICT
+    assert bench.says('interlocks')[0] == ERROR
+    text = 'N10:0: another program writes this word: 7 was read where 3 was written'
+    bench.diagnostics.interlocks.conflicts['alive'] = text
+    assert details(bench.status('interlocks'))['station 1'] == f'not in control: {text}'
+
+
 def test_last_fallback_value_of_a_station_is_told_with_its_cause(
         make_bench: Callable[..., Bench]) -> None:
     bench = make_bench('speed,Write,N10:1,1,PLC5,')
