@@ -231,6 +231,22 @@ def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
     assert bench.next(0.0) is another
 
 
+def test_new_writes_and_packets_of_a_long_one_take_turns() -> None:
+    bench = Bench()
+    task = bench.tasks.start(NinePackets(), 0.0)
+    task.reply(task.command.reply())
+    writes = [bench.write(make_mapping(f'N7:{20 + n}', 'Write'), n, 0.0) for n in range(4)]
+    order = []
+    for _ in range(8):
+        taken = bench.next(0.0)
+        order.append(taken)
+        if taken is task.job:
+            task.reply(task.command.reply())
+    assert order in ([task.job, writes[0], task.job, writes[1], task.job, writes[2], task.job,
+                      writes[3]], [writes[0], task.job, writes[1], task.job, writes[2], task.job,
+                                   writes[3], task.job])
+
+
 def test_writes_go_on_when_no_read_is_due() -> None:
     bench = Bench(make_job(period=1000))
     bench.read(0.0)

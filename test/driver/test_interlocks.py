@@ -23,11 +23,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+import math
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.guards import RunGuard
+from abdf1_ros.driver.fallbacks import FallbackCause, FallbackRow
+from abdf1_ros.driver.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.heartbeats import BeatState, LARGEST
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
@@ -272,6 +274,45 @@ def test_rule_3d_required_topic_that_falls_silent_is_0_at_once(polling: str) -> 
     assert zero < begun + 0.3 + 0.05
 
 
+def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
+    speed = speed_row(Fallback((7,), 3000))
+    cell = Cell(beat_row(2000, requires=['speed'], timeout=5000), speed)
+    cell.publish(speed, 3, times=100)
+    cell.run(5.0)
+    interlocks, now = cell.bench.driver.interlocks, cell.now
+    beat = interlocks.heartbeats[0]
+
+    def expires(executor: float, message: float) -> float:
+        """Return until when a beat may be sent that is due now."""
+        interlocks.executor_ran(executor)
+        interlocks._messages['speed'] = message
+        beat._next = beat.due = now
+        interlocks._plan(*interlocks._plcs.values())
+        own = interlocks.next(now)
+        assert own is not None
+        assert own.row is beat
+        own.ended(None)
+        return own.expires
+
+    assert expires(now - 0.5, now) == now + 1.5  # of the executor
+    assert expires(now, now - 4.0) == now + 1.0  # of the topic
+    assert expires(now + 9.0, now + 9.0) == now + 3.0  # of the fallback: a message waits
+
+
+def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(requires=['speed'], timeout=5000), speed)
+    cell.run(2.0)
+    assert set(cell.written('N10:0')) == {0}
+    row = cell.bench.driver.interlocks.fallbacks[0]
+    row.sent = cell.now
+    cell.bench.driver.write([speed], [3], cell.now - 0.1)
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(1.0)
+    assert cell.results()[-1] == 'not written: not sent: fallback'
+    assert set(cell.written('N10:0')) == {0}
+
+
 def test_rule_4_inactive_station_is_not_probed_with_heartbeats() -> None:
     cell = Cell(beat_row())
     cell.run(1.0)
@@ -412,6 +453,31 @@ def test_rule_8_change_to_run_is_a_first_contact() -> None:
     at = after.index(('N10:0', 0))
     assert after[at:at + 3] == [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)]
     assert cell.results()[-1] == RUN
+
+
+def test_rule_8_cleared_fault_is_a_change_to_run() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(beat_row(), speed)
+    cell.run(1.0)
+    cell.publish(speed, 3)
+    cell.run(1.0)
+    running = Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
+    for identity in (running, replace(running, faults=('bad RAM',)), running):
+        cell.bench.driver._station_told(1, identity, cell.now)
+    cell.run(1.0)
+    assert cell.results()[-1] == RUN
+
+
+def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
+    row = FallbackRow(speed_row(), 0.5)
+    row.make_due(FallbackCause.START, 0.0)
+    row.take(0.0)
+    row.ended(Outcome.WRITTEN, 0.1)
+    row.message_ended(1.0, Outcome.UNKNOWN)  # counts once for the time that it stands (rule 7)
+    assert row.deadline(-math.inf) == 1.0 + AFTER
+    assert not row.is_fresh(1.1)
+    row.message_ended(1.2, Outcome.WRITTEN)
+    assert row.is_fresh(1.2 + 0.9 * AFTER)
 
 
 def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None:
@@ -555,6 +621,19 @@ def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
     assert line.asked[7][0] - begun < 1.0 + 8 * (0.5 + 0.1)
 
 
+@pytest.mark.parametrize(('outcome', 'again'), [
+    (Outcome.PARTLY, True), (Outcome.UNKNOWN, True), (Outcome.FAILED, False)])
+def test_rule_10_once_more_after_a_message_that_may_have_been_written(
+        outcome: Outcome, again: bool) -> None:
+    row = FallbackRow(speed_row(), 0.5)
+    row.message_ended(1.0, outcome)
+    assert row.judge(2.0, -math.inf)
+    row.take(2.0)
+    assert row.ended(Outcome.WRITTEN, 2.1) is not None
+    assert row.judge(3.0, -math.inf) is False
+    assert row.judge(3.2, -math.inf) is again  # 2 x Cmd_Timeout after it was confirmed
+
+
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     cell = Cell(beat_row(), speed_row())
     cell.refused = {'N7:0', 'N10:0'}
@@ -691,6 +770,20 @@ def test_rule_14_counter_has_to_change_twice_before_anything_is_published() -> N
     times = cell.bench.listener.times(read)
     assert ended < times[-1] < ended + 0.65
     assert cell.bench.driver.points[read].withheld == 'alive has not changed twice within 0.5 s'
+
+
+def test_rule_14_late_change_ends_what_two_in_time_have_permitted() -> None:
+    row = make_mapping('N7:0', publish_while=PublishWhile('alive', 500))
+    point, guard = ReadPoint(row, 0.1, 3.0), CounterGuard('alive')
+    guard.add(point)
+    for number, now in enumerate((0.0, 0.3, 0.6)):
+        guard.read(bytes((number,)), now)
+    assert guard.why_not(point, 0.7, 0.7) == ''
+    guard.read(b'x', 5.0)  # late, and nobody has asked meanwhile
+    assert guard.why_not(point, 5.1, 5.1) == 'alive has not changed twice within 0.5 s'
+    guard.read(b'y', 5.2)
+    assert [guard.why_not(point, 5.2, 5.3), guard.why_not(point, 5.3, 5.3)] == [
+        'alive has begun to change during this read', '']
 
 
 def test_rule_14_one_change_is_no_life() -> None:
