@@ -28,7 +28,8 @@ _TIME = re.compile(
     rf'\d{{1,2}}:\d\d(?::\d\d)?(?: ?[ap]m)?|\d{{1,4}}[./-]\d{{1,2}}[./-]\d{{1,4}}|'
     rf'\d{{1,2}}\.?[ -]{_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+', re.IGNORECASE)
 _WRAPPED = re.compile(r'="?(?P<formula>[^"]+)"?|\'(?P<text>.+)')
-_ERROR = re.compile(r'#(?:N/A|NV|DIV/0!|[A-Z]+[!?])')
+_ERROR = re.compile(r'#(?:(?:N/A|NV|NAME\?|NOM\?)'
+                    r'|(?:DIV/0|REF|VALUE|NULL|NUM|BEZUG|WERT|ZAHL|VALEUR|VALOR)!)')
 
 
 def is_spreadsheet_error(text: str) -> bool:

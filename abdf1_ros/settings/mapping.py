@@ -38,21 +38,6 @@ from abdf1_ros.settings.scaling import Scaling
 READ_ONLY = 'Read'
 
 
-def _or_empty(value: int | None) -> str:
-    return '' if value is None else str(value)
-
-
-# By column: the attribute of a mapping, and how its value is written in a cell.
-_DEPENDENT_CELLS: dict[str, tuple[str, Callable[[Any], str]]] = {
-    'Requires': ('heartbeat', lambda entry: ' '.join(entry.requires)),
-    'Requires_Timeout': ('heartbeat', lambda entry: _or_empty(entry.requires_timeout)),
-    'Fallback': ('fallback', lambda entry: values_text(entry.values)),
-    'Fallback_After': ('fallback', lambda entry: str(entry.after)),
-    'Publish_While': ('publish_while', lambda entry: entry.text),
-    'Heartbeat_Timeout': ('publish_while', lambda entry: _or_empty(entry.timeout)),
-}
-
-
 class Command(Enum):
     """What a mapping does."""
 
@@ -176,17 +161,23 @@ class Mapping:
 
     def cell(self, column: str) -> str:
         """Return a column's value as text, defaults filled in."""
-        limits = {'Min': self.minimum, 'Max': self.maximum}
-        if column in limits:
-            return '' if math.isinf(limits[column]) else f'{limits[column]:.15g}'
-        if column in ('Scale', 'Offset'):
-            scaling = self.scaling
-            return '' if scaling is None else f'{getattr(scaling, column.lower()):.15g}'
-        if column == 'Access' and self.is_read_only:
-            return READ_ONLY
-        if column in _DEPENDENT_CELLS:
-            part, text = _DEPENDENT_CELLS[column]
-            entry = getattr(self, part)
-            return '' if entry is None else text(entry)
-        value = getattr(self, column.lower())
+        value = _CELLS[column](self) if column in _CELLS else getattr(self, column.lower())
+        if isinstance(value, float):
+            return '' if math.isinf(value) else f'{value:.15g}'
         return '' if value is None else str(value.value if isinstance(value, Enum) else value)
+
+
+# What stands in the cells of columns that are no attribute of the same name.
+_CELLS: dict[str, Callable[[Mapping], Any]] = {
+    'Min': lambda mapping: mapping.minimum,
+    'Max': lambda mapping: mapping.maximum,
+    'Scale': lambda mapping: mapping.scaling and mapping.scaling.scale,
+    'Offset': lambda mapping: mapping.scaling and mapping.scaling.offset,
+    'Access': lambda mapping: READ_ONLY if mapping.is_read_only else mapping.access,
+    'Requires': lambda mapping: mapping.heartbeat and ' '.join(mapping.heartbeat.requires),
+    'Requires_Timeout': lambda mapping: mapping.heartbeat and mapping.heartbeat.requires_timeout,
+    'Fallback': lambda mapping: mapping.fallback and values_text(mapping.fallback.values),
+    'Fallback_After': lambda mapping: mapping.fallback and mapping.fallback.after,
+    'Publish_While': lambda mapping: mapping.publish_while and mapping.publish_while.text,
+    'Heartbeat_Timeout': lambda mapping: mapping.publish_while and mapping.publish_while.timeout,
+}

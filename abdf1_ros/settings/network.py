@@ -20,7 +20,6 @@ from collections.abc import Iterator
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import re
-from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -112,13 +111,8 @@ class NetField:
                      if str(choice).lower() == text.lower()), None)
 
 
-def _net(column: str, default: int | str, description: str, *, low: int | None = None,
-         high: int | None = None, choices: tuple[int | str, ...] = (),
-         message: Message | None = None, message_args: tuple[Any, ...] = (),
-         other_words: MappingType[str, str] = MappingProxyType({}),
-         also: MappingType[str, str] = MappingProxyType({})) -> Any:
-    entry = NetField(column, default, description, low, high, choices, message, message_args,
-                     other_words, also)
+def _net(column: str, default: int | str, description: str, **details: Any) -> Any:
+    entry = NetField(column, default, description, **details)
     return field(default=default, metadata={'net': entry})
 
 
