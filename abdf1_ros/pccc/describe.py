@@ -23,18 +23,11 @@ from typing import Any
 
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc import diagnostics, notation
 from abdf1_ros.pccc.address import Address, AddressRefusal
 from abdf1_ros.pccc.families import decode_identity, known_commands
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.notation import (
-    CommandCode,
-    count_of,
-    hexadecimal,
-    KnownCommand,
-    part_of,
-    words_text,
-)
+from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.plc3 import commands as plc3
 from abdf1_ros.pccc.plc3.address import ADDRESSING as PLC3
 from abdf1_ros.pccc.plc3.address import BY_SECTION
@@ -54,7 +47,7 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
     Return what a command asks, or what a reply says.
 
     ``command`` is the one that a reply answers; without it the data of a reply are bytes. Unknown
-    or malformed parts are given in hexadecimal.
+    or malformed parts are given in notation.hexadecimal.
     """
     if not packet.is_reply:
         return _describe_command(packet)
@@ -70,7 +63,7 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
             return entry.values(entry.read(_parameters(command)), data)
         except FormatError:
             pass
-    return hexadecimal(data)
+    return notation.hexadecimal(data)
 
 
 def command_codes() -> dict[tuple[int, int | None], str]:
@@ -97,11 +90,11 @@ def _describe_command(packet: Packet) -> str:
     entry = _known().get(code)
     if entry is None:
         name = _NAMES.get(code) or f'command {command_name(packet)}'
-        return f'{name} {hexadecimal(parameters)}'.rstrip()
+        return f'{name} {notation.hexadecimal(parameters)}'.rstrip()
     try:
         return f'{entry.name} {entry.words(entry.read(Reader(parameters)))}'.rstrip()
     except FormatError as error:
-        return f'{entry.name}, malformed ({error}): {hexadecimal(packet.data)}'
+        return f'{entry.name}, malformed ({error}): {notation.hexadecimal(packet.data)}'
 
 
 def _code(packet: Packet) -> CommandCode:
@@ -179,13 +172,13 @@ def extended_address(address: ExtendedAddress) -> str:
 
 def _range_read(request: word_range.WordRangeRead[_Range]) -> str:
     words = request.size // 2
-    return (f'{_range_text(request.address)}, {count_of(words, "word")}'
-            f'{part_of(request.offset, words, request.total)}')
+    return (f'{_range_text(request.address)}, {notation.count_of(words, "word")}'
+            f'{notation.part_of(request.offset, words, request.total)}')
 
 
 def _range_write(request: word_range.WordRangeWrite[_Range]) -> str:
-    return (f'{_range_text(request.address)} = {words_text(request.data) or "nothing"}'
-            f'{part_of(request.offset, len(request.data) // 2, request.total)}')
+    return (f'{_range_text(request.address)} = {notation.words_text(request.data) or "nothing"}'
+            f'{notation.part_of(request.offset, len(request.data) // 2, request.total)}')
 
 
 def _bit_write(request: word_range.WordBitWrite[_Range]) -> str:
@@ -206,7 +199,7 @@ def _no_parameters(reader: Reader) -> None:
 
 
 def _words_reply(request: object, data: bytes) -> str:
-    return words_text(data)
+    return notation.words_text(data)
 
 
 def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callable[[Reader], Any]:
@@ -219,7 +212,8 @@ _SHARED: dict[CommandCode, KnownCommand] = {
         'diagnostic status', _no_parameters, lambda request: '', _identity_reply),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
         'read diagnostic counters', diagnostics.ReadCounters.read,
-        lambda request: f'at {request.address}, {count_of(request.size, "byte")}', _words_reply),
+        lambda request: f'at {request.address}, {notation.count_of(request.size, "byte")}',
+        _words_reply),
     (word_range.CMD, word_range.WRITE): KnownCommand(
         'word range write', _ranged(word_range.WordRangeWrite.read), _range_write),
     (word_range.CMD, word_range.READ): KnownCommand(

@@ -96,9 +96,10 @@ class ServedCounters:
             ((counts.get(name, 0) - self._origin.get(name, 0)) & 0xFFFF).to_bytes(2, 'little')
             for name in self._layout.names)
 
-    def reset(self) -> None:
-        """Begin again at 0."""
+    def reset(self) -> bytes:
+        """Begin again at 0; return the reply's data, which are none."""
         self._origin = self._counts()
+        return b''
 
     def _counts(self) -> dict[str, int]:
         """Return those of the names that we count."""

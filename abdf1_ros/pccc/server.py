@@ -21,21 +21,14 @@ drivers in the field report.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import status
+from abdf1_ros.pccc import diagnostics, status
 from abdf1_ros.pccc.address import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
-from abdf1_ros.pccc.diagnostics import (
-    CMD,
-    ECHO,
-    Echo,
-    MAX_COUNTERS,
-    READ_COUNTERS,
-    ReadCounters,
-    RESET_COUNTERS,
-    STATUS,
-)
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.family import Family
@@ -96,39 +89,32 @@ def _diagnostics(family: Family, processor: EmulatedProcessor,
     Without ``counters`` a read of them is refused. Commands that set up a link (06/02, 04 to 06,
     08) are not served: our settings come from a file, and must not be changed from the line.
     """
-    commands: Commands = {
-        (CMD, ECHO): lambda reader: _echo(reader, family.max_echo),
-        (CMD, STATUS): lambda reader: _without_parameters(reader, processor.encode()),
-    }
+    cmd = diagnostics.CMD
+    commands: Commands = {(cmd, diagnostics.ECHO): partial(_echo, family.max_echo),
+                          (cmd, diagnostics.STATUS): partial(_reply, processor.encode)}
     if counters is not None:
-        commands[CMD, READ_COUNTERS] = lambda reader: _counters(
-            reader, family, counters.encode())
-        commands[CMD, RESET_COUNTERS] = lambda reader: _reset(reader, counters)
+        commands[cmd, diagnostics.READ_COUNTERS] = partial(_counters, family, counters)
+        commands[cmd, diagnostics.RESET_COUNTERS] = partial(_reply, counters.reset)
     return commands
 
 
-def _echo(reader: Reader, limit: int) -> bytes:
-    data = Echo.read(reader).data
+def _echo(limit: int, reader: Reader) -> bytes:
+    data = diagnostics.Echo.read(reader).data
     if len(data) > limit:
         raise FormatError(f'an echo of {len(data)} bytes, at most {limit}')
     return data
 
 
-def _counters(reader: Reader, family: Family, block: bytes) -> bytes:
-    request = ReadCounters.read(reader)
-    if request.size > MAX_COUNTERS:
-        raise FormatError(f'{request.size} bytes of counters, at most {MAX_COUNTERS}')
+def _counters(family: Family, counters: ServedCounters, reader: Reader) -> bytes:
+    request = diagnostics.ReadCounters.read(reader)
+    if request.size > diagnostics.MAX_COUNTERS:
+        raise FormatError(f'{request.size} bytes of counters, at most {diagnostics.MAX_COUNTERS}')
     if request.address and not family.counters_anywhere:
         raise FormatError(f'counters at address {request.address}; they are at 0')
-    return block[:request.size]
+    return counters.encode()[:request.size]
 
 
-def _reset(reader: Reader, counters: ServedCounters) -> bytes:
+def _reply(carry_out: Callable[[], bytes], reader: Reader) -> bytes:
+    """Carry out a command without parameters."""
     reader.end()
-    counters.reset()
-    return b''
-
-
-def _without_parameters(reader: Reader, reply: bytes) -> bytes:
-    reader.end()
-    return reply
+    return carry_out()

@@ -16,20 +16,10 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc import typed_data
+from abdf1_ros.pccc import notation, typed_data
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.notation import (
-    CommandCode,
-    count_of,
-    floats_text,
-    integers_text,
-    KnownCommand,
-    NUMBERS,
-    part_of,
-    place_text,
-    words_text,
-)
+from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.typed_data import TypedData
@@ -56,7 +46,7 @@ def system_address(address: plc5.SystemAddress, values: TypedData | None = None)
     if kind is None and values is not None:
         kind = _BY_TYPE.get((values.type_id, values.element_size))
     if kind is not None:
-        return place_text(
+        return notation.place_text(
             ADDRESSING, kind, address.file, address.element, address.sub_element or 0)
     text = f'file {address.file}:{address.element}'
     return text if address.sub_element is None else f'{text}.{address.sub_element}'
@@ -65,24 +55,24 @@ def system_address(address: plc5.SystemAddress, values: TypedData | None = None)
 def _values(address: plc5.SystemAddress, values: TypedData) -> str:
     """Return the elements of a PLC-5 typed command or reply as their type says."""
     if values.type_id == typed_data.FLOAT and values.element_size == 4:
-        return floats_text(values.data)
+        return notation.floats_text(values.data)
     kind = _BY_FILE.get(address.file)
     if values.type_id == typed_data.INTEGER and values.element_size == 2 and (
-            kind is None or kind in NUMBERS):
-        return integers_text(values.data)
-    return words_text(values.data)
+            kind is None or kind in notation.NUMBERS):
+        return notation.integers_text(values.data)
+    return notation.words_text(values.data)
 
 
 def _typed_read(request: plc5.TypedRead) -> str:
-    return (f'{system_address(request.address)}, {count_of(request.size, "element")}'
-            f'{part_of(request.offset, request.size, request.total)}')
+    return (f'{system_address(request.address)}, {notation.count_of(request.size, "element")}'
+            f'{notation.part_of(request.offset, request.size, request.total)}')
 
 
 def _typed_write(request: plc5.TypedWrite) -> str:
     values = request.values
     return (f'{system_address(request.address, values)} = '
             f'{_values(request.address, values) or "nothing"}'
-            f'{part_of(request.offset, values.count, request.total)}')
+            f'{notation.part_of(request.offset, values.count, request.total)}')
 
 
 def _typed_reply(request: plc5.TypedRead, data: bytes) -> str:

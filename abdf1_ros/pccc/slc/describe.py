@@ -18,15 +18,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from abdf1_ros.pccc.notation import (
-    beyond,
-    CommandCode,
-    count_of,
-    KnownCommand,
-    NUMBERS,
-    place_text,
-    words_text,
-)
+from abdf1_ros.pccc import notation
+from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
@@ -36,9 +29,9 @@ def logical_address(address: slc.LogicalAddress) -> str:
     """Return an SLC address, by its fields where its type is not known."""
     kind, word = BY_CODE.get(address.type_code), address.sub_element or 0
     if kind is not None:
-        return place_text(ADDRESSING, kind, address.file, address.element, word)
+        return notation.place_text(ADDRESSING, kind, address.file, address.element, word)
     text = f'file {address.file} type {address.type_code:02X} element {address.element}'
-    return text + beyond(word)
+    return text + notation.beyond(word)
 
 
 def _size(address: slc.LogicalAddress, size: int) -> str:
@@ -46,16 +39,16 @@ def _size(address: slc.LogicalAddress, size: int) -> str:
     kind = BY_CODE.get(address.type_code)
     words = ADDRESSING.files[kind].words if kind else 1
     if words > 1 and size and size % (2 * words) == 0 and not address.sub_element:
-        return count_of(size // 2 // words, 'element')
-    return count_of(size, 'byte') if size % 2 else count_of(size // 2, 'word')
+        return notation.count_of(size // 2 // words, 'element')
+    return notation.count_of(size, 'byte') if size % 2 else notation.count_of(size // 2, 'word')
 
 
 def _values(address: slc.LogicalAddress, data: bytes) -> str:
     """Return the data of an SLC command or reply as its file type says."""
     kind = BY_CODE.get(address.type_code)
     if kind is None or kind.is_structure and not address.sub_element:
-        return words_text(data)  # a structure begins with a word of flags
-    return NUMBERS.get(kind, words_text)(data)
+        return notation.words_text(data)  # a structure begins with a word of flags
+    return notation.NUMBERS.get(kind, notation.words_text)(data)
 
 
 def _read(request: LogicalRead) -> str:
@@ -74,7 +67,7 @@ def _reply(request: LogicalRead, data: bytes) -> str:
 
 def _masked_write(request: slc.MaskedWrite) -> str:
     return (f'{logical_address(request.address)} mask {request.mask:04X} = '
-            f'{words_text(request.data) or "nothing"}')
+            f'{notation.words_text(request.data) or "nothing"}')
 
 
 DESCRIBED: dict[CommandCode, KnownCommand] = {
