@@ -84,6 +84,8 @@ ROOMS = (
          ('errors', 'problems', 'text', 'numbers', 'df1', 'pccc')),
     Room(('ports',), 'ports, the thread that runs a link on one, recording and listening',
          ('errors', 'df1', 'settings', 'sniffer'), is_pure=False),
+    Room(('share',), 'the line shared with other programs: a place for each guest',
+         ('errors', 'df1', 'pccc', 'settings', 'driver', 'ports'), is_pure=False),
     Room(('simulator',), 'simulated PLCs and the commands that they take',
          (*_BASE, 'problems', 'numbers', 'df1', 'pccc', 'settings')),
     Room(('conform',), 'cases of the manual, played against the other end of a line', ()),

@@ -132,11 +132,13 @@ class FullDuplexPeer:
     Carry out tasks on the line of ``machine`` and answer the commands that come in.
 
     ``serve`` executes a command and returns its reply; it is called once for each command,
-    never for a repetition. ``report`` is called with every numbered error and notice.
+    never for a repetition. Where it returns None, somebody adds the reply to ``replies`` later, in
+    any thread, and then wakes the machine. ``report`` is called with every numbered error and
+    notice.
     """
 
     def __init__(self, machine: Machine, settings: PeerSettings, stations: ActiveStationList,
-                 serve: Callable[[Packet], Packet],
+                 serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self._machine = machine
         self._counters = machine.counters
@@ -152,6 +154,11 @@ class FullDuplexPeer:
     def status(self) -> LinkStatus:
         """Return that there are no details."""
         return NO_STATUS
+
+    @property
+    def replies(self) -> deque[Packet]:
+        """Return the replies that are to be sent; after a start these are others."""
+        return self._replies
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve the other end, for ever."""
@@ -344,7 +351,9 @@ class FullDuplexPeer:
             self._counters.commands_received += 1
             is_ours = self._settings.station in (None, packet.dst)
             self._counters.invalid_messages += not is_ours
-            self._replies.append(self._serve(packet))
+            reply = self._serve(packet)
+            if reply is not None:
+                self._replies.append(reply)
 
     def _hear(self, symbol: Symbol) -> bytes:
         """Return what the receiver answers to a symbol (M 4-7..4-9)."""

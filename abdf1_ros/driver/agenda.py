@@ -24,6 +24,9 @@ its turn. Then there are three queues:
   reads that were due when it began go before the next check.
 - ``reads`` go in the order of ``read_queue``.
 
+``guests`` share what heartbeats, fallbacks and writes leave: after three checks or reads one of
+their commands has its turn, and never a second one while anything of ours is due.
+
 A command that asks a silent station whether it is there again is a probe. Probes get at most an
 eighth of the line's time (``df1.probes``).
 """
@@ -35,6 +38,7 @@ import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.driver.reads import Reads
@@ -42,6 +46,7 @@ from abdf1_ros.driver.writes import WriteQueue
 
 MAX_WRITES_IN_A_ROW = 4
 MAX_OWN_IN_A_ROW = 7
+MOST_BETWEEN_GUESTS = 3
 
 
 class Agenda:
@@ -52,12 +57,14 @@ class Agenda:
     """
 
     def __init__(self, stations: ActiveStationList, interlocks: Interlocks, writes: WriteQueue,
-                 checks: Checks, reads: Reads, tasks: JobTasks) -> None:
+                 checks: Checks, reads: Reads, guests: GuestQueue, tasks: JobTasks) -> None:
         self._stations = stations
         self._interlocks = interlocks or None
         self._writes = writes
         self._checks = checks
         self._reads = reads
+        self._guests = guests
+        self._since_guest = 0  # checks and reads
         self._tasks = tasks
         self._own_in_a_row = 0
         self._writes_in_a_row = 0
@@ -87,9 +94,23 @@ class Agenda:
         if has_writes and self._writes_in_a_row < MAX_WRITES_IN_A_ROW \
                 and (write := self._write(now, busy)):
             return write
+        guests = self._guests
+        has_guests = guests.has_news or guests.waiting
+        if has_guests and self._since_guest >= MOST_BETWEEN_GUESTS \
+                and (guest := self._guest(now, busy)):
+            return guest
         job = self._checks.is_due(now) and self._check(now, busy) \
             or self._interlocks and self._refresh(now, busy) or self._read(now, busy)
-        return job or has_writes and self._write(now, busy) or None
+        self._since_guest += bool(job)
+        return job or has_writes and self._write(now, busy) \
+            or has_guests and self._guest(now, busy) or None
+
+    def _guest(self, now: float, busy: Container[int]) -> Job | None:
+        """Return a command of a guest."""
+        job = self._guests.next(now, busy)
+        if job is not None:
+            self._since_guest = self._writes_in_a_row = 0
+        return job
 
     def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a new write, or the next packet of one under way, in turns."""

@@ -34,6 +34,8 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.guest_words import written_extents
+from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.heartbeats import LARGEST
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks import Interlocks
@@ -47,6 +49,7 @@ from abdf1_ros.driver.writes import MAX_WAITING_WRITES, waited_too_long, WriteQu
 from abdf1_ros.driver.writing import WritesUnderWay
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -129,9 +132,11 @@ class Driver:
             self._listener.unreadable, self._listener.foreign_value,
             1 + settings.first_tns % LARGEST)
         self._readings.read_back = self.interlocks.read_back
+        self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
+                                 self._station_of_guest, self._words_of_guest, self._reads)
         self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.health,
-                              self._reads, self._tasks)
+                              self._reads, self.guests, self._tasks)
 
     @property
     def transactions(self) -> int:
@@ -245,11 +250,12 @@ class Driver:
         self.interlocks.expire(now)
         self._writes.expire(now)
         self._tasks.expire(now)
+        self.guests.expire(now)
         self._read_backs.expire(now)
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
-        return min(self._writes.next_expiry, self._tasks.next_expiry,
+        return min(self._writes.next_expiry, self._tasks.next_expiry, self.guests.next_expiry,
                    self.interlocks.next_expiry, self._read_backs.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
@@ -260,6 +266,16 @@ class Driver:
         else:
             self.health.went_away(station.number)
         self._listener.station_changed(station)
+
+    def _station_of_guest(self, dst: int) -> int:
+        """Return whom a guest means; a peer has one PLC, whatever number others give it."""
+        if self.network.mode != 'Peer':
+            return dst
+        return next((station.number for station in self.stations), dst)
+
+    def _words_of_guest(self, command: Packet, station: int) -> list[Extent]:
+        families = {mapping.plc_type for mapping in self.mappings if mapping.station == station}
+        return written_extents(command, station, families)
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""
@@ -292,6 +308,7 @@ class Driver:
         self.health.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)
         self._inbox.open()
+        self.guests.begin()
         self.is_online = True
         reason = 'internal error, see the log'
         try:
@@ -306,6 +323,7 @@ class Driver:
         """Give everything a result; no old command is to be sent later."""
         self.is_online = False
         self._tasks.fail(error)
+        self.guests.end()
         self.health.end(str(error))
         self._readings.port_lost(str(error))
         for write in self._inbox.close():

@@ -22,11 +22,12 @@ without replying in time. Now and then one of them is sent as a probe.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Container, Iterable
+from collections.abc import Callable, Container, Iterable, Sequence
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Write
 from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
+from abdf1_ros.pccc.extent import Extent
 
 
 class Reads:
@@ -148,12 +149,20 @@ class Reads:
 
     def refresh(self, write: Write, now: float) -> None:
         """Make the reads of all words that ``write`` changed due at once."""
-        self.release(write.mapping.station, now)
-        for job in self._due.jobs:
-            if job.extent.meets(write.mapping.extent):
-                job.is_refresh, job.refreshed = True, now
-                if job.due > now:
-                    self._due.put(job, now)
+        station = write.mapping.station
+        self._refresh(station, now, lambda job: job.extent.meets(write.mapping.extent))
+
+    def refresh_words(self, station: int, extents: Sequence[Extent], now: float) -> None:
+        """Make the reads of these words due at once; all of the station where there are none."""
+        self._refresh(station, now, lambda job: job.station == station and (
+            not extents or any(job.extent.meets(extent) for extent in extents)))
+
+    def _refresh(self, station: int, now: float, is_meant: Callable[[ReadJob], bool]) -> None:
+        self.release(station, now)
+        for job in filter(is_meant, self._due.jobs):
+            job.is_refresh, job.refreshed = True, now
+            if job.due > now:
+                self._due.put(job, now)
 
     def release(self, station: int, now: float) -> None:
         """Make the reads of a station that were set aside due at once."""

@@ -37,6 +37,7 @@ from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_t
 from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
 from abdf1_ros.ros.write_log import WriteLog
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.share.guest_line import GuestLine
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -108,6 +109,13 @@ class Diagnostics:
             self._sections.append(
                 Section('interlocks', port, self.interlocks.judge, self.interlocks.values))
         self._node_name = node_name
+
+    def show_guests(self, lines: Sequence[GuestLine]) -> None:
+        """Add the status of guests, where there may be any."""
+        if lines:
+            self._sections.append(Section(
+                'guests', self._port, lambda now: _judge_guests(lines),
+                lambda now: _guest_values(lines)))
 
     def attach(self, link: LinkThread, opener: PortOpener) -> None:
         """Set the thread whose port is reported, and what opens it."""
@@ -319,6 +327,23 @@ class Diagnostics:
             if point.freshness(now) is not Freshness.FRESH:
                 values[f'tag {tag}' if tag in values else tag] = _describe(point, now)
         return values
+
+
+def _judge_guests(lines: Sequence[GuestLine]) -> Judgement:
+    guests = [line.guest for line in lines]
+    connected = sum(guest.is_connected for guest in guests)
+    notes = [f'{count} {what}' for count, what in (
+        (sum(guest.refused for guest in guests), 'commands not allowed'),
+        (sum(guest.collisions for guest in guests), 'writes to words of ours')) if count]
+    text = f'{connected} of {len(guests)} places are open'
+    return (WARN, '; '.join([text, *notes])) if notes else (OK, text)
+
+
+def _guest_values(lines: Sequence[GuestLine]) -> dict[str, str]:
+    return {line.guest.name: (
+        f'{line.link.state.text}; {line.guest.commands} commands, {line.guest.refused} not '
+        f'allowed, {line.guest.unanswered} without reply, {len(line.guest.waiting)} waiting, '
+        f'slowest {milliseconds(line.guest.slowest or None)}') for line in lines}
 
 
 def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mapping]]:

@@ -179,6 +179,7 @@ class BridgeNode(Node):
     def start(self) -> None:
         """Open the port and begin to read."""
         self.link.start()
+        self._session.start_guests()
 
     def begin_end(self) -> None:
         """Have heartbeats set to 0 and fallbacks written; ``finish_end`` waits for it."""
@@ -199,6 +200,7 @@ class BridgeNode(Node):
             self.begin_end()
             self.finish_end(time.monotonic() + END_LIMIT)
         self.link.stop()
+        self._session.stop_guests()
         self._opener.close()
         self._session.publish_diagnostics(line_time())
         # Messages that are still under way would be lost with their publisher.
@@ -249,6 +251,7 @@ class BridgeNode(Node):
             return False
         before.end()
         self._session.begin()
+        self._session.start_guests()
         declare_again(self, configuration)
         self._hold_ports(self.port)
         return True

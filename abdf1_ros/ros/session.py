@@ -23,15 +23,20 @@ used from any thread.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 import random
 from typing import Any
 
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import Guest
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.pccc.describe import describe
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -49,6 +54,8 @@ from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.share import share_places
+from abdf1_ros.share.guest_line import GuestLine
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
@@ -119,6 +126,8 @@ class BridgeSession:
         self.diagnostics = Diagnostics(
             node.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
             configuration.map_problems, Path(parameters.map_file).name)
+        self.guest_lines = self._make_guest_lines()
+        self.diagnostics.show_guests(self.guest_lines)
         self._interlocks = InterlockWatch(node, self.driver)
         self._types = TypeWatch(
             surroundings.graph, node.resolve_topic_name, configuration.mappings)
@@ -147,8 +156,19 @@ class BridgeSession:
         self.reads.take_over()
         self._publish_active()
 
+    def start_guests(self) -> None:
+        """Let guests connect."""
+        for line in self.guest_lines:
+            line.start()
+
+    def stop_guests(self) -> None:
+        """Let go of the guests."""
+        for line in self.guest_lines:
+            line.stop()
+
     def end(self) -> None:
         """End what waits and watches; another session has taken over the topics."""
+        self.stop_guests()
         self.link_counters.end()
         self._interlocks.end()
 
@@ -169,6 +189,38 @@ class BridgeSession:
 
     def _wake_link(self) -> None:
         self._surroundings.link.wake()
+
+    # Guests
+
+    def _make_guest_lines(self) -> list[GuestLine]:
+        network = self.configuration.network
+        if self.configuration.parameters.read_only:
+            network = replace(network, share_access='Read')
+        lines = [GuestLine(place, network, self.driver.guests, self._wake_link, self._guest_fault)
+                 for place in share_places(network.share)]
+        for line in lines:
+            line.guest.wrote = partial(self._guest_wrote, line.guest)
+            line.guest.was_refused = partial(self._guest_refused, line.guest)
+        return lines
+
+    def _guest_wrote(self, guest: Guest, command: Packet, station: int,
+                     words: list[Extent]) -> None:
+        rows = [row for row in self.driver.mappings if (row.writes or row.heartbeat)
+                and any(row.extent.meets(extent) for extent in words)]
+        if rows:
+            guest.collisions += 1
+            self.notes.warning(
+                f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
+                f'{describe(command)}, words of {_few([row.tag for row in rows])}')
+
+    def _guest_refused(self, guest: Guest, command: Packet) -> None:
+        if guest.refused == 1:
+            self.notes.warning(f'guest {guest.name}', (
+                f'guest {guest.name} is refused: {describe(command)}: Share_Access is '
+                f'{guest.access.value}'))
+
+    def _guest_fault(self, error: Exception) -> None:
+        self._logger.error(f'internal error in the line of a guest: {error!r}; please report it')
 
     # Files
 

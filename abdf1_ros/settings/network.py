@@ -34,6 +34,7 @@ from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.csv_table import read_table, Row, shown
 from abdf1_ros.settings.hints import hint
+from abdf1_ros.settings.share import share_places
 from abdf1_ros.settings.station_lists import octal_remarks
 
 MODES = ('Master', 'Slave', 'Peer')
@@ -158,6 +159,11 @@ class Network:
         'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
     polling: str = _net(
         'Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
+    share: str = _net(
+        'Share', '', 'places where other programs connect to share the line, separated by blanks: '
+        'pty:/name, tcp:port, tcp:address:port, or a serial device')
+    share_access: str = _net(
+        'Share_Access', 'Read', 'what they may do', choices=('Read', 'Write', 'All'))
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
@@ -249,8 +255,12 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
         try:
             checked[name] = FIELDS[name].parse(text, where)
             _check_port(name, checked[name], where)
+            _check_share(name, checked, where)
         except Problem as problem:
             problems.append(problem)
+    if checked['share'] and checked['mode'] == 'Slave':
+        problems.append(Problem(values.get('share', ('', 'Share'))[1], (
+            "Share needs Mode Master or Peer: a slave cannot send a guest's commands")))
     if problems:
         raise ConfigurationError(problems)
     given = {FIELDS[name].column for name in values}
@@ -266,6 +276,15 @@ def _check_port(name: str, value: int | str, where: Place | str) -> None:
         raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
                              f'path such as /dev/ttyUSB0, {URLS}; '
                              f'"plc ports" lists the devices{hint(text)}')
+
+
+def _check_share(name: str, checked: MappingType[str, Any], where: Place | str) -> None:
+    if name != 'share':
+        return
+    try:
+        share_places(checked['share'])
+    except ValueError as error:
+        raise Problem(where, f'Share: {error}') from None
 
 
 def _is_url(text: str) -> bool:

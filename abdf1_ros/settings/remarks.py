@@ -29,6 +29,7 @@ from abdf1_ros.problems import Problem
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.share import share_places, share_remarks
 from abdf1_ros.settings.station_lists import octal_remarks
 
 _ACK_SIZE = 2
@@ -43,6 +44,7 @@ def network_remarks(network: Network) -> Iterator[str]:
                'nearly every message fails')
     if network.mode != 'Slave':
         yield from _time_remarks(network)
+    yield from share_remarks(share_places(network.share))
 
 
 def _time_remarks(network: Network) -> Iterator[str]:

@@ -26,6 +26,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings
@@ -84,8 +85,10 @@ class Bench:
         interlocks = Interlocks((), self.stations, self.writes, writing, 1.0, lambda write: None,
                                 self.results.append, lambda mapping, reason: None,
                                 lambda mapping, text, is_conflict: None)
+        guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
+                            lambda command, station: [], self.reads)
         self.agenda = Agenda(
-            self.stations, interlocks, self.writes, checks, self.reads, self.tasks)
+            self.stations, interlocks, self.writes, checks, self.reads, guests, self.tasks)
         self.reads.replace((), jobs, 0.0)
 
     def next(self, now: float) -> object:  # noqa: A003

@@ -75,7 +75,7 @@ def test_columns_are_those_of_the_specification_and_polling() -> None:
     assert [entry.column for entry in FIELDS.values()] == [
         'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
         'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
-        'TX_Delay', 'Handshake', 'Polling']
+        'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access']
 
 
 def test_defaults() -> None:

@@ -1,0 +1,263 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Commands of guests: programs that share the PLC's port with us, each at a place of its own.
+
+A guest's command waits here for its turn on the line and gets exactly one reply, in time: that of
+the PLC, or one with an STS of M 8-2 that says why there is none. What has not been sent gets 60
+(not allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open) or 07 (the station
+is silent). What was sent and has no reply gets 02 (the station has become silent) or 05 (no reply
+in time): nobody knows then whether it was executed.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+
+from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.inbox import Inbox
+from abdf1_ros.driver.job_tasks import Job, LineTime
+from abdf1_ros.driver.reads import Reads
+from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.extent import Extent
+
+_MOST_WAITING = 4  # of a guest; a program that waits for its replies has one
+
+_NO_BUFFER, _NOT_ACKNOWLEDGED, _NOT_CONNECTED, _NO_REPLY, _OFF_LINE = 0x01, 0x02, 0x04, 0x05, 0x07
+_NOT_ALLOWED = 0x60
+
+# CMD and FNC (None: it has none) of the commands that only read, and of those that write data.
+_READS = frozenset(((0x01, None), (0x06, 0x00), (0x06, 0x01), (0x06, 0x03), *(
+    (0x0F, fnc) for fnc in (0x01, 0x04, 0x29, 0x68, 0x94, 0xA1, 0xA2, 0xA3))))
+_WRITES = frozenset((*((cmd, None) for cmd in (0x00, 0x02, 0x05, 0x08)), *(
+    (0x0F, fnc) for fnc in (0x00, 0x02, 0x03, 0x26, 0x67, 0x79, 0xA9, 0xAA, 0xAB))))
+_WITH_FUNCTION = (0x06, 0x07, 0x0F)
+
+
+class ShareAccess(Enum):
+    """What guests may do (column Share_Access)."""
+
+    READ = 'Read'
+    WRITE = 'Write'
+    ALL = 'All'
+
+    def allows(self, command: Packet) -> bool:
+        """Tell whether a command may go to the line."""
+        return self is ShareAccess.ALL or _code(command) in _READS or (
+            self is ShareAccess.WRITE and _code(command) in _WRITES)
+
+
+def _code(command: Packet) -> tuple[int, int | None]:
+    cmd = command.cmd & ~PRIORITY_BIT
+    return cmd, command.data[0] if cmd in _WITH_FUNCTION and command.data else None
+
+
+@dataclass(slots=True, eq=False)
+class Guest:
+    """
+    A guest and what it has done; ``name`` is its place.
+
+    ``refused`` counts commands that were not allowed, ``unanswered`` those for which the PLC has
+    given no reply, ``collisions`` writes to words that we write too; ``slowest`` is the longest
+    time (s) to a reply. ``is_connected`` is what its port says. ``wrote`` is called when a PLC may
+    have executed a command that is not a read, with the station and the words as far as known, and
+    ``was_refused`` with one that is not allowed.
+    """
+
+    name: str
+    access: ShareAccess = ShareAccess.READ
+    is_connected: bool = False
+    commands: int = 0
+    refused: int = 0
+    unanswered: int = 0
+    slowest: float = 0.0
+    collisions: int = 0
+    waiting: deque[GuestCommand] = field(default_factory=deque)
+    wrote: Callable[[Packet, int, list[Extent]], None] = lambda command, station, words: None
+    was_refused: Callable[[Packet], None] = lambda command: None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GuestCommand:
+    """A command as a guest has sent it, when (clock value in s), and who takes the reply."""
+
+    guest: Guest
+    packet: Packet
+    requested: float
+    answer: Callable[[Packet], None]
+
+
+class GuestJob(Job):
+    """A guest's command on the line, with our SRC and TNS."""
+
+    def __init__(self, queue: GuestQueue, command: GuestCommand, station: int,
+                 expires: float) -> None:
+        self.command = command
+        self.station = station
+        self.expires = expires
+        self._queue = queue
+        self._begun = 0.0
+
+    def steps(self, now: float) -> Steps[None]:
+        """Send the command, and hand its reply on."""
+        self._begun = now
+        packet = self.command.packet
+        reply = yield packet.cmd, packet.data
+        self._queue.answered(self.command, reply)
+
+    def ended(self, error: Exception | None) -> None:
+        self._queue.ended(self, self._begun, error)
+
+
+class GuestQueue:
+    """
+    The commands of all guests, in turns.
+
+    ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
+    more. ``station_of`` gives the station that a DST stands for, ``words`` what a command to a
+    station writes, where that is known. What a guest may have changed is read again at once.
+    """
+
+    def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
+                 station_of: Callable[[int], int],
+                 words: Callable[[Packet, int], list[Extent]], reads: Reads) -> None:
+        self._stations = stations
+        self._line = line
+        self._patience = patience
+        self._station_of = station_of
+        self._words = words
+        self._reads = reads
+        self._inbox: Inbox[GuestCommand] = Inbox(is_open=False)
+        self.has_news = False  # the inbox has something
+        self.waiting: deque[Guest] = deque()  # who has commands, the next one first
+        self.next_expiry = math.inf  # when ``expire`` has something to do (clock value in s)
+
+    def put(self, command: GuestCommand) -> None:
+        """Take a command, or refuse it at once; then wake the link."""
+        guest = command.guest
+        guest.commands += 1
+        if not guest.access.allows(command.packet):
+            guest.refused += 1
+            guest.was_refused(command.packet)
+            _refuse(command, _NOT_ALLOWED)
+        elif not self._inbox.put(command):
+            guest.unanswered += 1
+            _refuse(command, _NOT_CONNECTED)
+        self.has_news = True
+
+    def begin(self) -> None:
+        """Take commands: the port is open."""
+        self._inbox.open()
+
+    def end(self) -> None:
+        """Refuse all that waits, and all that comes: the port is lost."""
+        for command in self._inbox.close():
+            self._give_up(command, _NOT_CONNECTED)
+        for guest in self.waiting:
+            while guest.waiting:
+                self._give_up(guest.waiting.popleft(), _NOT_CONNECTED)
+        self.waiting.clear()
+        self._look()
+
+    def next(self, now: float, busy: Container[int]) -> GuestJob | None:  # noqa: A003
+        """Return the next command of the guest whose turn it is."""
+        self._sort()
+        for guest in list(self.waiting):
+            station = self._station_of(guest.waiting[0].packet.dst)
+            if station in busy:
+                continue
+            command = guest.waiting.popleft()
+            self.waiting.remove(guest)
+            if guest.waiting:
+                self.waiting.append(guest)
+            self._look()
+            if self._stations.admits_message(station, now):
+                return GuestJob(self, command, station, command.requested + self._patience)
+            self._give_up(command, _OFF_LINE)
+        return None
+
+    def expire(self, now: float) -> None:
+        """Refuse what has waited too long."""
+        self._sort()
+        for guest in list(self.waiting):
+            while guest.waiting and now >= guest.waiting[0].requested + self._patience:
+                self._give_up(guest.waiting.popleft(), _NO_BUFFER)
+            if not guest.waiting:
+                self.waiting.remove(guest)
+        self._look()
+
+    def answered(self, command: GuestCommand, reply: Packet) -> None:
+        """Hand a reply on, with the numbers of the guest."""
+        guest = command.guest
+        guest.slowest = max(guest.slowest, self._line.now - command.requested)
+        command.answer(command.packet.reply(reply.data, reply.sts))
+
+    def ended(self, job: GuestJob, begun: float, error: Exception | None) -> None:
+        """Refuse a command that has no reply; tell what it may have changed."""
+        command, station = job.command, job.station
+        self._stations.tried(station, begun, self._line.now, is_message=True,
+                             was_silent=not self._stations[station].replies_in_time)
+        was_sent = error is None or getattr(error, 'sent', True)
+        if error is not None:
+            self._give_up(command, _sent_status(error) if was_sent else _unsent_status(error))
+        if was_sent and _code(command.packet) not in _READS:
+            extents = self._words(command.packet, station)
+            self._reads.refresh_words(station, extents, self._line.now)
+            command.guest.wrote(command.packet, station, extents)
+
+    def _look(self) -> None:
+        """Find out when the first command has waited too long."""
+        self.next_expiry = min((guest.waiting[0].requested + self._patience
+                                for guest in self.waiting), default=math.inf)
+
+    def _sort(self) -> None:
+        """Put what has come with the others of its guest."""
+        if not self.has_news:
+            return
+        self.has_news = False
+        for command in self._inbox.take():
+            guest = command.guest
+            if len(guest.waiting) >= _MOST_WAITING:
+                self._give_up(command, _NO_BUFFER)
+                continue
+            guest.waiting.append(command)
+            if guest not in self.waiting:
+                self.waiting.append(guest)
+        self._look()
+
+    @staticmethod
+    def _give_up(command: GuestCommand, sts: int) -> None:
+        command.guest.unanswered += 1
+        _refuse(command, sts)
+
+
+def _refuse(command: GuestCommand, sts: int) -> None:
+    command.answer(command.packet.reply(sts=sts))
+
+
+def _sent_status(error: Exception) -> int:
+    return _NOT_ACKNOWLEDGED if isinstance(error, StationInactive) else _NO_REPLY
+
+
+def _unsent_status(error: Exception) -> int:
+    if isinstance(error, PortLost):
+        return _NOT_CONNECTED
+    return _NO_BUFFER if isinstance(error, CommandExpired) else _OFF_LINE

@@ -1,0 +1,116 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The column Share: places where other programs connect to share the line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import ipaddress
+import re
+from urllib.parse import parse_qsl
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.numbers import whole_number
+
+LOOPBACK = '127.0.0.1'
+_MOST_PLACES = 16
+_RIGHT = ('pty:/a/name, tcp:PORT, tcp:ADDRESS:PORT, or a serial device such as '
+          '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even')
+_OPTIONS = {'baud': ('1200', '2400', '4800', '9600', '19200', '38400', '57600', '115200'),
+            'check': ('BCC', 'CRC'), 'parity': ('None', 'Even', 'Odd')}
+
+
+@dataclass(frozen=True, slots=True)
+class SharePlace:
+    """
+    A place: ``text`` as it is written, ``kind`` pty, tcp or serial, ``name`` of link or device.
+
+    ``host`` and ``port`` are those of tcp. What is None is as on the line.
+    """
+
+    text: str
+    kind: str
+    name: str = ''
+    host: str = ''
+    port: int = 0
+    baud: int | None = None
+    check: Checksum | None = None
+    parity: str | None = None
+
+    @property
+    def is_open_to_others(self) -> bool:
+        """Tell whether other machines can connect."""
+        return self.kind == 'tcp' and not ipaddress.ip_address(self.host).is_loopback
+
+
+def share_places(text: str) -> list[SharePlace]:
+    """Return the places of a cell, separated by blanks; ValueError says what would be right."""
+    places = [_place(word) for word in text.split()]
+    names = [place.text.partition('?')[0] for place in places]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f'"{name}" is there twice; each guest has a place of its own')
+    if len(places) > _MOST_PLACES:
+        raise ValueError(f'{len(places)} places; the most are {_MOST_PLACES}')
+    return places
+
+
+def _place(text: str) -> SharePlace:
+    where, _, query = text.partition('?')
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    for name, value in options.items():
+        if value not in _OPTIONS.get(name, ()):
+            right = '; '.join(f'{option}={"|".join(values)}'
+                              for option, values in _OPTIONS.items())
+            raise ValueError(f'"{text}": after "?" may come {right}')
+    kind, _, name = where.partition(':')
+    if where.startswith('/'):
+        kind, name = 'serial', where
+    host, port = '', 0
+    if kind == 'tcp':
+        host, port = _host_and_port(name, text)
+    elif kind not in ('pty', 'serial') or not name.startswith('/'):
+        raise ValueError(f'"{text}" should be {_RIGHT}')
+    if kind != 'serial' and {'baud', 'parity'} & set(options):
+        raise ValueError(f'"{text}": only a serial device has baud and parity')
+    baud, check = options.get('baud'), options.get('check')
+    return SharePlace(text, kind, name, host, port, int(baud) if baud else None,
+                      Checksum(check) if check else None, options.get('parity'))
+
+
+def _host_and_port(name: str, text: str) -> tuple[str, int]:
+    host, colon, digits = name.rpartition(':')
+    port = whole_number(digits)
+    try:
+        host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else LOOPBACK
+    except ValueError:
+        port = None  # a name may stand for any interface
+    if port is None or not 0 < port < 65536:
+        raise ValueError(f'"{text}" should be tcp:PORT (for this machine only) or '
+                         'tcp:ADDRESS:PORT, with the address of an interface')
+    return host, port
+
+
+def share_remarks(places: list[SharePlace]) -> Iterator[str]:
+    """Yield what is to be known before a line is shared."""
+    for place in places:
+        if place.is_open_to_others:
+            yield (f'Share {place.text}: whoever reaches {place.host}:{place.port} over the '
+                   'network can send commands to the PLC; nothing asks who it is')
+    if places:
+        yield (f'Share: {len(places)} {"guest" if len(places) == 1 else "guests"} may take one '
+               'command in four of what heartbeats, fallbacks and writes leave: the poll cycle '
+               'may take a third longer')

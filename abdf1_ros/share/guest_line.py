@@ -1,0 +1,115 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One place where a guest connects: to the guest it is the PLC."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container
+from functools import partial
+
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import Task
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestQueue, ShareAccess
+from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
+from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.share import SharePlace
+
+
+class _Nothing:
+    """We send no commands of our own to a guest."""
+
+    def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
+        """Return nothing."""
+        return None
+
+    def next_due(self) -> float | None:
+        """Return that nothing will ever be due."""
+        return None
+
+    def expire(self, now: float) -> None:
+        """Do nothing."""
+
+
+class GuestLine:
+    """
+    Take the commands of the guest at ``place`` to ``queue``, and its replies back.
+
+    ``wake`` wakes the link of the PLC, ``fault`` is told of a bug. The guest's program may come
+    and go: a reply to one that has gone is dropped.
+    """
+
+    def __init__(self, place: SharePlace, network: Network, queue: GuestQueue,
+                 wake: Callable[[], None], fault: Callable[[Exception], None]) -> None:
+        self.guest = Guest(place.text, ShareAccess(network.share_access))
+        self._place = place
+        self._queue = queue
+        self._wake = wake
+        self._endpoint: Endpoint | None = None
+        self._port = PortSettings(
+            place.name, place.baud or network.baud, parity=place.parity or network.parity)
+        checksum = place.check or network.checksum
+        char_time = self._port.char_time if place.kind == 'serial' else 0.0
+        self._machine = Machine(self._run, checksum=checksum, duplex=Duplex.FULL,
+                                timing=LineTiming(char_time))
+        self._peer = FullDuplexPeer(
+            self._machine, PeerSettings(checksum), ActiveStationList(), self._take)
+        self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault)
+        self.link.daemon = True  # a guest never holds the process
+
+    def start(self) -> None:
+        """Wait for the guest, and serve it."""
+        self.link.start()
+
+    def stop(self) -> None:
+        """End the place."""
+        self.link.stop()
+        if self._endpoint is not None:
+            self._endpoint.close()
+
+    def _run(self, machine: Machine) -> Procedure:
+        return self._peer.run(_Nothing())
+
+    def _take(self, command: Packet) -> None:
+        answer = partial(self._answer, self._peer.replies.append)
+        self._queue.put(GuestCommand(self.guest, command, self._machine.now, answer))
+        self._wake()
+
+    def _answer(self, append: Callable[[Packet], None], reply: Packet) -> None:
+        """Send a reply, in any thread; ``append`` leads nowhere once the guest has gone."""
+        append(reply)
+        self.link.wake()
+
+    def _open(self) -> Port:
+        if self._endpoint is None:
+            self._endpoint = self._made()
+        return self._endpoint.open()
+
+    def _made(self) -> Endpoint:
+        place = self._place
+        if place.kind == 'pty':
+            return PtyEndpoint(place.name)
+        if place.kind == 'tcp':
+            return TcpEndpoint(place.host, place.port)
+        return SerialEndpoint(self._port)
+
+    def _changed(self, state: PortState) -> None:
+        self.guest.is_connected = state.is_open

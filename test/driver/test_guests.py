@@ -1,0 +1,262 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Commands of guests: one true reply each, in time, and our own values stay as they were."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count, pairwise
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.guest_words import written_extents
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.settings.heartbeats import Heartbeat
+from abdf1_ros.settings.network import Network
+import pytest
+from support.cases import for_all
+from support.driver_bench import DriverBench, store, stored
+from support.mappings import make_mapping
+
+READ_N7 = bytes.fromhex('A2 02 07 89 00 00')
+WRITE_N7 = bytes.fromhex('AA 02 07 89 00 00 34 12')
+
+
+class Program:
+    """A program at a place of its own, which asks with ``src`` as its station."""
+
+    def __init__(self, bench: DriverBench, access: ShareAccess = ShareAccess.READ,
+                 src: int = 9) -> None:
+        self.guest = Guest(f'pty:/tmp/{src}', access)
+        self.replies: list[tuple[float, Packet]] = []
+        self._again: Callable[[], object] | None = None
+        self._bench, self._src, self._tns = bench, src, count(1)
+
+    def ask(self, data: bytes, dst: int = 1, cmd: int = 0x0F) -> Packet:
+        """Send a command."""
+        command = Packet(dst, self._src, cmd, 0, next(self._tns), data)
+        bench = self._bench
+        bench.driver.guests.put(GuestCommand(
+            self.guest, command, bench.clock(),
+            self._answered))
+        bench.line.wake(bench.driver.machine)
+        return command
+
+    def keep_asking(self, data: bytes, dst: int = 1) -> None:
+        """Send the next command 1 ms after the last has its reply."""
+        self._again = lambda: self.ask(data, dst)
+        self.ask(data, dst)
+
+    def _answered(self, reply: Packet) -> None:
+        self.replies.append((self._bench.clock(), reply))
+        if self._again is not None:
+            self._bench.at(self._bench.clock() + 0.001, self._again)
+
+    @property
+    def statuses(self) -> list[int]:
+        """Return the STS of all replies."""
+        return [reply.sts for _, reply in self.replies]
+
+
+def bench_of(mode: str = 'Master', rows: int = 3, period: int = 50) -> DriverBench:
+    """Return a driver that reads rows of an SLC all the time."""
+    mappings = [make_mapping(f'N{7 + row}:0', station=1, plc='SLC', period=period)
+                for row in range(rows)]
+    bench = DriverBench(mappings, network=Network(mode=mode, baud=19200, timeout=200))
+    plc = bench.plc(1, 'SLC', *((f'N{7 + row}:0', 20) for row in range(rows)))
+    store(plc, 'N7:0', [4112])
+    bench.run(1.0)
+    return bench
+
+
+def run(bench: DriverBench, seconds: float) -> None:
+    """Let time pass in steps so short that a program asks again at once."""
+    for _ in range(round(seconds / 0.005)):
+        bench.run(0.005)
+
+
+def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest() -> None:
+    bench = bench_of()
+    program = Program(bench)
+    command = program.ask(READ_N7)
+    bench.run(1.0)
+    (_, reply), = program.replies
+    assert reply == command.reply(b'\x10\x10')
+    assert program.guest.slowest < 0.3
+
+
+def test_error_of_the_plc_is_handed_on() -> None:
+    bench = bench_of()
+    program = Program(bench)
+    program.ask(bytes.fromhex('A2 02 63 89 00 00'))
+    bench.run(1.0)
+    assert program.statuses == [0x10]
+
+
+@for_all('entry', [
+    (ShareAccess.READ, 0x0F, READ_N7, True), (ShareAccess.READ, 0x0F, WRITE_N7, False),
+    (ShareAccess.READ, 0x06, b'\x03', True), (ShareAccess.READ, 0x06, b'\x07', False),
+    (ShareAccess.READ, 0x01, b'\0\0\2', True), (ShareAccess.READ, 0x08, b'\0\0\1\2', False),
+    (ShareAccess.READ, 0x0F, b'', False), (ShareAccess.READ, 0x2F, READ_N7, True),
+    (ShareAccess.WRITE, 0x0F, WRITE_N7, True), (ShareAccess.WRITE, 0x08, b'\0\0\1\2', True),
+    (ShareAccess.WRITE, 0x0F, b'\x80\x01', False), (ShareAccess.WRITE, 0x0F, b'\x50', False),
+    (ShareAccess.ALL, 0x0F, b'\x80\x01', True), (ShareAccess.ALL, 0x07, b'\x00', True)])
+def test_access_says_what_goes_to_the_line(
+        entry: tuple[ShareAccess, int, bytes, bool]) -> None:
+    access, cmd, data, is_allowed = entry
+    assert access.allows(Packet(1, 9, cmd, 0, 1, data)) is is_allowed
+
+
+def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
+    bench = bench_of()
+    program = Program(bench)
+    sent = bench.driver.counters.commands_sent
+    program.ask(WRITE_N7)
+    assert program.statuses == [0x60]
+    assert program.guest.refused == 1
+    assert bench.driver.counters.commands_sent == sent
+
+
+def test_a_write_of_a_guest_is_read_again_at_once() -> None:
+    mapping = make_mapping('N7:0', station=1, plc='SLC', period=10000)
+    bench = DriverBench([mapping])
+    plc = bench.plc(1, 'SLC', ('N7:0', 20))
+    bench.run(1.0)
+    program = Program(bench, ShareAccess.WRITE)
+    wrote: list[tuple[int, list[Extent]]] = []
+    program.guest.wrote = lambda command, station, words: wrote.append((station, words))
+    program.ask(WRITE_N7)
+    bench.run(0.5)
+    assert stored(plc, 'N7:0') == b'\x34\x12'
+    assert bench.listener.values(mapping)[-1] == [0x1234]
+    assert wrote == [(1, [mapping.extent])]
+
+
+@for_all('entry', [
+    ('AA 04 07 89 05 00 34 12 00 00', 'N7:5', 2), ('AA 04 08 8A 02 00 00 00 80 3F', 'F8:2', 1),
+    ('AB 02 03 85 01 00 01 00 01 00', 'B3:1', 1), ('80 01', '', 0)])
+def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, int]) -> None:
+    data, address, length = entry
+    found = written_extents(Packet(1, 9, 0x0F, 0, 1, bytes.fromhex(data)), 1, [PlcType.SLC])
+    expected = [make_mapping(address, plc='SLC', length=length).extent] if address else []
+    assert found == expected
+
+
+def test_guests_get_a_quarter_and_never_two_between_two_of_ours() -> None:
+    bench = bench_of(rows=12, period=1)  # more than the line can carry
+    guests = [Program(bench, src=20 + number) for number in range(3)]
+    for program in guests:
+        program.keep_asking(READ_N7)
+    before = bench.driver.transactions
+    run(bench, 20.0)
+    total = bench.driver.transactions - before
+    counts = [len(program.replies) for program in guests]
+    assert sum(counts) == pytest.approx(total / 4, abs=2)
+    assert max(counts) - min(counts) <= 1
+
+
+def test_heartbeats_go_before_guests() -> None:
+    beat = make_mapping('N10:0', 'Heartbeat', plc='SLC', period=200, heartbeat=Heartbeat())
+    rows = [make_mapping(f'N{20 + row}:0', plc='SLC', period=1) for row in range(6)]
+    bench = DriverBench([beat, *rows], network=Network(baud=19200, timeout=200))
+    plc = bench.plc(1, 'SLC', ('N10:0', 4), *((f'N{20 + row}:0', 4) for row in range(6)))
+    for number in range(5):
+        Program(bench, src=20 + number).keep_asking(READ_N7)
+    changes, last = [], b''
+    for _ in range(2000):
+        bench.driver.interlocks.executor_ran(bench.clock())
+        bench.run(0.005)
+        if (now := stored(plc, 'N10:0')) != last:
+            changes.append(bench.clock())
+            last = now
+    # The first 0 stands for half a second.
+    assert max(later - before for before, later in pairwise(changes[2:])) < 0.35
+    assert len(changes) > 40
+
+
+def test_idle_line_is_the_guests() -> None:
+    bench = bench_of(rows=1, period=10000)
+    program = Program(bench)
+    program.keep_asking(READ_N7)
+    run(bench, 5.0)
+    assert len(program.replies) > 50
+
+
+def test_our_values_stay_as_old_as_the_share_allows() -> None:
+    alone, shared = bench_of(rows=12, period=1), bench_of(rows=12, period=1)
+    for number in range(10):
+        Program(shared, src=20 + number).keep_asking(READ_N7)
+    for bench in (alone, shared):
+        run(bench, 20.0)
+    assert len(shared.listener.reads) > 0.7 * len(alone.listener.reads)
+
+
+@pytest.mark.parametrize('how_many', [5, 50])
+def test_a_flood_gets_a_reply_to_each_command(how_many: int) -> None:
+    bench = bench_of()
+    program = Program(bench)
+    for _ in range(how_many):
+        program.ask(READ_N7)
+    bench.run(3.0)
+    assert program.statuses.count(0x00) == 4
+    assert program.statuses.count(0x01) == how_many - 4
+    assert len(program.guest.waiting) == 0
+
+
+def test_silent_station_is_told_at_once_and_costs_others_little() -> None:
+    bench = bench_of()
+    program = Program(bench)
+    program.keep_asking(READ_N7, dst=77)
+    before = bench.driver.transactions
+    run(bench, 10.0)
+    assert set(program.statuses) <= {0x02, 0x07}
+    # The probes of silent stations have an eighth of the line.
+    assert bench.driver.transactions - before > 200
+
+
+def test_every_command_has_one_reply_in_time_when_replies_are_lost() -> None:
+    bench = bench_of()
+    program = Program(bench, ShareAccess.WRITE)
+    bench.far.say = lambda data: b'' if data.startswith(b'\x10\x02') else data
+    for number in range(10):
+        program.ask(WRITE_N7 if number % 2 else READ_N7)
+        bench.run(2.0)
+    bench.run(10.0)
+    assert len(program.replies) == 10
+    assert set(program.statuses) <= {0x01, 0x02, 0x05, 0x07}
+    assert program.statuses[0] in (0x02, 0x05)  # it was sent
+
+
+def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
+    bench = bench_of()
+    program = Program(bench)
+    program.ask(READ_N7)
+    program.ask(READ_N7)
+    bench.lose_port()
+    program.ask(READ_N7)
+    assert len(program.replies) == 3
+    assert set(program.statuses) <= {0x04, 0x05}
+    bench.open()
+    bench.run(2.0)
+    assert len(program.replies) == 3
+
+
+def test_peer_has_one_plc_whatever_number_a_guest_gives_it() -> None:
+    queue = bench_of().driver
+    assert queue._station_of_guest(77) == 77
+    mapping = make_mapping('N7:0', station=3, plc='SLC')
+    peer = DriverBench([mapping], network=Network(mode='Peer'))
+    assert peer.driver._station_of_guest(77) == 3

@@ -1,0 +1,64 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A running node shares its line: an HMI reads and writes through it, and ROS is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from abdf1_ros.client import Client
+from abdf1_ros.errors import RemoteError
+import pytest
+from std_msgs.msg import Float32MultiArray
+from support.ros import Observer, OK, Process, until_status, WARN
+from support.simulator_process import make_files, OFTEN
+
+
+def test_hmi_reads_and_writes_through_the_node(tmp_path: Path) -> None:
+    files, place = make_files(tmp_path), tmp_path / 'hmi'
+    with (files.start_simulator(), Observer() as observer,
+          Process('node', *files.args(OFTEN, f'net.share:="pty:{place}"',
+                                      'net.share_access:=Write')) as node):
+        setpoints = observer.listen(Float32MultiArray, '/abdf1/read/setpoint')
+        diagnostics = observer.diagnostics(files.port)
+        setpoints.values([21.5])
+        with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=3.0) as hmi:
+            assert hmi.read('ST9:1') == 'Tank 4'
+            assert hmi.read('N7:10', 4) == [101, 102, 103, 104]
+            until_status(diagnostics, 'guests', OK)
+            hmi.write('F8:4', 30.5)
+            setpoints.values([30.5])
+            node.wait_for('[WARN] ', f'guest pty:{place} has sent to station 2: protected typed '
+                          'logical write F8:4 = 30.5, words of setpoint')
+            until_status(diagnostics, 'guests', WARN,
+                         lambda status: '1 writes to words of ours' in status.message)
+        node.end()
+    assert not place.is_symlink()
+
+
+def test_what_is_not_allowed_is_told_once(tmp_path: Path) -> None:
+    files, place = make_files(tmp_path), tmp_path / 'hmi'
+    with (files.start_simulator(), Observer() as observer,
+          Process('node', *files.args(f'net.share:="pty:{place}"')) as node):
+        observer.listen(Float32MultiArray, '/abdf1/read/setpoint').values([21.5])
+        with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=3.0) as hmi:
+            for _ in range(2):
+                with pytest.raises(RemoteError):
+                    hmi.write('F8:4', 30.5)
+            assert hmi.read('F8:4') == 21.5
+        node.wait_for('[WARN] ', f'guest pty:{place} is refused: protected typed logical write '
+                      'F8:4 = 30.5: Share_Access is Read')
+        node.end()
+    assert node.text.count('is refused') == 1

@@ -1,0 +1,71 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The column Share: places, and what is wrong with one."""
+
+from __future__ import annotations
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.network import make_network, Network
+from abdf1_ros.settings.remarks import network_remarks
+from abdf1_ros.settings.share import share_places, SharePlace
+import pytest
+
+
+@pytest.mark.parametrize(('text', 'place'), [
+    ('pty:/tmp/hmi', SharePlace('pty:/tmp/hmi', 'pty', '/tmp/hmi')),
+    ('tcp:4501', SharePlace('tcp:4501', 'tcp', '4501', '127.0.0.1', 4501)),
+    ('tcp:0.0.0.0:4501?check=BCC', SharePlace(
+        'tcp:0.0.0.0:4501?check=BCC', 'tcp', '0.0.0.0:4501', '0.0.0.0', 4501,
+        check=Checksum.BCC)),
+    ('tcp:[::1]:4501', SharePlace('tcp:[::1]:4501', 'tcp', '[::1]:4501', '::1', 4501)),
+    ('/dev/ttyUSB1?baud=19200&check=CRC&parity=Even', SharePlace(
+        '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even', 'serial', '/dev/ttyUSB1', baud=19200,
+        check=Checksum.CRC, parity='Even'))])
+def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> None:
+    assert share_places(f' {text} ') == [place]
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('hmi', '"hmi" should be pty:/a/name, tcp:PORT'), ('pty:hmi', 'pty:/a/name'),
+    ('tcp:', 'tcp:PORT (for this machine only)'), ('tcp:70000', 'tcp:PORT'),
+    ('tcp:plant.example:4501', 'the address of an interface'),
+    ('pty:/tmp/a?baud=9600', 'only a serial device has baud'),
+    ('/dev/ttyS1?speed=9600', 'after "?" may come baud=1200|'),
+    ('/dev/ttyS1?check=LRC', 'check=BCC|CRC'),
+    ('pty:/tmp/a pty:/tmp/a?check=BCC', 'there twice'),
+    (' '.join(f'tcp:{port}' for port in range(4000, 4017)), 'the most are 16')])
+def test_fault_says_what_would_be_right(text: str, words: str) -> None:
+    with pytest.raises(ConfigurationError) as error:
+        make_network({'share': (text, 'net.csv:2')})
+    problem, = error.value.problems
+    assert words in str(problem)
+    assert str(problem).startswith('net.csv:2: Share: ')
+
+
+def test_slave_has_nothing_to_share() -> None:
+    with pytest.raises(ConfigurationError) as error:
+        make_network({'mode': ('Slave', 'x'), 'share': ('tcp:4501', 'x')})
+    assert 'Share needs Mode Master or Peer' in str(error.value)
+
+
+def test_cost_and_open_ports_are_told() -> None:
+    remarks = [*network_remarks(Network(share='pty:/tmp/a tcp:0.0.0.0:4501'))]
+    assert remarks == [
+        'Share tcp:0.0.0.0:4501: whoever reaches 0.0.0.0:4501 over the network can send commands '
+        'to the PLC; nothing asks who it is',
+        'Share: 2 guests may take one command in four of what heartbeats, fallbacks and writes '
+        'leave: the poll cycle may take a third longer']
+    assert [*network_remarks(Network())] == []

@@ -1,0 +1,226 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A line that is shared: real ports and threads, good guests and bad ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+import socket
+import threading
+import time
+
+from abdf1_ros.cli.conform import main as conform
+from abdf1_ros.client import Client
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.errors import RemoteError
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.share import share_places
+from abdf1_ros.share.guest_line import GuestLine
+import pytest
+from support.driver_bench import Recorder, simulated_plc, store, stored
+from support.mappings import make_mapping
+
+# All have passed, but those that wait for a silence of 6 s take a minute.
+QUICK = ('message-acknowledged', 'bad-check-refused', 'short-message-refused', 'identity',
+         'broken-message-refused', 'enquiry-after-ack', 'enquiry-after-nak', 'largest-packet',
+         'duplicate-discarded', 'other-source-executed', 'reply-repeated-after-nak',
+         'noise-before-message', 'stuffing', 'tns-returned', 'write-and-read', 'masked-write')
+
+
+class Shared:
+    """A driver that reads an SLC all the time, and the places of its line."""
+
+    def __init__(self, folder: Path, places: str, access: str, mode: str) -> None:
+        self.plc = simulated_plc(1, 'SLC', line_time, ('N7:0', 50), ('N10:0', 20))
+        store(self.plc, 'N7:0', range(50))
+        self._line = PtyEndpoint(str(folder / 'plc'))
+        self._far = LinkThread(self._machine(mode), self._line.open)
+        network = Network(mode=mode, timeout=300, baud=115200, share=places, share_access=access)
+        self.listener = Recorder(line_time)
+        self.mapping = make_mapping('N10:0', plc='SLC', period=50)
+        self.driver = Driver(network, [self.mapping], DriverSettings(), self.listener)
+        name = self._line.name
+        self._near = LinkThread(self.driver.machine, lambda: open_port(PortSettings(name)))
+        self.faults: list[Exception] = []
+        self.guests = [GuestLine(place, network, self.driver.guests, self._near.wake,
+                                 self.faults.append) for place in share_places(places)]
+
+    def _machine(self, mode: str) -> Machine:
+        if mode == 'Master':
+            return Machine(multidrop([self.plc]), checksum=Checksum.CRC)
+        self.plc.be_full_duplex()
+        return Machine(
+            lambda machine: FullDuplexPeer(machine, PeerSettings(), ActiveStationList(),
+                                           self.plc.serve).run(self.plc),
+            checksum=Checksum.CRC, duplex=Duplex.FULL)
+
+    def start(self) -> None:
+        for thread in (self._far, self._near, *self.guests):
+            thread.start()
+
+    def leave(self) -> None:
+        """Close the port of the PLC."""
+        self._near.release()
+
+    def stop(self) -> None:
+        for thread in (*self.guests, self._near, self._far):
+            thread.stop()
+        self._line.close()
+
+
+@contextmanager
+def shared(folder: Path, places: str, access: str = 'Read',
+           mode: str = 'Master') -> Iterator[Shared]:
+    """Run a shared line; a guest may do what it likes, there is no internal error."""
+    line = Shared(folder, places, access, mode)
+    line.start()
+    try:
+        yield line
+    finally:
+        line.stop()
+    assert line.faults == []
+
+
+def free_port() -> int:
+    with socket.create_server(('127.0.0.1', 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+def wait_for(condition: Callable[[], object], limit: float = 30.0) -> None:
+    give_up = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+
+
+def client_at(port: Path | str) -> Client:
+    """Return a client at a place."""
+    if isinstance(port, Path):
+        wait_for(port.exists)
+    return Client(str(port), plc_type='SLC', timeout=2.0, cmd_timeout=3.0)
+
+
+@pytest.mark.parametrize('mode', ['Master', 'Peer'])
+def test_two_guests_read_and_write_and_none_gets_the_other_ones_values(
+        mode: str, tmp_path: Path) -> None:
+    port = free_port()
+    with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{port}', 'Write', mode) as line:
+        wrong: list[object] = []
+
+        def work(client: Client, first: int) -> None:
+            for number in range(40):
+                at = first + number % 20
+                if client.read(f'N7:{first}', 3) != [*range(first, first + 3)]:
+                    wrong.append(number)
+                client.write(f'N10:{first // 5 + 1}', number)
+                if client.read(f'N10:{first // 5 + 1}') != number:
+                    wrong.append((at, number))
+
+        with client_at(tmp_path / 'hmi') as one, client_at(f'socket://127.0.0.1:{port}') as two:
+            threads = [threading.Thread(target=work, args=(client, first))
+                       for client, first in ((one, 0), (two, 25))]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join(60)
+        assert wrong == []
+        assert [line.guest.commands for line in line.guests] == [120, 120]
+        assert [line.guest.unanswered for line in line.guests] == [0, 0]
+        assert stored(line.plc, 'N10:1') == b'\x27\x00'
+
+
+def test_only_what_is_allowed_goes_to_the_plc(tmp_path: Path) -> None:
+    with shared(tmp_path, f'pty:{tmp_path}/hmi') as line, client_at(tmp_path / 'hmi') as client:
+        with pytest.raises(RemoteError) as refusal:
+            client.write('N7:0', 1)
+        assert refusal.value.sts == 0x60
+        assert client.read('N7:0') == 0
+        assert line.guests[0].guest.refused == 1
+
+
+def test_place_is_a_peer_of_the_manual(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The link rules at a place, judged by the kit; BCC there, CRC on the line."""
+    with shared(tmp_path, f'pty:{tmp_path}/hmi?check=BCC', 'All'):
+        wait_for((tmp_path / 'hmi').exists)
+        status = conform(['peer', '--port', str(tmp_path / 'hmi'), '--check', 'BCC',
+                          '--answer-time', '0.2', '--words', 'N7:0', '--yes',
+                          *(word for case in QUICK for word in ('--only', case))])
+    said = capsys.readouterr().out
+    assert status == 0, said
+    assert '0 failed' in said
+
+
+def test_guests_that_babble_break_off_and_never_acknowledge_harm_nobody(tmp_path: Path) -> None:
+    ports = [free_port() for _ in range(3)]
+    places = ' '.join(f'tcp:{port}' for port in ports)
+    command = bytes.fromhex('10 02 01 09 0F 00 01 00 A2 02 07 89 00 00 10 03')
+    whole = frames.message_frame(Packet(1, 9, 0x0F, 0, 1, command[8:-2]).encode(), Checksum.CRC)
+    with shared(tmp_path, f'pty:{tmp_path}/hmi {places}') as line:
+        ended = threading.Event()
+
+        def be_bad(port: int, said: Sequence[bytes], pause: float) -> None:
+            while not ended.is_set():
+                try:
+                    with socket.create_connection(('127.0.0.1', port), timeout=1) as other:
+                        for data in said:
+                            other.sendall(data)
+                            time.sleep(pause)
+                except OSError:
+                    time.sleep(0.1)
+
+        bad = [threading.Thread(target=be_bad, args=arguments, daemon=True) for arguments in (
+            (ports[0], [bytes(range(256))] * 50, 0.005), (ports[1], [command[:9]], 0.05),
+            (ports[2], [whole] * 5, 0.2))]
+        for thread in bad:
+            thread.start()
+        with client_at(tmp_path / 'hmi') as client:
+            before = len(line.listener.reads)
+            begun = time.monotonic()
+            for _ in range(30):
+                assert client.read('N7:1', 2) == [1, 2]
+                time.sleep(0.05)
+            seconds = time.monotonic() - begun
+        ended.set()
+        for thread in bad:
+            thread.join(10)
+        # 20 a second are wanted.
+        assert len(line.listener.reads) - before > 5 * seconds
+        assert all(isinstance(values, list) for _, _, values in line.listener.reads)
+
+
+def test_lost_line_is_told_to_the_guest(tmp_path: Path) -> None:
+    with shared(tmp_path, f'pty:{tmp_path}/hmi') as line, client_at(tmp_path / 'hmi') as client:
+        assert client.read('N7:1') == 1
+        line.leave()
+        with pytest.raises(RemoteError) as refusal:
+            client.read('N7:1')
+        assert refusal.value.sts == 0x04
