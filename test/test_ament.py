@@ -26,20 +26,20 @@ SOURCES = [str(ROOT / name) for name in (
     'abdf1_ros', 'examples', 'launch', 'test', 'tools', 'setup.py')]
 
 
-def test_copyright() -> None:
+def test_ament_finds_a_licence_header_in_every_file() -> None:
     assert needs('ament_copyright.main').main(argv=SOURCES) == 0
 
 
-def test_flake8() -> None:
+def test_ament_flake8_finds_nothing_wrong() -> None:
     status, errors = needs('ament_flake8.main').main_with_errors(argv=SOURCES)
     assert (status, errors) == (0, [])
 
 
-def test_pep257() -> None:
+def test_ament_pep257_finds_nothing_wrong() -> None:
     assert needs('ament_pep257.main').main(argv=SOURCES) == 0
 
 
-def test_xmllint() -> None:
+def test_ament_xmllint_finds_nothing_wrong() -> None:
     # package.xml names a schema on a server; that is for those who have the Internet.
     folders = [str(ROOT / name) for name in ('config', 'launch')]
     assert needs('ament_xmllint.main').main(argv=folders) == 0

@@ -80,7 +80,8 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('A10:0', 2, 'string') == 'wxyz'
 
 
-def test_several_packets(port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+def test_values_of_several_packets_are_written_and_read(
+        port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
     values = [*range(-125, 125)]
     with client(port) as plc:
         for station in (1, 2):
@@ -147,7 +148,7 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
         Client(port)
 
 
-def test_full_duplex(tmp_path: Path) -> None:
+def test_client_talks_to_a_full_duplex_peer(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
     plc.be_full_duplex()
     line = PtyEndpoint(str(tmp_path / 'line'))

@@ -144,14 +144,14 @@ def test_commands_and_their_options_exist(name: str) -> None:
 
 
 @for_all('name', documents.NAMES)
-def test_parameters_exist(name: str) -> None:
+def test_parameters_that_pages_name_exist(name: str) -> None:
     for line in code(name):
         named = set(re.findall(r'(?:-p |^)([a-z_.]+):=', line))
         assert named <= PARAMETERS | LAUNCH_ARGUMENTS, line
 
 
 @for_all('name', documents.NAMES)
-def test_topics_exist(name: str) -> None:
+def test_topics_that_pages_name_exist(name: str) -> None:
     for line in code(name):
         named = set(re.findall(r'(?<![\w/.])(?:~|/abdf1)/([a-z_]+)\b(?!\.)', line))
         assert named <= TOPICS | AT_HOME, line
@@ -167,7 +167,7 @@ def test_make_targets_exist(name: str) -> None:
 
 
 @for_all('name', documents.NAMES)
-def test_files_exist(name: str) -> None:
+def test_files_that_pages_name_exist(name: str) -> None:
     for span in documents.spans(documents.text(name)):
         if re.fullmatch(r'[\w./@*-]+/[\w.@*-]+\.(py|csv|yaml|json|md|rules|service|txt)', span) \
                 and not span.startswith('/'):
@@ -176,7 +176,7 @@ def test_files_exist(name: str) -> None:
 
 
 @for_all('name', documents.NAMES)
-def test_columns_exist(name: str) -> None:
+def test_columns_that_pages_name_exist(name: str) -> None:
     known = {entry.column for entry in FIELDS.values()} | {
         column.name for column in MAP_COLUMNS}
     for column in re.findall(r'`(\w+)` = ', documents.text(name)):

@@ -27,21 +27,21 @@ from support.cases import for_all
     ('0', 0), ('-7', -7), ('+7', 7), ('007', 7), ('65535', 65535),
     ('', None), ('1.0', None), ('1e3', None), ('0x10', None), ('1 0', None), ('1_0', None),
     ('²', None), ('٣', None), ('-', None), ('5\n', None), ('9' * 5000, None)])
-def test_whole_number(text: str, value: int | None) -> None:
+def test_whole_number_is_decimal_digits_with_a_sign_at_most(text: str, value: int | None) -> None:
     assert whole_number(text) == value
 
 
 @pytest.mark.parametrize(('text', 'value'), [
     ('0', 0.0), ('-1.5', -1.5), ('+2', 2.0), ('.5', 0.5), ('5.', 5.0), ('1e3', 1000.0),
     ('2.5E-1', 0.25), ('007', 7.0), ('1e-400', 0.0)])
-def test_numbers(text: str, value: float) -> None:
+def test_decimal_number_is_read_as_people_write_it(text: str, value: float) -> None:
     assert decimal_number(text) == value
 
 
 @for_all('text', [
     '', ' 1', '1 ', '1_000', '1_0.5', 'nan', 'inf', '-Infinity', '1e999', '\u0661', '\uff11',
     '1,5', '1e', 'e3', '.', '0x10', '1.2.3', '--1', '1\n'])
-def test_no_numbers(text: str) -> None:
+def test_text_that_is_no_number_is_none(text: str) -> None:
     assert decimal_number(text) is None
 
 

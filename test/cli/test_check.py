@@ -52,7 +52,8 @@ def parsed(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
     return content
 
 
-def test_good_files(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_good_files_show_their_plan_and_no_error(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     assert check(files, GOOD_NET, (GOOD_ROW,)) == 0
     out = capsys.readouterr().out
     assert 'error' not in out.replace('no errors', '')
@@ -202,7 +203,8 @@ def test_many_tags_of_a_block(files: tuple[Path, Path],
     assert parsed(capsys)['blocks'][0]['tags'] == [f't{number}' for number in range(10)]
 
 
-def test_default_period(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_row_without_a_period_has_the_default_one(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     row = GOOD_ROW.removesuffix('1000')
     check(files, GOOD_NET, (row,), '--json')
     assert parsed(capsys)['blocks'][0]['period_ms'] == 100
@@ -222,7 +224,8 @@ def test_odd_settings_are_warnings_with_their_places(
         'with its next scan']
 
 
-def test_missing_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_both_files_that_are_missing_are_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path / 'a.csv'), str(tmp_path / 'b.csv')]) == 2
     out = capsys.readouterr().out
     assert 'a.csv: cannot be read' in out
@@ -240,7 +243,8 @@ def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
 
 @pytest.mark.parametrize('option', ['--default-period', '--response-time'])
 @pytest.mark.parametrize('text', ['x', '-1', 'nan', '1e12', '1_0', '\u0661'])
-def test_bad_time(option: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_time_that_is_no_number_of_ms_is_told(
+        option: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['net.csv', 'map.csv', f'{option}={text}'])
     assert ending.value.code == 2

@@ -243,7 +243,8 @@ def test_commands_of_one_time_keep_their_order(start: Start) -> None:
 @pytest.mark.parametrize('at', [
     'soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1', 'inf silent 1',
     '1_0 silent 1', '\u0661 silent 1', '5', '5 '])
-def test_bad_time(capsys: pytest.CaptureFixture[str], data: Path, at: str) -> None:
+def test_time_of_a_command_that_is_wrong_is_told(
+        capsys: pytest.CaptureFixture[str], data: Path, at: str) -> None:
     assert _refused(capsys, '--data', str(data), '--at', at) == \
         f'simulator: --at "{at}" should be seconds from 0 and a command, as in "5 silent 1"\n'
 
@@ -343,13 +344,14 @@ def test_port_that_is_not_there_is_an_error_at_once(
 @pytest.mark.parametrize('option', [
     '--check=XOR', '--baud=9601', '--baud=9_600', '--seconds=x', '--seconds=-1', '--what',
     '--pty=', '--port='])
-def test_bad_option(capsys: pytest.CaptureFixture[str], option: str) -> None:
+def test_option_that_is_wrong_is_told_with_status_2(
+        capsys: pytest.CaptureFixture[str], option: str) -> None:
     said = call(main, capsys, option)
     assert said.status == 2
     assert said.err.startswith('simulator: error: ')
 
 
-def test_help(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_names_every_option_and_command(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(['--help'])
     assert caught.value.code == 0

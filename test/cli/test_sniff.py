@@ -83,7 +83,7 @@ def refused(capsys: Output, *args: str) -> str:
     return capsys.readouterr().err
 
 
-def test_capture(capsys: Output, capture: str) -> None:
+def test_capture_is_shown_line_by_line_with_a_summary(capsys: Output, capture: str) -> None:
     lines = lines_of(capsys, capture)
     assert lines[:5] == LINES
     assert lines[5].startswith('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC')
@@ -108,7 +108,7 @@ def test_json_has_one_object_a_line_and_the_summary_last(capsys: Output, capture
     assert objects[5]['counts'] == {'poll': 1, 'command': 1, 'reply': 1, 'ACK': 2}
 
 
-def test_summary_alone(capsys: Output, capture: str) -> None:
+def test_summary_alone_shows_the_load_at_a_baud_rate(capsys: Output, capture: str) -> None:
     head, *_ = lines_of(capsys, '--summary', '--baud', '19200', capture)
     assert head == ('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC, '
                     'line load 58.6% at 19200 baud')
@@ -198,7 +198,7 @@ def test_speed_in_a_capture_that_is_none(capsys: Output, tmp_path: Path, baud: s
     assert not any('load' in line for line in lines_of(capsys, str(path)))
 
 
-def test_missing_ports(capsys: Output, tmp_path: Path) -> None:
+def test_port_or_file_that_cannot_be_opened_is_named(capsys: Output, tmp_path: Path) -> None:
     none = tmp_path / 'none'
     assert f'sniff: {none}: ' in refused(capsys, '--port', str(none))
     assert f'sniff: {none}: ' in refused(capsys, '--tap', 'pty', str(none))
@@ -219,7 +219,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
     ['x', '--check', 'md5'], ['x', '--baud', '7'],
     ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
-def test_bad_options(capsys: Output, args: list[str]) -> None:
+def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, args: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(args)
     assert caught.value.code == 2

@@ -74,7 +74,7 @@ def test_dumb_terminal_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not is_terminal(Screen())
 
 
-def test_table() -> None:
+def test_columns_of_a_table_are_aligned() -> None:
     assert table(('name', 'n'), [('a', '10'), ('long name', '5')], right=(1,)) == (
         'name        n\n'
         'a          10\n'

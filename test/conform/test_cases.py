@@ -87,7 +87,7 @@ def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None
 
 @pytest.mark.parametrize('check', CHECKS)
 @pytest.mark.parametrize(('target', 'mode'), [(Target.MASTER, 'Master'), (Target.CLIENT, 'Peer')])
-def test_driver_conforms(target: Target, mode: str, check: str) -> None:
+def test_our_driver_passes_every_case(target: Target, mode: str, check: str) -> None:
     results = results_of(asking(check, mode), target, check)
     assert failures(results) == []
     assert {result.verdict for result in results} == {Verdict.PASS}

@@ -100,13 +100,13 @@ def expected_symbols(entry: Vector) -> list[Symbol]:
 
 @for_all('chunk', [None, 1, 3])
 @for_all('entry', VECTORS)
-def test_vector_decodes(entry: Vector, chunk: int | None) -> None:
+def test_frame_of_a_vector_is_decoded_in_any_portions(entry: Vector, chunk: int | None) -> None:
     assert decode(entry.frame, entry.checksum, entry.duplex, chunk) == expected_symbols(entry)
 
 
 @for_all('entry', [
     entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response])
-def test_vector_encodes(entry: Vector) -> None:
+def test_message_of_a_vector_is_encoded_to_its_frame(entry: Vector) -> None:
     if entry.station is not None:
         assert entry.station is not None
         frame = master_frame(entry.station, entry.link_data, entry.checksum)
@@ -161,7 +161,7 @@ def test_captured_nak_answers_a_frame_shorter_than_a_header() -> None:
 
 @pytest.mark.parametrize(('frame', 'code'), [(ACK, Code.ACK), (NAK, Code.NAK), (EOT, Code.EOT)])
 @pytest.mark.parametrize('duplex', Duplex)
-def test_control_symbols(frame: bytes, code: Code, duplex: Duplex) -> None:
+def test_control_symbols_are_told_apart(frame: bytes, code: Code, duplex: Duplex) -> None:
     assert len(frame) == 2
     assert decode(frame, duplex=duplex, chunk=1) == [Control(code)]
 
@@ -261,7 +261,7 @@ def test_wrong_check_of_a_short_message_is_a_wrong_check() -> None:
 
 
 @pytest.mark.parametrize('fill', [0x10, 0x55])
-def test_longest_message(fill: int) -> None:
+def test_longest_message_is_decoded_whatever_its_bytes_are(fill: int) -> None:
     data = bytes((fill,)) * MAX_LINK_DATA
     (frame,) = decode(message_frame(data, CRC))
     assert isinstance(frame, Frame)

@@ -76,7 +76,7 @@ def inactive_script() -> MasterScript:
     return script
 
 
-def test_normal() -> None:
+def test_command_is_acknowledged_and_its_reply_polled_for() -> None:
     script = MasterScript(SETTINGS)
     reply = script.run(
         COMMAND,
@@ -316,7 +316,7 @@ def test_ack_is_no_answer_to_a_probe() -> None:
 
 
 @pytest.mark.parametrize('retries', [0, 1, 3])
-def test_enq_limit(retries: int) -> None:
+def test_station_is_inactive_after_the_last_poll_without_an_answer(retries: int) -> None:
     script = MasterScript(replace(SETTINGS, enq_retries=retries))
     error = script.run(COMMAND, SENT, SAYS_ACK, *(POLLED, TIMEOUT) * (retries + 1))
     assert isinstance(error, StationInactive)

@@ -83,7 +83,7 @@ def test_peer_that_acknowledges_and_never_replies_has_no_replies() -> None:
 # Transmitter
 
 @pytest.mark.parametrize('checksum', Checksum)
-def test_normal(checksum: Checksum) -> None:
+def test_command_is_acknowledged_and_answered_by_its_reply(checksum: Checksum) -> None:
     peer = bench(checksum)
     task = peer.begin(COMMAND)
     assert peer.said() == peer.frame(COMMAND)
@@ -750,7 +750,8 @@ def test_response_between_message_and_enq_changes_nothing() -> None:
 
 @pytest.mark.parametrize(('checksum', 'counter', 'event'), [
     (Checksum.CRC, 'crc_errors', 2506), (Checksum.BCC, 'bcc_errors', 2507)])
-def test_wrong_check(checksum: Checksum, counter: str, event: int) -> None:
+def test_message_with_a_wrong_check_gets_nak_and_is_counted(
+        checksum: Checksum, counter: str, event: int) -> None:
     peer = bench(checksum)
     frame = peer.frame(THEIRS)
     damaged = frame[:-1] + bytes((frame[-1] ^ 0x20,))
@@ -786,7 +787,7 @@ def test_header_alone_is_a_message() -> None:
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
 
 
-def test_longest_message() -> None:
+def test_longest_message_is_served() -> None:
     peer = bench()
     command = THEIRS._replace(data=b'\x10' * (MAX_LINK_DATA - 6))
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
@@ -929,7 +930,7 @@ def test_duplicates_are_forgotten_with_the_port() -> None:
     assert len(peer.served) == 2
 
 
-def test_sink_full() -> None:
+def test_command_that_finds_no_room_gets_nak() -> None:
     peer = bench()
     peer.begin(COMMAND)
     peer.said()
@@ -1081,7 +1082,7 @@ def test_messages_of_the_vectors(entry: Vector, chunk: int) -> None:
 
 
 @pytest.mark.parametrize('is_slow', [False, True])
-def test_captured_conversation(is_slow: bool) -> None:
+def test_conversation_of_a_real_modem_is_played_again(is_slow: bool) -> None:
     """Play the modem's part: its client asks, and we refuse what only the real one can do."""
     peer = bench(serve=lambda command: command.reply(sts=0x10))
     heard = 0
@@ -1232,7 +1233,7 @@ def test_command_with_our_tns_is_no_reply() -> None:
 
 
 @pytest.mark.parametrize('allowed', [1, 2, 3])
-def test_commands_outstanding(allowed: int) -> None:
+def test_as_many_commands_as_allowed_are_outstanding(allowed: int) -> None:
     peer = bench(max_outstanding=allowed)
     commands = [later(COMMAND, number) for number in range(6)]
     tasks = [peer.begin(command) for command in commands]

@@ -202,7 +202,8 @@ def test_counters_of_both_ends_agree_on_a_clean_line(checksum: Checksum, outstan
 
 @pytest.mark.parametrize('outstanding', [1, 3])
 @pytest.mark.parametrize(('rate', 'chunk'), [(1e-4, 14), (1e-3, 14), (1e-2, 1)])
-def test_noise(rate: float, outstanding: int, chunk: int) -> None:
+def test_noise_costs_time_but_no_result_is_wrong(
+        rate: float, outstanding: int, chunk: int) -> None:
     rig = Rig(replace(SETTINGS, max_outstanding=outstanding), noise=noise_of(rate), chunk=chunk,
               seed=int(rate * 1e4) + outstanding)
     rig.run(300)
@@ -237,7 +238,7 @@ def test_noise_of_one_kind(kind: str) -> None:
 
 
 @pytest.mark.parametrize('outstanding', [1, 3])
-def test_dead_line(outstanding: int) -> None:
+def test_commands_on_a_dead_line_end_as_inactive(outstanding: int) -> None:
     rig = Rig(replace(SETTINGS, max_outstanding=outstanding), noise=Noise(lost=1.0))
     rig.run(5)
     for end in rig.ends:

@@ -536,7 +536,7 @@ def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
     assert ended(task)
 
 
-def test_scan_times() -> None:
+def test_last_and_longest_scan_of_each_list_are_known() -> None:
     rig = bench(PollingSettings((1, 2, 3), priority=(9,), group_size=1))
     scans = rig.master.link.status().scans
     priority, normal = scans['priority'], scans['normal']

@@ -82,7 +82,7 @@ def later(number: int) -> Packet:
     return COMMAND._replace(tns=COMMAND.tns + number)
 
 
-def test_normal() -> None:
+def test_command_is_acknowledged_and_its_reply_waits_for_a_poll() -> None:
     bench = Bench()
     assert bench.hear(sent(COMMAND), POLL, HEARD_ACK, POLL) == [
         ACK, reply_frame(COMMAND), b'', EOT]

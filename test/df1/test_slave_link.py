@@ -522,7 +522,7 @@ def test_bytes_come_one_by_one() -> None:
     assert bench.served == [FROM_MASTER]
 
 
-def test_eot_suppression() -> None:
+def test_suppressed_eot_leaves_a_poll_without_an_answer() -> None:
     bench = SlaveBench(replace(SETTINGS, eot_suppression=True))
     task = bench.add(own())
     assert bench.poll() == bench.own(own())

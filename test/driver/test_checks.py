@@ -439,7 +439,7 @@ def test_two_requests_at_once_are_one() -> None:
     assert len(ears.times(COUNTERS)) == 1
 
 
-def test_refused_counters() -> None:
+def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
     bench, _, (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
     bench.open()

@@ -117,7 +117,8 @@ def serve_row(text: str, family: str = 'PLC5', length: int = 1, **other: object)
 @pytest.mark.parametrize('family', ['PLC5', 'SLC'])
 @pytest.mark.parametrize('check', ['CRC', 'BCC'])
 @pytest.mark.parametrize(('outstanding', 'chunk'), [(1, 1), (3, 1), (2, 14)])
-def test_reads(family: str, check: str, outstanding: int, chunk: int) -> None:
+def test_reads_of_a_peer_come_in_time_and_true(
+        family: str, check: str, outstanding: int, chunk: int) -> None:
     integers = make_mapping('N7:0', plc=family, length=3)
     floats = make_mapping('F8:2', plc=family, length=2)
     bits = make_mapping('B3:1/4', plc=family, length=6)
@@ -143,7 +144,7 @@ def test_reads(family: str, check: str, outstanding: int, chunk: int) -> None:
 
 @pytest.mark.parametrize('family', ['PLC5', 'SLC'])
 @pytest.mark.parametrize('outstanding', [1, 3])
-def test_writes(family: str, outstanding: int) -> None:
+def test_writes_to_a_peer_are_confirmed_and_stored(family: str, outstanding: int) -> None:
     words = make_mapping('N7:10', 'ReadWrite', plc=family, length=4)
     floats = make_mapping('F8:0', 'Write', plc=family)
     bits = make_mapping('B3:2/3', 'Write', plc=family, length=3)

@@ -91,7 +91,7 @@ def test_read_that_takes_several_commands() -> None:
     assert {tuple(entry) for entry in bench.listener.values(long)} == {tuple(range(300))}
 
 
-def test_writes() -> None:
+def test_write_is_confirmed_in_standard_polling() -> None:
     words = make_mapping('N7:0', 'ReadWrite', length=2)
     bench = DriverBench([words], network=STANDARD)
     plc = bench.plc(1, 'PLC5', ('N7:0', 2))
@@ -160,7 +160,7 @@ def test_lost_port_leaves_nothing_without_a_result(polling: str) -> None:
 
 
 @BOTH
-def test_broadcast_row(polling: str) -> None:
+def test_broadcast_row_is_written_to_every_station(polling: str) -> None:
     everybody = make_mapping('N7:0', 'Write', station=BROADCAST)
     read = make_mapping('N7:0', station=1)
     bench = DriverBench([everybody, read], network=network(polling))

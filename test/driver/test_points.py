@@ -44,7 +44,7 @@ def test_value_is_waited_for_at_first() -> None:
 @pytest.mark.parametrize('age, freshness', [
     (0.0, Freshness.FRESH), (0.29, Freshness.FRESH), (0.31, Freshness.LATE),
     (0.6, Freshness.LATE), (0.61, Freshness.STALE), (1e6, Freshness.STALE)])
-def test_value_ages(age: float, freshness: Freshness) -> None:
+def test_value_becomes_late_and_then_stale(age: float, freshness: Freshness) -> None:
     fresh = point()
     fresh.update(b'\1\0', 0.0)
     assert fresh.freshness(age) is freshness

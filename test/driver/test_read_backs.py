@@ -113,7 +113,7 @@ def test_read_that_began_before_the_write_ended_says_nothing() -> None:
     assert unconfirmed.details == []
 
 
-def test_patience_ends() -> None:
+def test_read_back_that_does_not_come_ends_when_patience_does() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     unconfirmed = Unconfirmed(mapping, mapping, [5])
     assert unconfirmed.backs.next_expiry == EARLY + PATIENCE

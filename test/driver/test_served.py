@@ -301,7 +301,7 @@ def test_storing_for_a_long_time_takes_no_memory() -> None:
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
-def test_string(plc: str) -> None:
+def test_string_is_served_and_read_in_whole_elements(plc: str) -> None:
     mapping = row('ST9:1', plc)
     bench = Bench(plc, mapping)
     bench.served.store(mapping, 'Tank 4')
@@ -367,7 +367,8 @@ def test_whole_element_of_which_a_word_is_served(plc: str, access: str) -> None:
 
 @pytest.mark.parametrize(('plc', 'text', 'other'), [
     ('SLC', 'O:2.1', 'O:3.1'), ('SLC', 'I:1.0', 'I:1.1'), ('PLC5', 'O:017', 'O:016')])
-def test_io(plc: str, text: str, other: str) -> None:
+def test_inputs_and_outputs_are_served_where_they_are_mapped(
+        plc: str, text: str, other: str) -> None:
     mapping = row(text, plc)
     bench = Bench(plc, mapping)
     assert bench.write(text, 0xF00F) == (0, b'')

@@ -171,7 +171,7 @@ def test_bits_of_two_words_of_which_one_fails_are_partly_written() -> None:
     assert (result.outcome, result.packets_done) == (Outcome.PARTLY, 1)
 
 
-def test_identify() -> None:
+def test_identity_is_asked_for_with_a_diagnostic_status() -> None:
     requests, identity = converse(identify(), [reply(STATUS)])
     assert requests == [(0x06, b'\x03')]
     assert str(identity).startswith('SLC 5/03')
@@ -193,7 +193,7 @@ def test_plc5_with_a_fault_is_asked_which(answer: Packet, fault: str) -> None:
     assert identity.faults == (fault,)
 
 
-def test_echo() -> None:
+def test_echo_is_answered_by_the_same_bytes() -> None:
     assert converse(echo(b'\1\2'), [reply(b'\1\2')]) == ([(0x06, b'\x00\1\2')], None)
 
 

@@ -99,7 +99,7 @@ def test_node_is_stopped_and_goes_on(observer: Observer, tmp_path: Path) -> None
         observer.node.destroy_publisher(publisher)
 
 
-def test_clock_steps(observer: Observer, tmp_path: Path) -> None:
+def test_clock_of_the_host_that_steps_changes_no_age(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path)
     with rigged(observer, files, str(files.port), files.start_simulator(),
                 program=HERE / 'support' / 'stepping_node.py') as rig:

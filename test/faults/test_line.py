@@ -108,7 +108,7 @@ def test_adapter_begins_to_echo_and_ends(line: Boxed) -> None:
     assert 'ERROR' not in rig.said
 
 
-def test_line_babbles(line: Boxed) -> None:
+def test_line_that_babbles_loses_writes_but_tells_no_lies(line: Boxed) -> None:
     rig, box = line
     box.babbles = True
     results = [rig.write(3.0 + number) for number in range(5)]

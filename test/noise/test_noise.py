@@ -40,7 +40,8 @@ LONGEST_RECOVERY = 30.0
 @pytest.mark.parametrize('error_code', ['CRC', 'BCC'])
 @pytest.mark.parametrize('rate', [1e-3, 2e-2])
 @pytest.mark.parametrize('mode', MODES)
-def test_noise(mode: str, rate: float, error_code: str) -> None:
+def test_noise_gives_no_wrong_value_that_a_check_could_see(
+        mode: str, rate: float, error_code: str) -> None:
     rig = Rig(mode, error_code, seed=round(1 / rate))
     for _ in range(2):
         rig.disturb(rate, 300.0)

@@ -46,8 +46,9 @@ FAMILIES = st.sampled_from(BOTH)
     ('C5:2/CU', 'C', 5, 2, 0, 15), ('R6:0.LEN', 'R', 6, 0, 1, None),
     ('R6:0/FD', 'R', 6, 0, 0, 8), ('A12:3', 'A', 12, 3, 0, None), ('D13:3/15', 'D', 13, 3, 0, 15),
 ])
-def test_parse(family: PlcType, text: str, kind: str, file: int, element: int, word: int,
-               bit: int | None) -> None:
+def test_address_has_the_parts_that_its_text_names(
+        family: PlcType, text: str, kind: str, file: int, element: int, word: int,
+        bit: int | None) -> None:
     assert parse_address(text, family) == Address(
         family_of(family).addressing, FileType(kind), file, element, word, bit)
 

@@ -96,7 +96,7 @@ def test_data_table_commands(data: str, text: str) -> None:
     (0x06, '00 01 02', 'echo 01 02'), (0x06, '03', 'diagnostic status'),
     (0x0F, 'E7 01 02', 'command 0F/E7 01 02'), (0x0F, 'E7', 'command 0F/E7'),
     (0x0F, '', 'command 0F'), (0x0E, '01 02', 'command 0E 01 02')])
-def test_other_commands(cmd: int, data: str, text: str) -> None:
+def test_command_without_fnc_is_described(cmd: int, data: str, text: str) -> None:
     assert describe(command(data, cmd)) == text
 
 
@@ -122,7 +122,7 @@ def test_malformed_commands_are_given_as_bytes(data: str) -> None:
     ('68 00 00 01 00 07 00 07 00 01 00', '95 09', '95 09'),
     ('01 00 00 02 00 07 00 07 00 04', '34 12 FE FF', '1234 FFFE'),
     ('00 00 00 01', '01 02', '01 02'), ('E7', '01 02', '01 02')])
-def test_replies(asked: str, data: str, text: str) -> None:
+def test_reply_is_described_by_what_was_asked(asked: str, data: str, text: str) -> None:
     request = command(asked)
     assert describe(request.reply(bytes.fromhex(data)), request) == text
 
@@ -137,7 +137,7 @@ def test_replies(asked: str, data: str, text: str) -> None:
     ('08 BB 00 80 01 00 42 07 FD 00 0C 00 05 00 00 00 00',
      'PLC-5/15 series C revision C, PROG; major processor fault (word S:11 says which)'),
     ('00 99 01 02 03 04 05 06 07 08', '00 99 01 02 03 04 05 06 07 08'), ('00', '00')])
-def test_diagnostic_status(data: str, text: str) -> None:
+def test_diagnostic_status_is_described_by_its_identity(data: str, text: str) -> None:
     request = command('03', 0x06)
     assert describe(request.reply(bytes.fromhex(data)), request) == text
 
@@ -146,14 +146,14 @@ def test_reply_without_its_command_is_bytes() -> None:
     assert describe(command('').reply(b'\x34\x12')) == '34 12'
 
 
-def test_refusals() -> None:
+def test_refusal_is_described_by_sts_and_ext_sts() -> None:
     assert describe(command('').reply(sts=0x50)) == \
         'STS 50: address not there, or memory protected'
     assert describe(command('').reply(b'\x06', 0xF0)) == \
         'STS F0 EXT STS 06: address does not point to something usable'
 
 
-def test_command_name() -> None:
+def test_name_of_a_command_has_cmd_and_fnc() -> None:
     assert command_name(command('A2 02')) == '0F/A2'
     assert command_name(command('A2 02', 0x2F)) == '0F/A2'
     assert command_name(command('A2 02').reply(b'\x01')) == '0F'

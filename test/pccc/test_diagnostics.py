@@ -51,7 +51,7 @@ def test_reset_of_the_vectors() -> None:
     assert pair('diag_reset_counters')[0].data == b'\x07'
 
 
-def test_read_counters() -> None:
+def test_counters_are_asked_for_by_address_and_size() -> None:
     assert ReadCounters(0x4144, 26).encode() == b'\x01\x44\x41\x1A'
 
 

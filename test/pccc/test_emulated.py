@@ -44,7 +44,8 @@ def test_plc5_has_the_layout_of_the_vectors() -> None:
 
 @pytest.mark.parametrize(('plc_type', 'size', 'first'), [
     (PlcType.PLC3, 18, b'\x02\x47'), (PlcType.PLC2, 10, b'\x02\x14')])
-def test_older_families(plc_type: PlcType, size: int, first: bytes) -> None:
+def test_older_families_tell_of_themselves_in_their_own_layout(
+        plc_type: PlcType, size: int, first: bytes) -> None:
     data = EmulatedProcessor(plc_type).encode()
     assert (len(data), data[:2]) == (size, first)
 

@@ -66,7 +66,8 @@ def test_plc5_of_the_vectors() -> None:
     (0x06, 'REM RUN', True), (0x07, 'REM TEST', False), (0x08, 'REM TEST, single scan', False),
     (0x09, 'REM TEST, step', False), (0x10, 'DOWNLOAD', False), (0x11, 'PROG', False),
     (0x1B, 'SUSPEND', False), (0x1E, 'RUN', True), (0x05, 'mode 0x05', None)])
-def test_slc_modes(code: int, text: str, is_running: bool | None) -> None:
+def test_mode_of_an_slc_is_read_from_its_code(
+        code: int, text: str, is_running: bool | None) -> None:
     identity = changed(SLC, byte19=code | 0x80)  # communication active says nothing new
     assert (identity.mode_text, identity.is_running) == (text, is_running)
     assert str(identity).endswith(f', {text}')
@@ -75,7 +76,8 @@ def test_slc_modes(code: int, text: str, is_running: bool | None) -> None:
 @pytest.mark.parametrize(('code', 'text', 'is_running'), [
     (0, 'PROG', False), (2, 'RUN', True), (4, 'REM PROG', False), (5, 'REM TEST', False),
     (6, 'REM RUN', True), (1, 'mode 0x01', None)])
-def test_plc5_modes(code: int, text: str, is_running: bool | None) -> None:
+def test_mode_of_a_plc5_is_read_from_its_code(
+        code: int, text: str, is_running: bool | None) -> None:
     identity = changed(PLC5, byte1=code)
     assert (identity.mode_text, identity.is_running) == (text, is_running)
 
@@ -124,7 +126,7 @@ def test_plc5_faults_and_remarks() -> None:
     (0x58, 'MicroLogix 1000', 'ML1000'), (0x88, 'MicroLogix 1200', 'ML1200'),
     (0x89, 'MicroLogix 1500 LSP', 'ML1500'), (0x8C, 'MicroLogix 1500 LRP', 'ML1500'),
     (0x9C, 'MicroLogix 1100', 'ML1100')])
-def test_slc_models(code: int, model: str, processor: str) -> None:
+def test_model_of_an_slc_is_read_from_its_code(code: int, model: str, processor: str) -> None:
     identity = changed(SLC, byte4=code, byte6=0)  # without a name
     assert str(identity) == f'{model} series B revision 3, REM RUN'
     assert identity.processor is Processor(processor)
@@ -159,7 +161,7 @@ def test_name_of_an_slc_counts_more_than_its_code(
     (0x0056, 'major error 0x0056 (slot 0: chassis configuration is not that of the program)'),
     (0x0352, 'major error 0x0352 (slot 3: module is missing or was removed)'),
     (0x0122, 'major error 0x0122'), (0x0099, 'major error 0x0099')])
-def test_major_errors(code: int, text: str) -> None:
+def test_major_error_has_its_text(code: int, text: str) -> None:
     assert major_error(code) == text
 
 
@@ -178,7 +180,7 @@ def test_unknown_processor_is_named_and_not_interpreted() -> None:
     (0x29, 'PLC-5/60L'), (0x31, 'PLC-5/11'), (0x32, 'PLC-5/20'), (0x33, 'PLC-5/30'),
     (0x4A, 'PLC-5/20E'), (0x4B, 'PLC-5/40E'), (0x55, 'PLC-5/80'), (0x59, 'PLC-5/80E'),
     (0x13, 'PLC-5/12'), (0x14, 'PLC-5/25'), (0x77, 'PLC-5 of type 0x77')])
-def test_plc5_models(byte3: int, model: str) -> None:
+def test_model_of_a_plc5_is_read_from_its_code(byte3: int, model: str) -> None:
     assert changed(PLC5, byte3=byte3).model == model
 
 
@@ -214,7 +216,7 @@ def test_fault_of_a_plc5_is_asked_for_and_named() -> None:
         'major processor fault: S:11 is 0; fault code 0 (S:12)'
 
 
-def test_plc3() -> None:
+def test_plc3_tells_series_mode_faults_and_remarks() -> None:
     data = bytes((0x02, 0x47, 0x10, 0, 0, 0, 0x34, 0x12, 0x41)) + bytes(9)
     identity = decode_identity(data)
     assert str(identity) == 'PLC-3 series C revision B, RUN'
@@ -283,7 +285,7 @@ def test_unknown_layout_is_shown_in_hexadecimal() -> None:
 
 
 @pytest.mark.parametrize('data', [b'', b'\0', PLC5[:17], PLC5[:2]])
-def test_too_short(data: bytes) -> None:
+def test_reply_that_is_too_short_is_a_format_error(data: bytes) -> None:
     with pytest.raises(FormatError, match='a diagnostic status of'):
         decode_identity(data)
 

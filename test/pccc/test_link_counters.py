@@ -79,7 +79,7 @@ def test_names_of_the_words(layout: CounterLayout, expected: dict[str, str]) -> 
     assert decode_counters(block, layout) == expected
 
 
-def test_modem_lines() -> None:
+def test_modem_lines_that_are_on_are_named() -> None:
     assert decode_counters(b'\x1F\0', COUNTERS) == {'modem lines': 'CTS RTS DSR DCD DTR'}
     assert decode_counters(b'\0\0', COUNTERS) == {'modem lines': 'none on'}
 

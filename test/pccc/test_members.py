@@ -56,7 +56,8 @@ def values(table: Members) -> dict[str, int]:
     (members.SLC_PID, 0, {'EN': 15, 'RA': 14, 'DN': 13, 'PV': 12, 'SP': 11, 'LL': 10, 'UL': 9,
                           'DB': 8, 'DA': 7, 'TF': 6, 'SC': 5, 'RG': 4, 'OL': 3, 'CM': 2,
                           'AM': 1, 'TM': 0})])
-def test_bits(table: Members, word: int, expected: dict[str, int]) -> None:
+def test_named_bits_are_told_in_their_order(
+        table: Members, word: int, expected: dict[str, int]) -> None:
     assert bits(table, word) == expected
     assert list(bits(table, word)) == list(expected)
 
@@ -70,7 +71,7 @@ def test_bits(table: Members, word: int, expected: dict[str, int]) -> None:
                            'TFN': 13, 'ELE': 14, 'ERR': 18}),
     (members.SLC_PID, {'SPS': 2, 'KC': 3, 'TI': 4, 'TD': 5, 'MAXS': 7, 'MINS': 8, 'CVH': 11,
                        'CVL': 12, 'SPV': 14, 'CVP': 16})])
-def test_words(table: Members, expected: dict[str, int]) -> None:
+def test_named_words_have_their_places(table: Members, expected: dict[str, int]) -> None:
     assert values(table) == expected
 
 

@@ -39,7 +39,7 @@ def test_names_are_those_of_the_map_file() -> None:
 @pytest.mark.parametrize(('names', 'read', 'write'), [
     ('5/01 5/02 ML1000', 82, 82), ('5/03 5/04 5/05', 236, 234),
     ('ML1100 ML1200 ML1400 ML1500', 206, 206)])
-def test_packets(names: str, read: int, write: int) -> None:
+def test_largest_packets_are_those_of_the_processor(names: str, read: int, write: int) -> None:
     for name in names.split():
         assert (Processor(name).max_read, Processor(name).max_write) == (read, write)
 

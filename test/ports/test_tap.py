@@ -119,5 +119,5 @@ def test_silence_is_told(ptys: tuple[Pty, Pty]) -> None:
 @pytest.mark.parametrize(('name', 'expected'), [
     ('pty', True), ('pty:/tmp/x', True), ('/dev/ttyUSB0', False), ('socket://h:1', False),
     ('ptys', False)])
-def test_is_pty(name: str, expected: bool) -> None:
+def test_word_pty_and_its_file_name_ask_for_a_pseudo_terminal(name: str, expected: bool) -> None:
     assert is_pty(name) is expected

@@ -177,8 +177,8 @@ def test_link_parameters_are_read_as_the_file_is(
     ({'net.com_port': 'socket://plc:4001'}, 'socket://plc:4001'),
     ({'port': '/dev/ttyUSB7', 'net.com_port': 1}, '/dev/ttyUSB7'),
     ({'port': 7}, '/dev/ttyS6')])
-def test_port(configured: Callable[..., Configuration], values: dict[str, Any],
-              port: str) -> None:
+def test_port_is_the_parameter_or_else_com_port(
+        configured: Callable[..., Configuration], values: dict[str, Any], port: str) -> None:
     assert configured(**values).port == port
 
 
@@ -187,8 +187,8 @@ def test_port(configured: Callable[..., Configuration], values: dict[str, Any],
     ('default_period', 0, 0), ('default_period', 86_400_000, 86_400_000),
     ('read_only', True, True), ('write_timeout', 0.05, 0.05), ('poll_list', [1, 2], '1,2'),
     ('poll_list', 3, '3')])
-def test_own_parameters(configured: Callable[..., Configuration], name: str, value: Any,
-                        expected: Any) -> None:
+def test_own_parameter_has_the_value_and_type_that_was_given(
+        configured: Callable[..., Configuration], name: str, value: Any, expected: Any) -> None:
     found = getattr(configured(**{name: value}).parameters, name)
     assert found == expected
     assert type(found) is type(expected)
@@ -298,7 +298,8 @@ def test_overrides_of_the_map_are_ignored_unless_they_repeat_it(
         'map.', 'map.gate.max', 'map.line.door.length', 'map.recipe.maximum']
 
 
-def test_parameter_file(make_node: Nodes, files: dict[str, str], tmp_path: Path) -> None:
+def test_parameter_file_sets_parameters_of_node_and_net(
+        make_node: Nodes, files: dict[str, str], tmp_path: Path) -> None:
     path = tmp_path / 'parameters.yaml'
     path.write_text(
         '/**:\n  ros__parameters:\n    default_period: 250\n    stale_after: 4\n'

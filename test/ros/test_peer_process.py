@@ -212,7 +212,7 @@ both_checks = pytest.mark.parametrize('line', ['CRC', 'BCC'], indirect=True)
 
 @both_checks
 @pytest.mark.parametrize('is_slow', [False, True])
-def test_commands(line: Line, is_slow: bool) -> None:
+def test_commands_to_a_peer_are_executed_and_answered(line: Line, is_slow: bool) -> None:
     client = line.client
     for _ in range(3):
         assert client.ask(1, 0x0F, typed_read(0, 4), is_slow) == bytes.fromhex(
@@ -228,7 +228,7 @@ def test_commands(line: Line, is_slow: bool) -> None:
 
 
 @both_checks
-def test_responses(line: Line) -> None:
+def test_response_to_an_enq_is_the_last_one_again(line: Line) -> None:
     client = line.client
     client.say(ENQ)
     assert client.hear() == NAK
@@ -335,7 +335,7 @@ def test_slow_port_is_given_the_time_that_a_message_takes(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize('check', ['CRC', 'BCC'])
-def test_slc(tmp_path: Path, check: str) -> None:
+def test_slc_answers_as_a_full_duplex_peer(tmp_path: Path, check: str) -> None:
     made = Line(tmp_path, check, 2)
     read = bytes.fromhex('A2 04 07 89 00 00')
     assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 10')
@@ -352,7 +352,7 @@ def test_slc(tmp_path: Path, check: str) -> None:
     made.close()
 
 
-def test_tcp(tmp_path: Path) -> None:
+def test_peer_on_tcp_takes_one_client_after_the_other(tmp_path: Path) -> None:
     simulator = Simulator(tmp_path, '--full-duplex', '1', '--tcp', '127.0.0.1:0')
     port = int(simulator.until(r'socket://127\.0\.0\.1:(\d+)')[1])
     for _ in range(2):  # one client after the other

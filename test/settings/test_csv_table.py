@@ -234,7 +234,7 @@ def test_only_cell_of_a_row_and_of_a_file(path: Path) -> None:
     assert cells_of(path, 'Tag\na;b\n') == [['a;b', '', '']]
 
 
-def test_missing_file(path: Path) -> None:
+def test_file_that_is_missing_is_named(path: Path) -> None:
     with pytest.raises(ConfigurationError) as caught:
         read_rows(str(path), KNOWN)
     assert str(caught.value) == f'{path}: cannot be read: No such file or directory'
@@ -267,7 +267,7 @@ def test_byte_that_is_no_text(path: Path, content: bytes, where: str, byte: str)
 
 @pytest.mark.parametrize('content', [
     b'', b'\n\n', b'\xef\xbb\xbf', b'# only\n# comments\n', b',,,\n;\n\t\n', b'  \r\n'])
-def test_empty_file(path: Path, content: bytes) -> None:
+def test_file_without_a_header_is_told_which_columns_there_are(path: Path, content: bytes) -> None:
     assert problems_of(path, content) == [
         'FILE:1: the file is empty; its first row names columns: Tag, Address, Length']
 

@@ -45,7 +45,7 @@ def test_row_with_every_column() -> None:
     assert str(mapping.address) == 'N7:10'
 
 
-def test_defaults() -> None:
+def test_cells_that_are_left_out_have_defaults() -> None:
     mapping = one(Tag='x:y', Command='Read')
     assert (mapping.length, mapping.type, mapping.topic, mapping.period, mapping.publish) == (
         1, ValueType.INT16, 'x_y', None, Publish.ALWAYS)
@@ -55,7 +55,7 @@ def test_defaults() -> None:
 @pytest.mark.parametrize('text, reads, writes', [
     ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
     ('READ', True, False), ('write', False, True)])
-def test_command(text: str, reads: bool, writes: bool) -> None:
+def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, writes: bool) -> None:
     mapping = one(Command=text)
     assert (mapping.reads, mapping.writes) == (reads, writes)
 
@@ -67,7 +67,7 @@ def test_command(text: str, reads: bool, writes: bool) -> None:
     ('T4:0.ACC', 'PLC5', 'int16'), ('C5:0.PRE', 'SLC', 'int16'), ('R6:0.LEN', 'PLC5', 'int16'),
     ('ST9:0', 'PLC5', 'string'), ('B3:0/5', 'PLC5', 'bool'), ('T4:0/DN', 'SLC', 'bool'),
     ('I:017/12', 'PLC5', 'bool'), ('I:1.0/3', 'SLC', 'bool'), ('N7:0/1', 'SLC', 'bool')])
-def test_natural_type(address: str, plc: str, kind: str) -> None:
+def test_type_that_is_left_out_is_that_of_the_address(address: str, plc: str, kind: str) -> None:
     assert one(Address=address, PLC_Type=plc, Command='Read').type.value == kind
 
 
@@ -136,7 +136,7 @@ def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
     ('Topic', '/', '2:8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
     ('Topic', 'x' * 151, '2:8 (Topic): Item: 1, Topic has 151 characters, at most 150 go'),
 ])
-def test_exact_text(column: str, text: str, expected: str) -> None:
+def test_fault_of_a_cell_is_told_word_for_word(column: str, text: str, expected: str) -> None:
     assert fault(**{column: text}) == expected
 
 
@@ -152,7 +152,7 @@ def test_long_cell_is_shown_without_its_end(column: str, texts: list[str]) -> No
 
 
 @pytest.mark.parametrize('column', ['Tag', 'Command', 'Address', 'Station', 'PLC_Type'])
-def test_needed_column(column: str) -> None:
+def test_needed_cell_that_is_empty_is_told_as_missing(column: str) -> None:
     assert fault(**{column: ''}) == \
         f'2:{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing'
 
@@ -355,7 +355,7 @@ def test_types_and_length_over_the_words_of_a_plc2() -> None:
     ('PLC2', '', 'Unprotected'), ('PLC2', 'protected', 'Protected'), ('PLC2', 'cif', 'CIF'),
     ('PLC3', '', 'WordRange'), ('PLC5', '', 'Typed'), ('PLC5', 'WORDRANGE', 'WordRange'),
     ('SLC', '', 'Slot'), ('SLC', 'flat', 'Flat')])
-def test_access(plc: str, text: str, access: str) -> None:
+def test_access_chooses_the_dialect(plc: str, text: str, access: str) -> None:
     address = '020' if plc == 'PLC2' else 'N7:0'
     mapping = one(PLC_Type=plc, Address=address, Access=text)
     assert (mapping.access, mapping.cell('Access')) == (Access(access), access)
@@ -446,7 +446,7 @@ def test_io_by_the_word_of_the_image() -> None:
 
 
 @pytest.mark.parametrize('processor', Processor)
-def test_processor(processor: Processor) -> None:
+def test_processor_chooses_the_dialect(processor: Processor) -> None:
     mapping = one(PLC_Type='SLC', Processor=processor.value.lower())
     assert (mapping.processor, mapping.cell('Processor')) == (processor, processor.value)
     assert mapping.dialect is dialect_of(PlcType.SLC, None, processor)

@@ -78,7 +78,7 @@ def test_columns_are_those_of_the_specification_and_polling() -> None:
         'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access']
 
 
-def test_defaults() -> None:
+def test_columns_that_are_left_out_have_defaults() -> None:
     network = Network()
     for _, field, default, *_ in NUMBERS + CHOICES:
         assert getattr(network, field) == default, field
@@ -162,7 +162,8 @@ def test_choice_that_is_none(
      'Com_Port = "COM1" should be a number from 1, a device path such as /dev/ttyUSB0, '
      'socket://host:port or rfc2217://host:port; "plc ports" lists the devices'),
 ])
-def test_exact_text(path: Path, column: str, text: str, expected: str) -> None:
+def test_fault_of_a_cell_is_told_word_for_word(
+        path: Path, column: str, text: str, expected: str) -> None:
     assert faults(path, column, text) == [f'FILE:2:1 ({column}): {expected}']
 
 
@@ -218,7 +219,7 @@ def test_parameter_name_is_the_column_in_lower_case(
     ('socket://10.0.0.7:4001', 'socket://10.0.0.7:4001'),
     ('rfc2217://host:2217', 'rfc2217://host:2217'),
     ('RFC2217://host:2217', 'RFC2217://host:2217')])
-def test_com_port(path: Path, text: str, port: str) -> None:
+def test_com_port_may_be_a_number_a_device_or_a_url(path: Path, text: str, port: str) -> None:
     assert load(path, 'Com_Port', text).port == port
 
 
@@ -233,7 +234,7 @@ def test_bad_com_port(path: Path, text: str) -> None:
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')
 
 
-def test_checksum() -> None:
+def test_checksum_is_that_of_error_code() -> None:
     assert Network().checksum is Checksum.CRC
     assert Network(error_code='BCC').checksum is Checksum.BCC
 

@@ -67,7 +67,8 @@ def test_floats_come_back_as_near_as_their_digits_allow(
 @pytest.mark.parametrize('scale, offset, raw, value', [
     (0.1, 0.0, 215, 21.5), (0.01, -40.0, 6150, 21.5), (-0.5, 0.0, 3, -1.5), (1.0, 0.5, 1, 1.5),
     (0.001525902, -50.0, 32767, -0.000769)])
-def test_engineering_value(scale: float, offset: float, raw: int, value: float) -> None:
+def test_engineering_value_comes_from_scale_and_offset_and_goes_back(
+        scale: float, offset: float, raw: int, value: float) -> None:
     scaling = Scaling(scale, offset)
     published = scaling.publish([raw])
     assert list(published) == pytest.approx([value], abs=1e-6)

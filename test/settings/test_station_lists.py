@@ -23,14 +23,14 @@ import pytest
 @pytest.mark.parametrize('text, stations', [
     ('', ()), ('7', (7,)), ('0-3', (0, 1, 2, 3)), ('5, 1 - 3', (5, 1, 2, 3)),
     ('1-3,2,1', (1, 2, 3)), ('254', (254,)), (',1,,', (1,))])
-def test_list(text: str, stations: tuple[int, ...]) -> None:
+def test_list_may_have_single_stations_and_ranges(text: str, stations: tuple[int, ...]) -> None:
     assert parse_stations(text) == (stations, [])
 
 
 @pytest.mark.parametrize('text, part', [
     ('255', '255'), ('1 2', '1 2'), ('1 2-3', '1 2-3'), ('1-', '1-'), ('5,1- ,2', '1-'),
     ('1,x', 'x'), ('3-1', '3-1'), ('-1', '-1'), ('1-2-3', '1-2-3')])
-def test_fault(text: str, part: str) -> None:
+def test_part_of_a_list_that_is_no_station_is_named(text: str, part: str) -> None:
     assert parse_stations(text)[1] == [
         f'"{part}" should be a station from 0 to 254, or a range such as 3-5; '
         'put commas between them']

@@ -43,7 +43,8 @@ def plcs() -> list[SimulatedPlc]:
     ('error 12 50', InjectedFaults(status=(0x50,)), 'station 12: error 50'),
     ('error 12 F0 0b', InjectedFaults(status=(0xF0, 0x0B)), 'station 12: error F0 0b'),
     ('normal 12', InjectedFaults(), 'station 12: normal')])
-def test_command(plcs: list[SimulatedPlc], line: str, faults: InjectedFaults, text: str) -> None:
+def test_command_changes_the_faults_of_its_station_alone(
+        plcs: list[SimulatedPlc], line: str, faults: InjectedFaults, text: str) -> None:
     plcs[1].faults = InjectedFaults(silent=True, slow=9)
     assert execute(line, plcs) == text
     assert plcs[1].faults == faults
@@ -77,7 +78,8 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
     *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal, as in 0B')
       for text in ('zz', '5', '500000', '\u0661\u0661')),
     ('error 1', '"error 1" is not a command'), ('normal 1 x', '"normal 1 x" is not a command')])
-def test_bad_command(plcs: list[SimulatedPlc], line: str, text: str) -> None:
+def test_command_that_is_wrong_changes_nothing(
+        plcs: list[SimulatedPlc], line: str, text: str) -> None:
     plcs[0].faults = before = InjectedFaults(slow=2)
     with pytest.raises(CommandError) as caught:
         execute(line, plcs)
@@ -96,7 +98,7 @@ def test_bad_command_is_told_the_commands_and_no_more(
 
 
 @pytest.mark.parametrize('setting', Setting)
-def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
+def test_mode_is_told_by_the_diagnostic_status(plcs: list[SimulatedPlc], setting: Setting) -> None:
     plcs[1].faults = before = InjectedFaults(slow=9)
     assert execute(f'mode 12 {setting.value}', plcs) == f'station 12: mode {setting.value}'
     assert plcs[1].processor.setting is setting
@@ -110,7 +112,8 @@ def test_mode(plcs: list[SimulatedPlc], setting: Setting) -> None:
 @pytest.mark.parametrize('line, text', [
     ('mode 12', '"mode 12" is not a command'), ('mode 12 run now', '"mode 12 run now" is not'),
     ('mode 12 stop', 'mode 12 stop: the modes are run, program, remote, test, fault')])
-def test_bad_mode(plcs: list[SimulatedPlc], line: str, text: str) -> None:
+def test_mode_that_is_wrong_changes_nothing(
+        plcs: list[SimulatedPlc], line: str, text: str) -> None:
     with pytest.raises(CommandError) as caught:
         execute(line, plcs)
     assert str(caught.value).startswith(text)

@@ -95,7 +95,7 @@ class Master:
         return int.from_bytes(self.read(text), 'little', signed=True)
 
 
-def test_data_file(path: Path, clock: Clock) -> None:
+def test_data_file_fills_the_tables_of_its_plcs(path: Path, clock: Clock) -> None:
     one, two = load(path, clock, '1,PLC5,N7:0,3,1 -2 3,,', '1,PLC5,B3:0/4,3,1 0 1,,',
                     '1,PLC5,F8:1,1,1.5,,', '1,plc5,ST9:0,1,Hi,,', '2,SLC,L10:1,1,70000,,',
                     '2,slc,I:1.0,2,5,,')
@@ -207,7 +207,7 @@ def test_shipped_file_is_good(clock: Clock) -> None:
     assert [(plc.station, plc.table.plc_type.value) for plc in plcs] == [(1, 'PLC5'), (2, 'SLC')]
 
 
-def test_ramp(path: Path, clock: Clock) -> None:
+def test_ramp_counts_up_each_period_and_begins_again(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,PLC5,N7:0,2,10 998,Ramp,250')
     master = Master(plc)
     seen = []
@@ -217,7 +217,7 @@ def test_ramp(path: Path, clock: Clock) -> None:
     assert seen == [(10, 998), (10, 998), (11, 999), (11, 999), (12, 0), (20, 8)]
 
 
-def test_toggle(path: Path, clock: Clock) -> None:
+def test_toggle_changes_its_bit_each_period_and_no_other(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,PLC5,B3:0,1,65535,,', '1,PLC5,B3:0/3,1,0,Toggle,100')
     master = Master(plc)
     seen = []
@@ -255,7 +255,7 @@ def plc(clock: Clock) -> SimulatedPlc:
 READ = (0x0F, bytes.fromhex('a2 02 07 89 00 00'))
 
 
-def test_without_faults(plc: SimulatedPlc) -> None:
+def test_plc_without_faults_acknowledges_and_replies_at_the_poll(plc: SimulatedPlc) -> None:
     master = Master(plc)
     assert master.poll() == frames.EOT
     assert master.deliver(READ) == frames.ACK
@@ -263,7 +263,7 @@ def test_without_faults(plc: SimulatedPlc) -> None:
         bytes.fromhex('05 01 4f 00 01 00 00 00'), Checksum.CRC)
 
 
-def test_silent(plc: SimulatedPlc) -> None:
+def test_silent_plc_hears_and_says_nothing(plc: SimulatedPlc) -> None:
     plc.faults = InjectedFaults(silent=True)
     master = Master(plc)
     assert (master.deliver(READ), master.poll()) == (b'', b'')
@@ -272,7 +272,7 @@ def test_silent(plc: SimulatedPlc) -> None:
     assert master.number('N7:0') == 0
 
 
-def test_full(plc: SimulatedPlc) -> None:
+def test_full_plc_answers_polls_and_takes_no_command(plc: SimulatedPlc) -> None:
     plc.faults = InjectedFaults(full=True)
     master = Master(plc)
     assert (master.deliver(READ), master.poll()) == (b'', frames.EOT)
@@ -281,7 +281,7 @@ def test_full(plc: SimulatedPlc) -> None:
     assert master.number('N7:0') == 0
 
 
-def test_slow(plc: SimulatedPlc) -> None:
+def test_slow_plc_lets_polls_pass_before_it_replies(plc: SimulatedPlc) -> None:
     plc.faults = InjectedFaults(slow=3)
     master = Master(plc)
     for _ in range(2):
@@ -303,7 +303,8 @@ def test_slow_station_does_not_answer_polls_of_others(plc: SimulatedPlc) -> None
 
 @pytest.mark.parametrize('status, link_data', [
     ((0x50,), '05 01 4f 50 01 00'), ((0xF0, 0x0B), '05 01 4f f0 01 00 0b')])
-def test_error(plc: SimulatedPlc, status: tuple[int, ...], link_data: str) -> None:
+def test_plc_with_an_error_replies_with_that_status(
+        plc: SimulatedPlc, status: tuple[int, ...], link_data: str) -> None:
     plc.faults = InjectedFaults(status=status)
     master = Master(plc)
     master.deliver(READ)
@@ -338,7 +339,7 @@ def test_noise_is_the_same_in_every_run(clock: Clock) -> None:
     assert heard[0] == heard[1] != bytes(100)
 
 
-def test_delay(plc: SimulatedPlc, clock: Clock) -> None:
+def test_plc_with_a_delay_replies_when_it_is_over(plc: SimulatedPlc, clock: Clock) -> None:
     plc.faults = InjectedFaults(delay=0.05)
     master = Master(plc)
     for _ in range(2):

@@ -51,7 +51,7 @@ def chunks_of(path: Path) -> list[Chunk]:
     return list(read_capture(str(path), lines_of(path), {}))
 
 
-def test_format(tmp_path: Path) -> None:
+def test_capture_is_text_that_is_there_before_it_is_closed(tmp_path: Path) -> None:
     writer = CaptureWriter(tmp_path / 'x', settings={'baud': '19200'})
     for chunk in CHUNKS:
         writer.write(chunk)
@@ -66,7 +66,7 @@ def test_format(tmp_path: Path) -> None:
     Chunk, strategies.integers(0, 10**12).map(lambda micros: micros / 1e6),
     strategies.sampled_from(Direction), strategies.binary(min_size=1, max_size=50),
     strategies.just(False)))
-def test_round_trip(chunk: Chunk) -> None:
+def test_chunk_that_was_written_reads_back_the_same(chunk: Chunk) -> None:
     (again,) = read_capture('x', ['# abdf1_ros capture 1', str(chunk)], {})
     assert again.time == pytest.approx(chunk.time, abs=1e-6)
     assert again[1:] == chunk[1:]

@@ -61,7 +61,7 @@ def _characters(data: bytes) -> str:
 @pytest.mark.parametrize('text', [
     '10 05 01 FF', '100501ff', '1005 01ff', '0x10, 0x05, 0x01, 0xFF', '10,05,01,FF',
     '  10 05 01 FF  ', '# a poll\n10 05\n\n01 FF\n'])
-def test_bytes_alone(text: str) -> None:
+def test_bytes_alone_are_read_in_any_notation(text: str) -> None:
     assert joined(text.splitlines()) == b'\x10\x05\x01\xff'
 
 
@@ -130,7 +130,7 @@ def test_zeros_are_no_text(tmp_path: Path, content: bytes) -> None:
         chunks(tmp_path / 'x', content)
 
 
-def test_longest_line(tmp_path: Path) -> None:
+def test_line_of_1_mb_is_read_and_a_longer_one_refused(tmp_path: Path) -> None:
     longest = b'10' * 500_000
     assert [len(chunk.data) for chunk in chunks(tmp_path / 'x', b'10\n' + longest)] == [
         1, 500_000]
@@ -157,6 +157,6 @@ def test_settings_and_percent(tmp_path: Path) -> None:
     assert not Recording(Path('/dev/zero')).has_size
 
 
-def test_missing_file(tmp_path: Path) -> None:
+def test_recording_that_is_missing_is_file_not_found(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         Recording(tmp_path / 'nothing')

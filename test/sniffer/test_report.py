@@ -51,14 +51,14 @@ NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
     (POLL, '            - ?  16 poll     BCC good'),
     (NOISE, '     3.000000 <     noise    2 bytes outside of any frame'),
     (Entry(0.0, IN, Kind.ACK, station=1), '     0.000000 <   1 ACK')])
-def test_text(entry: Entry, text: str) -> None:
+def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
     assert text_line(entry) == text
 
 
 @pytest.mark.parametrize(('entry', 'shade'), [
     (COMMAND, '\x1b[33m'), (REFUSAL, '\x1b[31m'), (DAMAGED, '\x1b[31m'), (POLL, '\x1b[2m'),
     (NOISE, '\x1b[31m')])
-def test_colour(entry: Entry, shade: str) -> None:
+def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
     assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
 
 
@@ -66,7 +66,7 @@ def test_what_is_well_has_no_colour() -> None:
     assert text_line(REPLY, colour=True) == text_line(REPLY)
 
 
-def test_json() -> None:
+def test_entry_is_told_as_json_with_all_its_fields() -> None:
     assert json.loads(json_line(COMMAND)) == {
         'time': 0.5, 'direction': '>', 'kind': 'command', 'station': 1,
         'text': '5 to 1, TNS 1234: echo 01', 'check': 'CRC', 'valid': True,
@@ -89,7 +89,7 @@ def summary() -> Summary:
     return summary
 
 
-def test_summary(summary: Summary) -> None:
+def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> None:
     head, seen, faults, latency, _, one, sixteen = summary_lines(summary, HALF)
     assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
                     'line load 50.0% at 9600 baud')

@@ -63,7 +63,8 @@ def _heard(summary: Summary) -> Summary:
 @pytest.mark.parametrize(('baud', 'duplex', 'load'), [
     (9600, Duplex.HALF, 0.5), (9600, Duplex.FULL, 0.3125), (9600, None, 0.5),
     (4800, Duplex.HALF, 1.0), (1200, Duplex.HALF, None), (None, Duplex.HALF, None)])
-def test_load(baud: int | None, duplex: Duplex | None, load: float | None) -> None:
+def test_load_is_known_where_baud_and_duplex_are(
+        baud: int | None, duplex: Duplex | None, load: float | None) -> None:
     summary = _heard(Summary(baud))
     assert summary.load(duplex) == load
     assert summary.seconds == 1.0

@@ -74,7 +74,8 @@ def one_wire(said: Iterable[tuple[Direction, bytes]]) -> Iterator[tuple[Directio
 
 
 @pytest.mark.parametrize('directions', [list, one_wire])
-def test_transaction(directions: type[list[tuple[Direction, bytes]]]) -> None:
+def test_transaction_is_told_symbol_by_symbol(
+        directions: type[list[tuple[Direction, bytes]]]) -> None:
     entries = decode(directions(TRANSACTION))
     assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.POLL, Kind.REPLY, Kind.ACK, Kind.POLL,
                               Kind.EOT]
@@ -158,7 +159,7 @@ def test_command_is_given_up_while_the_line_goes_on() -> None:
     assert entry.time == 11.0
 
 
-def test_full_duplex() -> None:
+def test_full_duplex_traffic_is_told_in_both_directions() -> None:
     whole = message(REPLY)
     back = Packet(5, 1, 0x0F, 0, 0x0001, bytes.fromhex('AA 02 07 89 00 00 05 00'))
     session = TrafficDecoder()
@@ -199,7 +200,7 @@ def test_nothing_is_lost_of_a_chunk_of_any_size() -> None:
     assert (found.count(Kind.POLL), found.count(Kind.NOISE)) == (20_000, 0)
 
 
-def test_unknown_symbol() -> None:
+def test_unknown_symbol_is_shown_with_its_code() -> None:
     (entry,) = decode([(IN, b'\x10\x1b')])
     assert (entry.kind, entry.text) == (Kind.UNKNOWN, 'DLE 1B')
 
@@ -211,7 +212,7 @@ def test_master_resets_the_line() -> None:
 
 @for_all('vector', [
     vector for vector in VECTORS if vector.frame])
-def test_vectors(vector: Vector) -> None:
+def test_every_vector_is_told_as_what_it_is(vector: Vector) -> None:
     entries = [entry for entry in decode([(UNKNOWN, vector.frame)],
                                          TrafficDecoder(vector.checksum, vector.duplex))
                if entry.kind is not Kind.UNANSWERED]

@@ -116,7 +116,7 @@ def assert_all_same(path: Path, entries: Iterable[Entry]) -> list[dict[str, str]
     return told
 
 
-def test_every_capture(tmp_path: Path) -> None:
+def test_dissector_tells_every_capture_as_we_do(tmp_path: Path) -> None:
     entries = [entry for capture in CAPTURES for entry in capture.entries]
     told = assert_all_same(tmp_path / 'line.pcapng', entries)
     assert sum(bool(fields['abdf1.request']) for fields in told) >= sum(

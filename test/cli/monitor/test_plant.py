@@ -59,7 +59,7 @@ def test_no_line_at_all() -> None:
 
 
 @pytest.mark.parametrize('width', [20, 40, 80])
-def test_lines_fit(width: int) -> None:
+def test_lines_are_no_longer_than_the_terminal_is_wide(width: int) -> None:
     found = render_plant([line('/a_hall_of_some_size/and_a_press_of_a_name', SILENT)], NOW, width)
     assert max(len(shown.text) for shown in found) <= width
     assert found[-1].section == '/a_hall_of_some_size/and_a_press_of_a_name'

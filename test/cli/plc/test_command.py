@@ -79,8 +79,8 @@ def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
     (2, 'N7:40', ('--type', 'int32'), ['N7:40 131071']),
     (2, 'N7:30', ('--type', 'bcd16', '--length', '2'), ['N7:30 1234 99']),
     (2, 'ST9:1', (), ["ST9:1 'Tank 4'"]), (2, 'F8:4', (), ['F8:4 21.5'])])
-def test_read(plc: Plc, station: int, address: str, options: tuple[str, ...],
-              lines: list[str]) -> None:
+def test_read_shows_address_and_values(
+        plc: Plc, station: int, address: str, options: tuple[str, ...], lines: list[str]) -> None:
     said = plc('read', address, '--station', str(station), *options)
     assert (said.status, said.lines, said.err) == (0, lines, '')
 
@@ -161,8 +161,9 @@ def test_read_over_a_net_file(line: str, files: Files,
     ('N7:50', ('70000',), ('--type', 'int32'), ['N7:50 70000']),
     ('N7:52', ('abcde',), ('--type', 'string'), ["N7:52 'abcde'"]),
     ('C5:2.PRE', ('9',), (), ['C5:2.PRE 9'])])
-def test_write(plc: Plc, address: str, values: tuple[str, ...], options: tuple[str, ...],
-               lines: list[str]) -> None:
+def test_write_is_read_back_and_shown(
+        plc: Plc, address: str, values: tuple[str, ...], options: tuple[str, ...], lines:
+        list[str]) -> None:
     said = plc('write', address, *values, '--yes', '--station', '2', *options)
     assert (said.status, said.lines, said.err) == (
         0, [f'{address} of station 2: written; now:', *lines], '')
@@ -253,7 +254,7 @@ def test_what_no_plc_could_take_is_told_before_the_port_is_opened(
     assert capsys.readouterr().err == f'plc: {text}\n'
 
 
-def test_refused_write(plc: Plc, simulator: Process) -> None:
+def test_write_that_the_plc_refuses_says_why(plc: Plc, simulator: Process) -> None:
     simulator.say('error 2 F0 0B')
     said = plc('write', 'N7:0', '1', '--yes', '--station', '2', '--plc-type', 'SLC')
     assert said.status == 1
@@ -280,7 +281,7 @@ def test_write_broken_off_is_unknown(tmp_path: Path, count: int) -> None:
     assert 'Traceback' not in process.text
 
 
-def test_status(plc: Plc) -> None:
+def test_status_names_processor_mode_and_faults(plc: Plc) -> None:
     said = plc('status', '2')
     assert said.status == 0
     assert said.lines[0].startswith('station 2: SLC 5/03')
@@ -289,7 +290,7 @@ def test_status(plc: Plc) -> None:
     assert plc('status').lines[0].startswith('station 1: PLC-5/40')
 
 
-def test_ping(plc: Plc) -> None:
+def test_ping_shows_each_answer_and_sums_up(plc: Plc) -> None:
     said = plc('ping', '2', '--count', '3')
     assert said.status == 0
     assert len(said.lines) == 4
@@ -304,7 +305,7 @@ def test_ping_of_nobody(plc: Plc) -> None:
     assert 'not one character came' in said.err
 
 
-def test_scan(plc: Plc) -> None:
+def test_scan_lists_who_answers_and_counts_them(plc: Plc) -> None:
     said = plc('scan', '0-2,9')
     assert said.status == 0
     assert said.lines[0].split() == ['station', 'answer', 'processor']
@@ -523,7 +524,8 @@ def test_detect_finds_nobody_in_an_echo(
     assert 'characters came' not in said.err
 
 
-def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_work_over_a_tcp_connection(
+        files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:
         url = process.wait_for('socket://').partition(' on ')[2].partition(',')[0]
         assert call(main, capsys, 'read', 'N7:0', '--port', url).lines == ['N7:0 1200']
@@ -531,7 +533,7 @@ def test_over_tcp(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     assert said.lines[1].endswith(f'--port {url} --baud 9600 --check CRC --parity Even')
 
 
-def test_lost_port(tmp_path: Path) -> None:
+def test_port_that_is_lost_ends_with_status_1(tmp_path: Path) -> None:
     line = Pty(tmp_path / 'line')
     with Process('plc', 'read', 'N7:0', '--port', str(line.name), '--plc-type', 'SLC',
                  '--timeout', '5000') as process:
@@ -566,8 +568,8 @@ def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> 
     (('ping', '1', '--count', '0', '--port', 'x'), '"0" should be a whole number from 1'),
     (('watch', 'N7:0', '--period', 'x'), '"x" should be seconds from 0 to 86400'),
     ((), 'the following arguments are required: COMMAND')])
-def test_wrong_options(args: tuple[str, ...], text: str,
-                       capsys: pytest.CaptureFixture[str]) -> None:
+def test_option_that_is_wrong_is_told_with_status_2(
+        args: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:
     said = call(main, capsys, *args)
     assert said.status == 2
     assert text in said.err

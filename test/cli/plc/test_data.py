@@ -98,7 +98,8 @@ def test_rows_of_values() -> None:
     ('N7:0', '', ['5', '-6', '0x1F', '0b11', '007'], [5, -6, 31, 3, 7]),
     ('F8:0', '', ['1.5', '1e3', '2,5'], [1.5, 1000, 2.5]), ('B3:0/0', '', ['1', '0'], [1, 0]),
     ('ST9:0', '', ['a b'], 'a b'), ('N7:0', 'bcd16', ['1234'], [1234])])
-def test_values(address: str, kind: str, texts: list[str], values: object) -> None:
+def test_text_becomes_values_of_the_type(
+        address: str, kind: str, texts: list[str], values: object) -> None:
     assert parse_values(make(address, Type=kind), texts) == values
 
 
@@ -107,7 +108,7 @@ def test_values(address: str, kind: str, texts: list[str], values: object) -> No
     ('ST9:0', ['a', 'b']), ('N7:0', ['1_000']), ('N7:0', ['0x1_0']), ('N7:0', ['\u0661']),
     ('N7:0', ['\uff11']), ('N7:0', [' 1']), ('F8:0', ['1_0.5']), ('F8:0', ['\u0661']),
     ('F8:0', ['nan']), ('F8:0', ['1e39']), ('F8:0', ['1,000'])])
-def test_no_values(address: str, texts: list[str]) -> None:
+def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str]) -> None:
     with pytest.raises(FormatError):
         parse_values(make(address), texts)
 

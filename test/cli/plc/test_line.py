@@ -35,7 +35,7 @@ def test_defaults_are_those_of_a_net_file_with_a_shorter_timeout() -> None:
     assert DEFAULTS == Network(timeout=300)
 
 
-def test_every_option() -> None:
+def test_every_option_sets_its_field_of_the_network() -> None:
     assert line_of('--port', '3', '--baud', '19200', '--check', 'bcc', '--parity', 'even',
                    '--timeout', '150', '--own-station', '9', '--duplex', 'FULL') == Network(
         com_port='3', baud=19200, error_code='BCC', parity='Even', timeout=150, station=9,
@@ -69,6 +69,6 @@ def test_every_wrong_option_is_told() -> None:
         '--port', '--baud', '--check', '--own-station']
 
 
-def test_no_port() -> None:
+def test_port_that_is_missing_is_asked_for() -> None:
     with pytest.raises(ConfigurationError, match='name the port, such as --port /dev/ttyUSB0'):
         line_of('--baud', '1200')

@@ -26,7 +26,7 @@ def parse(*args: str) -> argparse.Namespace:
     return make_parser('').parse_args(args)
 
 
-def test_defaults() -> None:
+def test_options_that_are_left_out_have_defaults() -> None:
     read = parse('read', 'N7:0')
     assert (read.command, read.addresses) == ('read', ['N7:0'])
     assert (read.length, read.radix) == ('1', 'dec')
@@ -90,7 +90,7 @@ def test_lists_of_stations() -> None:
     ('scan', '1', '--peer', '--duplex', 'half'), ('scan', '1', '--duplex', 'half', '--peer'),
     ('write', 'N7:0'), ('fly',), ('write', 'N7:0', '1', '--ye'),
     ('read', 'N7:0', '--type', 'int8')])
-def test_wrong(args: tuple[str, ...]) -> None:
+def test_command_line_that_is_wrong_ends_with_status_2(args: tuple[str, ...]) -> None:
     with pytest.raises(SystemExit) as ending:
         parse(*args)
     assert ending.value.code == 2

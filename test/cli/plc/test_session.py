@@ -58,7 +58,7 @@ def test_port_is_held_from_the_beginning(line: Pty) -> None:
         assert session.counters.chars_sent == 0
 
 
-def test_answer(line: Pty) -> None:
+def test_answer_to_an_echo_ends_the_request(line: Pty) -> None:
     with Session(network_on(line)) as session:
         future = session.start(1, echo(b'\x05'))
         tns = line.read(13)[6:8]

@@ -33,7 +33,8 @@ changes = st.builds(
     ('516_fd_plc2_read_cmd', 0x01, BasicRead(0x11, 2)),
     ('plc2_write_unprot_req_fd_crc', 0x08, BasicWrite(0o11 * 2, b'\xFF\xFF')),
     ('cif_read_word_req_fd_crc', 0x01, BasicRead(9, 2))])
-def test_vectors(name: str, cmd: int, request_: BasicRead | BasicWrite) -> None:
+def test_request_is_the_bytes_of_its_vector_and_back(
+        name: str, cmd: int, request_: BasicRead | BasicWrite) -> None:
     packet = vector(name).packet
     assert packet.cmd == cmd
     assert packet.data == request_.encode()

@@ -38,7 +38,7 @@ def at(text: str) -> Address:
 @pytest.mark.parametrize(('name', 'request_'), [
     ('plc2_write_unprot_req_fd_crc', UNPROTECTED.write(at('011'), b'\xFF\xFF')),
     ('cif_read_word_req_fd_crc', CIF.read(at('011'), 1))])
-def test_vectors(name: str, request_: tuple[int, bytes]) -> None:
+def test_dialect_asks_with_the_bytes_of_the_vector(name: str, request_: tuple[int, bytes]) -> None:
     packet = vector(name).packet
     assert (packet.cmd, packet.data) == request_
 
@@ -73,5 +73,6 @@ def test_common_interface_file_has_no_bit_write() -> None:
 
 @pytest.mark.parametrize(('dialect', 'read', 'write'), [
     (UNPROTECTED, 122, 121), (PROTECTED, 122, 121), (CIF, 47, 47)])
-def test_limits(dialect: Plc2Dialect, read: int, write: int) -> None:
+def test_longest_read_and_write_are_those_of_the_family(
+        dialect: Plc2Dialect, read: int, write: int) -> None:
     assert (dialect.max_read(FileType.BINARY), dialect.max_write(FileType.BINARY)) == (read, write)

@@ -65,7 +65,7 @@ def test_bit_writes_change_bytes(cmd: int) -> None:
     assert words_at(memory, '000', 3) == 'F0 80 00 7F 12 34'
 
 
-def test_largest_packets() -> None:
+def test_largest_packets_are_served_and_larger_ones_refused() -> None:
     memory = words(200)
     assert len(ask(memory, '00 00 F4', 0x01)[1].split()) == 244
     assert ask(memory, '00 00' + ' 01' * 244, 0x08) == (0, '')
@@ -80,7 +80,7 @@ def test_largest_packets() -> None:
     (0x00, '20 00 01 00', 0x50), (0x05, '00 00 01 01', 0x10), (0x05, '', 0x10),
     (0x05, '20 00 01 00', 0x50), (0x05, '00 00 FF 00 20 00 01 00', 0x50),
     (0x02, '00 00 01', 0x10), (0x0F, '01 00 00 01 00 2C 08 0A 00 02', 0x10), (0x03, '', 0x10)])
-def test_refusals(cmd: int, data: str, sts: int) -> None:
+def test_command_that_is_refused_changes_nothing(cmd: int, data: str, sts: int) -> None:
     memory = words()
     assert ask(memory, data, cmd) == (sts, '')
     assert words_at(memory, '000', 16) == words_at(words(), '000', 16)

@@ -30,7 +30,7 @@ levels = st.integers(0, 0xFFFF)
     (ExtendedAddress(8, 10), '2C 08 0A 00'), (ExtendedAddress(8, 260), '2C 08 FF 04 01 00'),
     (ExtendedAddress(3, 0, 9, 2), '3C 03 00 09 02'), (ExtendedAddress(5, 7, 0, 255),
                                                       '2C 05 07 FF FF 00')])
-def test_encode(address: ExtendedAddress, encoded: str) -> None:
+def test_extended_address_is_encoded_and_read_back(address: ExtendedAddress, encoded: str) -> None:
     assert address.encode() == bytes.fromhex(encoded)
     assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
 

@@ -53,7 +53,7 @@ def at(text: str) -> Address:
     ('BT9:1.DLEN', 1, '68 00 00 01 00 0E 09 01 02 01 00'),
     ('SC9:1', 3, '68 00 00 01 00 06 09 01 01 00'),
 ])
-def test_read(text: str, words: int, encoded: str) -> None:
+def test_read_is_the_typed_read_of_the_manual(text: str, words: int, encoded: str) -> None:
     assert DIALECT.read(at(text), words) == (0x0F, bytes.fromhex(encoded))
 
 
@@ -67,7 +67,7 @@ def test_read(text: str, words: int, encoded: str) -> None:
      '67 00 00 01 00 0E 0C 0A 02 96 09 94 08 00 00 2A 42'),
     ('SC9:1.PRE', '07 00', '67 00 00 01 00 0E 09 01 01 93 09 42 07 00'),
 ])
-def test_write(text: str, data: str, encoded: str) -> None:
+def test_write_is_the_typed_write_of_the_manual(text: str, data: str, encoded: str) -> None:
     assert DIALECT.write(at(text), bytes.fromhex(data)) == (0x0F, bytes.fromhex(encoded))
 
 
@@ -75,7 +75,7 @@ def test_write(text: str, data: str, encoded: str) -> None:
     ('B3:4', '26 06 03 04 F7 FE 00 01'), ('T4:1', '26 0E 04 01 00 F7 FE 00 01'),
     ('PD12:10.1', '26 0E 0C 0A 01 F7 FE 00 01'),
 ])
-def test_write_bits(text: str, encoded: str) -> None:
+def test_bits_are_written_with_and_and_or_masks(text: str, encoded: str) -> None:
     request = DIALECT.write_bits(at(text), 0x0108, 0x0100)
     assert request == (0x0F, bytes.fromhex(encoded))
 

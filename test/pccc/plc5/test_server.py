@@ -105,7 +105,7 @@ def test_plc5_offset_counts_elements() -> None:
     ('68 00 00 01 00 00 24 4E 37 3A 39 39 39 39 00 01 00', '06'),
     ('26 07 00 09 00 FF FF 01 00', '06'), ('26 07 00 07 04 FF FF 01 00', '07'),
     ('26 07 00 07 00 FF FF 01 00 07 00 07 04 FF FF 01 00', '07')])
-def test_plc5_refusals(data: str, ext_sts: str) -> None:
+def test_command_that_a_plc5_refuses_changes_nothing(data: str, ext_sts: str) -> None:
     words = table(PLC5, N7_0='00 00' * 4, T4_0='00 00' * 3)
     assert ask(words, data) == (0xF0, ext_sts)
     assert words_at(words, 'N7:0', 4) == '00 00 ' * 3 + '00 00'

@@ -46,7 +46,7 @@ def at(text: str) -> Address:
     ('PD10:1', 23, 'A2 2E 0A 93 01 00'), ('I:1.3', 2, 'A2 04 01 8C 01 03'),
     ('N7:255', 1, 'A2 02 07 89 FF FF 00 00'),
 ])
-def test_read(text: str, words: int, encoded: str) -> None:
+def test_read_is_the_typed_logical_read_of_the_manual(text: str, words: int, encoded: str) -> None:
     assert DIALECT.read(at(text), words) == (0x0F, bytes.fromhex(encoded))
 
 
@@ -55,14 +55,15 @@ def test_read(text: str, words: int, encoded: str) -> None:
     ('T4:0.PRE', '2C 01', 'AA 02 04 86 00 01 2C 01'),
     ('O:2.1', '03 00', 'AA 02 00 8B 02 01 03 00'),
 ])
-def test_write(text: str, data: str, encoded: str) -> None:
+def test_write_is_the_typed_logical_write_of_the_manual(
+        text: str, data: str, encoded: str) -> None:
     assert DIALECT.write(at(text), bytes.fromhex(data)) == (0x0F, bytes.fromhex(encoded))
 
 
 @pytest.mark.parametrize(('text', 'encoded'), [
     ('B3:4', 'AB 02 03 85 04 00 08 01 00 01'), ('O:2.0', 'AB 02 00 8B 02 00 08 01 00 01'),
 ])
-def test_write_bits(text: str, encoded: str) -> None:
+def test_bits_are_written_with_a_mask(text: str, encoded: str) -> None:
     request = DIALECT.write_bits(at(text), 0x0108, 0x0100)
     assert request == (0x0F, bytes.fromhex(encoded))
 

@@ -104,7 +104,7 @@ def test_strange_replies_are_files_or_a_format_error(processor: Processor,
             return
 
 
-def test_refused_directory() -> None:
+def test_refused_directory_is_a_remote_error() -> None:
     steps = steps_of(Processor.ML1200)
     next(steps)
     with pytest.raises(RemoteError):

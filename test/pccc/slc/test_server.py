@@ -35,7 +35,7 @@ SLC = PlcType.SLC
     ('A1 02 09 89 00', 0x10), ('A1 02 07 89 04', 0x50), ('A1 02 07 89 00 01', 0x10),
     ('A9 02 07 89 04 01 00', 0x50), ('A9 04 07 89 03 01 00 02 00', 0x50),
     ('A2 02 00 82 00 00', 0x50), ('A2 02 01 82 00 00', 0x10), ('A2 02 07 83 00 00', 0x10)])
-def test_slc_refusals(data: str, sts: int) -> None:
+def test_command_that_an_slc_refuses_changes_nothing(data: str, sts: int) -> None:
     words = table(SLC, N7_0='00 00' * 4)
     assert ask(words, data) == (sts, '')
     assert words_at(words, 'N7:0', 4) == '00 00 ' * 3 + '00 00'

@@ -37,8 +37,8 @@ from support.vectors import vector, without_area
     ('516_fd_plc3_wrr_cmd3', WordRangeRead(ExtendedAddress(8, 10), 228, 228, 342)),
     ('plc5_wrr_F8_req_fd_crc', WordRangeRead(SystemAddress(8, 0), 4, 0, 2)),
     ('plc5_wrr_max_req_fd_crc', WordRangeRead(SystemAddress(7, 0), 244, 0, 122))])
-def test_read_vectors(name: str,
-                      request_: WordRangeRead[ExtendedAddress | SystemAddress]) -> None:
+def test_read_is_the_bytes_of_its_vector_and_back(
+        name: str, request_: WordRangeRead[ExtendedAddress | SystemAddress]) -> None:
     data = vector(name).packet.data
     assert request_.encode() == without_area(data)
     reader = Reader(data)
@@ -46,7 +46,7 @@ def test_read_vectors(name: str,
     assert WordRangeRead.read(reader, type(request_.address).read) == request_
 
 
-def test_write_vector() -> None:
+def test_write_is_the_bytes_of_its_vector_and_back() -> None:
     data = vector('plc5_wrw_N7_req_fd_crc').packet.data
     request = WordRangeWrite(SystemAddress(7, 10), b'\x10\x10\x07\0', 0, 2)
     assert request.encode() == without_area(data)
@@ -62,7 +62,7 @@ def test_file_read_has_the_parameters_of_a_word_range_read() -> None:
         ExtendedAddress(8, 10), 8, 0, 4)
 
 
-def test_bit_write() -> None:
+def test_bit_write_is_encoded_and_read_back() -> None:
     request = WordBitWrite(ExtendedAddress(8, 10, 0, 5), 0x0108, 0x8001)
     assert request.encode() == bytes.fromhex('02 2C 08 0A 05 08 01 01 80')
     reader = Reader(request.encode()[1:])

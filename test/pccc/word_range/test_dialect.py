@@ -47,7 +47,7 @@ def test_packets_of_a_printed_transfer(number: int) -> None:
     ('plc5_wrr_max_req_fd_crc', PLC5_WORD_RANGE.read(at('N7:0', 'PLC5'), 122)),
     ('plc5_wrw_N7_req_fd_crc',
      PLC5_WORD_RANGE.write(at('N7:10', 'PLC5'), b'\x10\x10\x07\0'))])
-def test_vectors(name: str, request_: tuple[int, bytes]) -> None:
+def test_dialect_asks_with_the_bytes_of_the_vector(name: str, request_: tuple[int, bytes]) -> None:
     packet = vector(name).packet
     assert (packet.cmd, without_area(packet.data)) == request_
 
@@ -66,7 +66,7 @@ def test_float_of_the_vectors() -> None:
     ('I:017', 'PLC3', '2C 02 00 0F'), ('S:3', 'PLC3', '2C 0D 00 03'),
     ('T4:2.ACC', 'PLC5', '0E 04 02 02'), ('T4:2', 'PLC5', '06 04 02'),
     ('B3:300', 'PLC5', '06 03 FF 2C 01'), ('I:012', 'PLC5', '06 01 0A')])
-def test_addresses(text: str, family: str, encoded: str) -> None:
+def test_address_is_encoded_for_its_family(text: str, family: str, encoded: str) -> None:
     dialect: WordRangeDialect = FAMILIES[PlcType(family)]
     assert dialect.read(at(text, family), 1) == (
         0x0F, bytes.fromhex(f'01 00 00 01 00 {encoded} 02'))
@@ -75,7 +75,7 @@ def test_addresses(text: str, family: str, encoded: str) -> None:
 @pytest.mark.parametrize(('text', 'family', 'encoded'), [
     ('B10:5', 'PLC3', '02 2C 08 0A 05 00 01 08 00'),
     ('B3:4', 'PLC5', '26 06 03 04 F7 FE 00 01')])
-def test_write_bits(text: str, family: str, encoded: str) -> None:
+def test_bits_are_written_with_and_and_or_masks(text: str, family: str, encoded: str) -> None:
     request = FAMILIES[PlcType(family)].write_bits(at(text, family), 0x0108, 0xFF00)
     assert request == (0x0F, bytes.fromhex(encoded))
 

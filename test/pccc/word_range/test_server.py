@@ -69,7 +69,7 @@ def test_bit_write_sets_and_resets() -> None:
     ('00 00 00 01 00 06 07 00', 0xF0, '01'), ('00 00 00 02 00 06 07 03 01 00 02 00', 0xF0, '0A'),
     ('00 00 00 77 00 06 07 00' + ' 00' * 238, 0xF0, '01'), ('02 06 07 04 01 00 00 00', 0xF0, '07'),
     ('02 06 07 00 01 00 01 00', 0x10, ''), ('01 00 00 01 00 06 07', 0x10, '')])
-def test_refusals(data: str, sts: int, ext_sts: str) -> None:
+def test_command_that_is_refused_changes_nothing(data: str, sts: int, ext_sts: str) -> None:
     memory = table(PLC5, N7_0=counting(4))
     assert ask(memory, data) == (sts, ext_sts)
     assert words_at(memory, 'N7:0', 4) == '00 00 01 00 02 00 03 00'
