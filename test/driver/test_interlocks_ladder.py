@@ -102,7 +102,7 @@ def test_rule_2_every_plc_sees_a_restart_that_is_quicker_than_its_timer(
         mode: str, scan_time: float, happens: Callable[[Cell], None]) -> None:
     cell, dice = Cell(mode, scan_time), Random(1)
     kept = []
-    for number in range(6):
+    for number in range(4):
         cell.take_control()
         cell.bench.run(dice.uniform(0.0, 0.5))
         cell.zeros.clear()
