@@ -25,6 +25,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import math
 
+from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
@@ -128,7 +129,10 @@ class Times:
         written = max((max(_packets(network, mapping)) for mapping in mappings
                        if mapping.writes and not mapping.serves), default=0.0)
         self._frames = own
-        self._any_frames = max(own, read, written, _question_time(network, 0.0))
+        # A guest may have the longest command there is under way.
+        guest = forecast.line_model(network).transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) \
+            if network.share else 0.0
+        self._any_frames = max(own, read, written, guest, _question_time(network, 0.0))
         self.longest = forecast.longest_transaction(network) + own
 
     def bounds(self) -> Iterator[Bound]:
