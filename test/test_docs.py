@@ -104,6 +104,18 @@ def test_every_page_is_in_the_index() -> None:
     assert [name for name in pages - {'README.md'} if f'({name})' not in index] == []
 
 
+# To look things up in, or to know how a figure was measured.
+LOOKED_UP = ('docs/reference/', 'docs/protocol/', 'docs/measured/', 'docs/faults.md',
+             'docs/heartbeats.md', 'docs/interoperability.md', 'docs/troubleshooting.md',
+             'docs/wiring.md', 'docs/tutorials/interlocks.md', 'CONTRIBUTING.md')
+
+
+def test_pages_that_are_read_through_are_short() -> None:
+    sizes = {name: len(documents.text(name).split()) for name in documents.NAMES
+             if not name.startswith(LOOKED_UP)}
+    assert {name: size for name, size in sizes.items() if size > 1200} == {}
+
+
 def test_every_command_and_topic_is_in_the_reference() -> None:
     commands, topics = (documents.text(f'docs/reference/{name}.md')
                         for name in ('commands', 'topics'))
