@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-import subprocess
-import sys
 import time
 
 from abdf1_ros.client import Client
@@ -148,25 +146,40 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
         Client(port)
 
 
-def test_client_talks_to_a_full_duplex_peer(tmp_path: Path) -> None:
+@pytest.fixture
+def peer(tmp_path: Path) -> Iterator[str]:
+    """Return the port of an SLC in full duplex."""
     plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
     plc.be_full_duplex()
     line = PtyEndpoint(str(tmp_path / 'line'))
-    settings: LinkSettings = Network(mode='Peer', baud=115200, station=1).line
+    settings: LinkSettings = Network(mode='Peer', baud=9600, station=1).line
     machine = make_machine(settings, lambda: link.run(Nothing()), Counters())
     link = make_link(settings, DriverSettings(), machine, ActiveStationList(()), plc.serve,
                      lambda event: None)
     thread = LinkThread(machine, line.open)
     thread.start()
     try:
-        with Client(line.name, baud=115200) as here:
-            here.write('N7:0', [1, 2])
-            assert here.read('N7:0', 2) == [1, 2]
-            identity = here.identify()
-            assert (identity.model, identity.mode) == ('SLC 5/03', Mode.REMOTE_RUN)
+        yield line.name
     finally:
         thread.stop()
         line.close()
+
+
+def test_client_talks_to_a_full_duplex_peer(peer: str) -> None:
+    with Client(peer) as here:
+        here.write('N7:0', [1, 2])
+        assert here.read('N7:0', 2) == [1, 2]
+        identity = here.identify()
+        assert (identity.model, identity.mode) == ('SLC 5/03', Mode.REMOTE_RUN)
+
+
+def test_example_of_the_page_runs(peer: str, capsys: pytest.CaptureFixture[str]) -> None:
+    page = Path(__file__).parents[1] / 'docs' / 'library.md'
+    example = page.read_text(encoding='utf-8').partition('```python\n')[2].partition('```')[0]
+    names: dict[str, object] = {}
+    exec(example.replace('/dev/ttyUSB0', peer), names)  # noqa: S102
+    assert names['speeds'] == [0] * 10 and names['level'] == 0.0
+    assert capsys.readouterr().out == 'SLC 5/03 series A revision 1, REM RUN\n'
 
 
 class Nothing:
@@ -180,13 +193,3 @@ class Nothing:
 
     def expire(self, now: float) -> None:
         """Do nothing."""
-
-
-def test_library_has_neither_ros_nor_files() -> None:
-    program = 'import sys, abdf1_ros.client; print(*sys.modules)'
-    loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
-                            check=True, timeout=60).stdout.split()
-    assert 'abdf1_ros.driver.requests' in loaded
-    unwanted = ('abdf1_ros.settings', 'abdf1_ros.plan', 'abdf1_ros.ros', 'abdf1_ros.cli.',
-                'abdf1_ros.simulator', 'abdf1_ros.sniffer', 'yaml', 'rclpy', 'std_msgs')
-    assert [name for name in loaded if name.startswith(unwanted)] == []

@@ -16,6 +16,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 from support.cases import for_all
 
@@ -141,3 +144,13 @@ def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
 ])
 def test_import_along_the_arrows_is_let_through(module: str, source: str) -> None:
     assert violations(module, source) == []
+
+
+def test_library_has_neither_ros_nor_files() -> None:
+    program = 'import sys, abdf1_ros.client; print(*sys.modules)'
+    loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                            check=True, timeout=60).stdout.split()
+    assert 'abdf1_ros.driver.requests' in loaded
+    unwanted = ('abdf1_ros.settings', 'abdf1_ros.plan', 'abdf1_ros.ros', 'abdf1_ros.cli.',
+                'abdf1_ros.simulator', 'abdf1_ros.sniffer', 'yaml', 'rclpy', 'std_msgs')
+    assert [name for name in loaded if name.startswith(unwanted)] == []

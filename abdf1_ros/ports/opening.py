@@ -22,19 +22,21 @@ from importlib import import_module
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.serial_device import open_device
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.settings.network import DEVICE_SERVERS
 
 
 def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text: None) -> Port:
     """
     Open a port, a serial device exclusively.
 
-    A URL is opened by the module of its scheme, one of ``DEVICE_SERVERS``. ``tell`` is called with
+    A URL is opened by the module of its scheme, where there is one. ``tell`` is called with
     settings that the port does not support, which is not an error. Raises OSError.
     """
     scheme, separator, _ = settings.name.lower().partition('://')
-    if not separator or scheme not in DEVICE_SERVERS:
+    try:
+        opener = import_module(f'abdf1_ros.ports.{scheme}_port') if separator else None
+    except ModuleNotFoundError:
+        opener = None
+    if opener is None:
         return open_device(settings, tell)
-    opener = import_module(f'abdf1_ros.ports.{scheme}_port')
     port: Port = opener.open_port(settings)
     return port

@@ -20,7 +20,6 @@ from collections.abc import Iterator
 import sys
 from types import ModuleType
 
-from abdf1_ros.ports import opening
 from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -37,8 +36,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[PortSettings]]:
     module.open_port = lambda settings: (  # type: ignore[attr-defined]
         asked.append(settings), DescriptorPort(0, lambda: None))[1]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    for user in (network, opening):
-        monkeypatch.setattr(user, 'DEVICE_SERVERS', (*network.DEVICE_SERVERS, 'pigeon'))
+    monkeypatch.setattr(network, 'DEVICE_SERVERS', (*network.DEVICE_SERVERS, 'pigeon'))
     yield asked
 
 
