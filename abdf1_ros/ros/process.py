@@ -153,7 +153,12 @@ def _made(parser: argparse.ArgumentParser, make: Callable[[Sequence[str]], Progr
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
                      '--ros-args')
     _check_log_directory()
-    rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        if isinstance(error, REFUSALS):
+            raise
+        raise rclpy_implementation.RCLError(str(error)) from error  # of the log, for instance
     try:
         return make(given)
     except BaseException:

@@ -92,6 +92,7 @@ class Surroundings:
     snapshot: Any
     writes: WriteTopics
     published: dict[str, ReadTopic] = field(default_factory=dict)
+    active_words: Sequence[int] = ()
     link: LinkThread = field(init=False)
 
     def wake_executor(self) -> None:
@@ -154,7 +155,8 @@ class BridgeSession:
         self._tell_files()
         self.diagnostics.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
-        self._publish_active()
+        if self._surroundings.link.state.is_open:  # otherwise it is told when it has been tried
+            self._publish_active()
 
     def start_guests(self) -> None:
         """Let guests connect."""
@@ -341,11 +343,13 @@ class BridgeSession:
             f'settings of the line{scan}')
 
     def _publish_active(self) -> None:
-        """Publish the Active Node Table; with a closed port no station is active."""
-        is_open = self._surroundings.link.state.is_open
-        words = self.driver.stations.words() if is_open else [0] * 16
-        self._surroundings.active_stations.publish(
-            UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
+        """Publish the Active Node Table if it changes; with a closed port no station is active."""
+        surroundings = self._surroundings
+        words = self.driver.stations.words() if surroundings.link.state.is_open else [0] * 16
+        if words != surroundings.active_words:
+            surroundings.active_words = words
+            surroundings.active_stations.publish(
+                UInt16MultiArray(layout=ACTIVE_LAYOUT, data=words))
 
     def port_changed(self, state: PortState) -> None:
         """Log the state of the port."""

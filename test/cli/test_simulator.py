@@ -265,7 +265,7 @@ def test_bad_data_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> No
         f'simulator: {path}:4:2 (PLC_Type): PLC_Type = "PLC7" should be one of PLC2, PLC3, PLC5, '
         'SLC',
         f'{path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, N, F, ST, '
-        'A, D, L, PD, MG']
+        'A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
 
 
 def test_missing_data_file(capsys: pytest.CaptureFixture[str]) -> None:

@@ -134,7 +134,7 @@ def test_late_subscriber_gets_the_value_with_its_type_and_layout(
 def test_topics_are_those_of_the_map_and_no_others(bridge: Bridge) -> None:
     node = bridge.observer.node
     expected = {f'/abdf1/read/{tag}' for tag in READS} | {f'/abdf1/write/{tag}' for tag in WRITES}
-    expected |= {'/abdf1/write_results', '/abdf1/active_stations'}
+    expected |= {'/abdf1/write_results', '/abdf1/active_stations', '/abdf1/snapshot'}
     found = dict(node.get_topic_names_and_types())
     assert {name for name in found if name.startswith('/abdf1/')} == expected
     for tag, (kind, _, _) in READS.items():

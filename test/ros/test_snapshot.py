@@ -27,10 +27,11 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.node import BridgeNode
 from abdf1_ros.ros.snapshot import ValueSnapshot
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from support.mappings import make_mapping
-from support.ros import details, EVERYTHING, Inbox, Observer, Plcs, ros_args, write_csv
+from support.ros import details, EVERYTHING, Inbox, Observer, ros_args, write_csv
 
 OK, STALE, ERROR = DiagnosticStatus.OK, DiagnosticStatus.STALE, DiagnosticStatus.ERROR
 
