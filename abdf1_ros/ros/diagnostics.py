@@ -341,7 +341,7 @@ def _judge_guests(lines: Sequence[GuestLine]) -> Judgement:
 
 def _guest_values(lines: Sequence[GuestLine]) -> dict[str, str]:
     return {line.guest.name: (
-        f'{line.link.state.text}; {line.guest.commands} commands, {line.guest.refused} not '
+        f'{line.state}; {line.guest.commands} commands, {line.guest.refused} not '
         f'allowed, {line.guest.unanswered} without reply, {len(line.guest.waiting)} waiting, '
         f'slowest {milliseconds(line.guest.slowest or None)}') for line in lines}
 

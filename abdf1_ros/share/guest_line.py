@@ -27,7 +27,13 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.guests import Guest, GuestCommand, GuestQueue, ShareAccess
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
+from abdf1_ros.ports.endpoints import (
+    Endpoint,
+    PtyEndpoint,
+    SerialEndpoint,
+    TcpEndpoint,
+    WAITING,
+)
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
@@ -74,6 +80,12 @@ class GuestLine:
             self._machine, PeerSettings(checksum), ActiveStationList(), self._take)
         self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault)
         self.link.daemon = True  # a guest never holds the process
+
+    @property
+    def state(self) -> str:
+        """Return what a person is to know of the place."""
+        text = self.link.state.text
+        return WAITING if WAITING in text else text
 
     def start(self) -> None:
         """Wait for the guest, and serve it."""

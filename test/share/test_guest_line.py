@@ -103,6 +103,7 @@ def shared(folder: Path, places: str, access: str = 'Read',
     line = Shared(folder, places, access, mode)
     line.start()
     try:
+        wait_for(lambda: all(guest.state != 'not opened yet' for guest in line.guests))
         yield line
     finally:
         line.stop()
