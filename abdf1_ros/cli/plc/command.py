@@ -490,7 +490,9 @@ def _clock(options: argparse.Namespace) -> int:
 
 
 def _files(options: argparse.Namespace) -> int:
-    mappings = load_mappings(options.map)[0] if options.map else []
+    mappings, problems = load_mappings(options.map) if options.map else ([], [])
+    for problem in problems:
+        _complain(str(problem))
     with Session(_line(options), via=options.via) as session:
         try:
             family, processor = _family(options, session)
