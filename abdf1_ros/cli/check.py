@@ -223,11 +223,12 @@ def _text(found: Findings, report: Report | None) -> str:
     parts = [colour(f'error: {problem}', RED, sys.stdout) for problem in found.problems]
     if report is None:
         return '\n'.join([*parts, 'no plan without a good net file'])
-    if parts:
-        parts.append('the plan is that of the rows without errors')
+    if found.mappings:
+        if parts:
+            parts.append('the plan is that of the rows without errors')
+        parts += ['', _line_text(report), '', _rows_text(report), '', _plan_text(report), '',
+                  _times_text(report)]
     remarks = report.remarks()
-    parts += ['', _line_text(report), '', _rows_text(report), '', _plan_text(report), '',
-              _times_text(report)]
     parts += [f'note: {printable(note)}' for note in report.notes()]
     parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
               for remark in remarks]

@@ -30,7 +30,6 @@ import math
 import os
 from pathlib import Path
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -38,7 +37,7 @@ import tempfile
 import time
 from typing import Any
 
-from abdf1_ros.cli.terminal import command_parser, ignore_further, interruptible
+from abdf1_ros.cli.terminal import called, command_parser, ignore_further, interruptible
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.messages import MESSAGES
@@ -232,9 +231,7 @@ class Demo:
         self._bridge = self._start('node', *self._bridge_args)
         print(f'\n{self._scene.title}', flush=True)
         domain = os.environ['ROS_DOMAIN_ID']
-        look_on = 'ros2 topic echo /diagnostics, or ros2 run abdf1_ros monitor' \
-            if shutil.which('ros2') else f'{Path(sys.executable).parent / "monitor"}'
-        self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} {look_on}')
+        self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} {called("monitor")}')
         self._say('lines with "node:" and "simulator:" are what these two say meanwhile')
         if self._speed:
             self._say('a program publishes a speed; until its messages come, the node writes the '

@@ -86,14 +86,13 @@ def import_map(path: str, station: int, plc_type: PlcType) -> Import:
             mapping = reader.read()
             if mapping is None:
                 raise ValueError('; '.join(fault.words() for fault in reader.faults))
-            if mapping.name.lower() in seen:
-                raise ValueError(f'the name {mapping.name} is that of line '
-                                 f'{seen[mapping.name.lower()]}')
+            if mapping.name in seen:
+                raise ValueError(f'the name {mapping.name} is that of line {seen[mapping.name]}')
         except ValueError as error:
             result.left_out.append(Problem(Place(path, line), str(error)))
             result.lines.append(printable(f'# line {line}: {",".join(record)}: {error}'))
         else:
-            seen[mapping.name.lower()] = line
+            seen[mapping.name] = line
             result.count += 1
             result.lines.append(_csv_line(cells))
     return result
