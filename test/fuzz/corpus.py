@@ -51,6 +51,11 @@ _SCRIPT = bytes.fromhex(
     '0405 0700 0205 0001020304 0405 0701 0204 F0060000 0500 0405 0701 0203 000000 0702 0704'
     '0309 68000001000702 0515 0405 0600 0420')
 
+# Commands of a guest: a read, what nobody knows, none at all, with time, a reply and a lost port.
+_GUESTS = bytes.fromhex(
+    '0405 8307 0FA20207890000 830A 0FAA02078900003412 0405 0701 0203 001234 8302 0C00 8300 0440'
+    '8307 0FA20207890000 0600 8307 0FA20207890000 04FF')
+
 # Bytes as xxd prints them and as hexdump -C does, which leaves out lines that repeat.
 _DUMPS = (
     b'00000000: 1005 01ff 1004 1002                      ........\n',
@@ -148,7 +153,9 @@ def _server() -> Iterable[bytes]:
 
 
 def _links() -> Iterable[bytes]:
-    return (bytes((mode,)) + _SCRIPT for mode in range(16))
+    for mode in range(16):
+        yield bytes((mode,)) + _SCRIPT
+        yield bytes((mode,)) + _GUESTS + _SCRIPT
 
 
 def _captures() -> Iterable[bytes]:

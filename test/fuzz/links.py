@@ -25,6 +25,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, FrameDecoder, MAX_WAITING
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.values import Values
@@ -55,6 +56,9 @@ class _Line:
     def __init__(self, network: Network) -> None:
         self.now = 0.0
         self.accepted = 0
+        self.asked: list[Packet] = []  # by a guest
+        self.answered: list[Packet] = []
+        self._guest = Guest('a guest', ShareAccess.ALL)
         self.heard = Recorder(lambda: self.now)
         settings = DriverSettings(default_period=0.05, max_outstanding=2, poll_timeout=1.0)
         self.driver = Driver(network, _MAPPINGS, settings, self.heard)
@@ -100,6 +104,16 @@ class _Line:
         self.driver.machine.wake(self.now)
         self._settle()
 
+    def ask(self, much: int, data: bytes) -> None:
+        """Let a guest send a command."""
+        command = Packet(much % 4, 9, data[0] & 0x3F if data else 0x0F, 0, len(self.asked),
+                         data[1:])
+        self.asked.append(command)
+        self.driver.guests.put(GuestCommand(
+            self._guest, command, self.now, self.answered.append))
+        self.driver.machine.wake(self.now)
+        self._settle()
+
     def lose(self) -> None:
         """Lose the port, and open it again."""
         self.driver.machine.stop(PortLost('unplugged'))
@@ -107,9 +121,13 @@ class _Line:
         self._settle()
 
     def end(self) -> None:
-        """Lose the port for ever; then every write has had its one result."""
+        """Lose the port for ever; then each write has had one result, each guest one reply."""
         self.driver.machine.stop(PortLost('unplugged'))
         assert len(self.heard.results) == self.accepted
+        assert len(self.answered) == len(self.asked)
+        for command in self.asked:
+            reply, = (reply for reply in self.answered if reply.tns == command.tns)
+            assert reply.answers(command)
 
     def _framed(self, data: bytes) -> bytes:
         network = self.driver.network
@@ -149,7 +167,10 @@ def one_input(data: bytes) -> None:
         at += 2
         if what in (0, 1, 2, 3):
             at += len(taken)
-        _ACTIONS[what](line, much, taken)
+        if data[at - 2] & 0x80 and what == 3:
+            line.ask(much, taken)
+        else:
+            _ACTIONS[what](line, much, taken)
     line.wait(0.5)
     line.end()
 
