@@ -80,7 +80,9 @@ def main(args: Sequence[str] | None = None) -> int:
     if done.returncode:
         print(done.stdout, end='')
         return done.returncode
-    options.file.write_text(picture(options.title, done.stdout), encoding='utf-8')
+    # Where the repository lies is nobody's business.
+    text = done.stdout.replace(f'{Path.cwd()}/', '')
+    options.file.write_text(picture(options.title, text), encoding='utf-8')
     return 0
 
 

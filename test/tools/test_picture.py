@@ -51,8 +51,9 @@ def test_errors_have_a_colour_of_their_own() -> None:
 
 def test_what_a_command_prints_becomes_a_file(tmp_path: Path) -> None:
     file = tmp_path / 'run.svg'
-    assert picture.main([str(file), 'hello', sys.executable, '-c', 'print("hello you")']) == 0
-    assert lines(file.read_text(encoding='utf-8')) == ['$ hello', 'hello you']
+    command = 'import os; print("hello", os.getcwd() + "/config/net.csv")'
+    assert picture.main([str(file), 'hello', sys.executable, '-c', command]) == 0
+    assert lines(file.read_text(encoding='utf-8')) == ['$ hello', 'hello config/net.csv']
 
 
 def test_a_command_that_fails_leaves_no_picture(
