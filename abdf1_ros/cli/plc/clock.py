@@ -53,8 +53,8 @@ class Clock:
         try:
             found = datetime(*values)
         except ValueError:
-            raise FormatError(f'has no time: {self.address} holds '
-                              f'{" ".join(map(str, values))}') from None
+            raise FormatError(f'has no time: {self.address} holds {" ".join(map(str, values))}'
+                              + ('' if any(values) else '; is its clock off?')) from None
         return found, found - (begun + (ended - begun) / 2)
 
     def write(self) -> None:

@@ -485,7 +485,8 @@ def _clock(options: argparse.Namespace) -> int:
     print(f'station {options.station}: {told(time, ahead)}')
     if abs(ahead) <= TAKEN:
         return 0
-    _complain('it has not taken the time, though it has confirmed the write')
+    _complain('it has not taken the time, though it has confirmed the write: a processor that '
+              'only shows its clock there is set by its own means')
     return EXIT_FAILED
 
 
