@@ -37,8 +37,10 @@ from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.settings.remarks import network_remarks
+from abdf1_ros.settings.share import share_places
 
 _HIGH_LOAD = 0.8
+_OURS_BESIDE_GUESTS = 0.75  # of the commands (driver.agenda)
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 _LONG_REQUIRES = 10_000  # ms
@@ -331,6 +333,11 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
         yield Remark(RemarkKind.LOAD, (
             f'the periods need {load:.0%} of the line; writes, repetitions and silent stations '
             'have to do with the rest'))
+    if share_places(report.network.share):
+        yield Remark(RemarkKind.LOAD, (
+            'while guests (Share) ask, every fourth command may be theirs: the periods then need '
+            f'{load / _OURS_BESIDE_GUESTS:.0%} of the time that is left, and the poll cycle is up '
+            'to a third longer'))
 
 
 def _interlock_remarks(report: Report) -> Iterator[Remark]:

@@ -25,7 +25,7 @@ from urllib.parse import parse_qsl
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.numbers import whole_number
 
-LOOPBACK = '127.0.0.1'
+_LOOPBACK = '127.0.0.1'
 _MOST_PLACES = 16
 _RIGHT = ('pty:/a/name, tcp:PORT, tcp:ADDRESS:PORT, or a serial device such as '
           '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even')
@@ -95,7 +95,7 @@ def _host_and_port(name: str, text: str) -> tuple[str, int]:
     host, colon, digits = name.rpartition(':')
     port = whole_number(digits)
     try:
-        host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else LOOPBACK
+        host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else _LOOPBACK
     except ValueError:
         port = None  # a name may stand for any interface
     if port is None or not 0 < port < 65536:
@@ -105,12 +105,8 @@ def _host_and_port(name: str, text: str) -> tuple[str, int]:
 
 
 def share_remarks(places: list[SharePlace]) -> Iterator[str]:
-    """Yield what is to be known before a line is shared."""
+    """Yield which places are open to other machines."""
     for place in places:
         if place.is_open_to_others:
             yield (f'Share {place.text}: whoever reaches {place.host}:{place.port} over the '
                    'network can send commands to the PLC; nothing asks who it is')
-    if places:
-        yield (f'Share: {len(places)} {"guest" if len(places) == 1 else "guests"} may take one '
-               'command in four of what heartbeats, fallbacks and writes leave: the poll cycle '
-               'may take a third longer')

@@ -190,6 +190,15 @@ def test_as_often_as_the_line_allows_is_no_load() -> None:
     assert report.remarks() == []
 
 
+def test_guests_are_part_of_the_load() -> None:
+    report = report_of(make_mapping('N7:0', period=100), share='pty:/tmp/hmi')
+    text, = texts(report, RemarkKind.LOAD)
+    assert text == (
+        'while guests (Share) ask, every fourth command may be theirs: the periods then need '
+        f'{report.load / 0.75:.0%} of the time that is left, and the poll cycle is up to a third '
+        'longer')
+
+
 def test_our_own_station_is_mapped() -> None:
     mapping = make_mapping('N7:0', station=5, tag='speed')
     assert texts(report_of(mapping), RemarkKind.STATION) == [
