@@ -38,7 +38,13 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
+from abdf1_ros.pccc.families import (
+    dialect_of,
+    FAMILIES,
+    family_of,
+    parse_address,
+    served_counters,
+)
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.values import Codec, types_of, ValueType
@@ -46,7 +52,8 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import read_rows, Row
 from abdf1_ros.simulator.ladder import Ladder
 
-COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period', 'Via')
+COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period', 'Via',
+           'Processor')
 _RAMP_TOP = 1000
 
 _Choice = TypeVar('_Choice')
@@ -313,6 +320,9 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
     if plc.table.plc_type != plc_type:
         raise Problem(row.where('PLC_Type'),
                       f'station {station} is a {plc.table.plc_type.value} already')
+    if row.get('Processor'):
+        plc.processor.processor = _choice(row, 'Processor', {
+            entry.value: entry for entry in family_of(plc_type).by_processor})
     try:
         address = parse_address(row.get('Address'), plc_type)
         codec = _natural_codec(address, length)

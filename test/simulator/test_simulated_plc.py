@@ -24,7 +24,8 @@ from abdf1_ros.df1.frames import Code, Control, Frame, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.emulated import Setting
-from abdf1_ros.pccc.families import dialect_of, parse_address
+from abdf1_ros.pccc.families import decode_identity, dialect_of, parse_address
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
 from abdf1_ros.simulator.ladder import Ladder
@@ -430,3 +431,12 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
     ('2,PLC5,F8:0,,,,,0', '3:8 (Via): Via = "0" should be a whole number from 1 to 254')])
 def test_gateways_that_cannot_be(tmp_path: Path, row: str, text: str) -> None:
     assert faults(tmp_path / 'simulator.csv', '1,PLC5,N7:0,,,,,10', row) == [text]
+
+
+def test_simulated_slc_may_be_another_processor(path: Path, clock: Clock) -> None:
+    plc, = load(path, clock, '1,SLC,N7:0,,,,,,ML1400', '1,SLC,B3:0,,,,,,')
+    assert decode_identity(plc.processor.encode()).processor is Processor.ML1400
+    fault, = faults(path, '1,SLC,N7:0,,,,,,5/99')
+    assert fault.startswith('2:9 (Processor): Processor = "5/99" should be one of 5/01, 5/02')
+    fault, = faults(path, '1,PLC5,N7:0,,,,,,5/03')
+    assert fault.startswith('2:9 (Processor)')
