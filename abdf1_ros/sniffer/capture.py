@@ -101,8 +101,9 @@ class CaptureWriter:
         # Escaped here, so that the escaped length is counted.
         self._head = head.encode('ascii', 'backslashreplace').decode('ascii')
         self._written = 0
-        if path.exists() and not _is_capture(path):
-            raise OSError(f'{path} exists and is not a capture; give another name')
+        for place in (path, Path(f'{path}.1')):
+            if place.exists() and not _is_capture(place):
+                raise OSError(f'{place} exists and is not a capture; give another name')
         self._file = self._begin()
 
     def write(self, chunk: Chunk) -> None:

@@ -129,6 +129,10 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
     with pytest.raises(OSError, match='is not a capture; give another name'):
         CaptureWriter(path)
     assert path.read_text(encoding='ascii') == 'important'
+    path.rename(tmp_path / 'y.1')  # where an older part of a capture y goes
+    with pytest.raises(OSError, match='y.1 exists and is not a capture'):
+        CaptureWriter(tmp_path / 'y')
+    assert (tmp_path / 'y.1').read_text(encoding='ascii') == 'important'
     with pytest.raises(OSError, match='is not a capture'):
         CaptureWriter(Path('/dev/null'))
     with pytest.raises(OSError, match='is not a capture'):
