@@ -68,7 +68,7 @@ class Accounting:
 
     def sent(self, packet: Packet) -> None:
         """Count a message of ours once, also if it is sent several times."""
-        if packet.is_reply:
+        if packet.cmd & REPLY_BIT:
             self.counters.replies_sent += 1
             self.counters.error_messages_sent += packet.sts != 0
         else:
@@ -76,7 +76,7 @@ class Accounting:
 
     def received(self, packet: Packet) -> None:
         """Count a good message that is not a repetition."""
-        if packet.is_reply:
+        if packet.cmd & REPLY_BIT:
             self.counters.replies_received += 1
             self.counters.error_messages_received += packet.sts != 0
         else:
@@ -94,7 +94,7 @@ class Accounting:
         A gateway replies in place of a PLC that it does not reach, maybe after a long time: this
         is as good as no reply in time, where waiting for it keeps others waiting.
         """
-        station = self._stations[reply.src]
+        station = self._stations.records[reply.src]
         expected = task.command.cmd | REPLY_BIT
         if reply.cmd != expected:
             self.counters.invalid_messages += 1
@@ -105,10 +105,10 @@ class Accounting:
         station.replies += 1
         station.unanswered = 0
         station.returns = 0
-        station.local_status = reply.sts if is_local_status(reply.sts) else 0
+        station.local_status = reply.sts if reply.sts and is_local_status(reply.sts) else 0
         station.overdue = station.overdue + keeps_others_waiting if station.local_status else 0
         station.last_tns = reply.tns
-        self.note(Message.NTC_REPLY_MSG_RCVD, station.number, station=station.number)
+        self.report(Event(Message.NTC_REPLY_MSG_RCVD, (station.number,), station.number))
         task.reply(reply)
 
     def late(self, station: int, *, keeps_others_waiting: bool) -> None:

@@ -208,15 +208,15 @@ class FrameDecoder:
     Turn bytes into symbols.
 
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
-    everything heard. Bytes outside of any symbol are counted in ``noise``, and the last byte heard
-    stays in ``last_byte`` for whoever reports it. ``in_message`` tells whether a message has begun
-    and not ended, ``begun`` counts beginnings.
+    everything heard. ``waiting`` are bytes that are to be read. Bytes outside of any symbol are
+    counted in ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
+    ``in_message`` tells whether a message has begun and not ended, ``begun`` counts beginnings.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
         self._checksum = checksum
         self._is_half_duplex = duplex is Duplex.HALF
-        self._buffer = bytearray()
+        self.waiting = bytearray()
         self._data = bytearray()
         self._step: Callable[[], Decoded] = self._idle
         self._station: int | None = None
@@ -235,9 +235,9 @@ class FrameDecoder:
 
     def reset(self) -> None:
         """Forget everything heard so far."""
-        if self._buffer or self.in_message:
-            self.noise += len(self._buffer) + self.in_message
-            self._buffer.clear()
+        if self.waiting or self.in_message:
+            self.noise += len(self.waiting) + self.in_message
+            self.waiting.clear()
             self.in_message = False
         self._step = self._idle
         self.last_byte = 0
@@ -247,28 +247,28 @@ class FrameDecoder:
         if isinstance(data, Damaged):
             self._take_damaged(data)
         elif data:
-            self._buffer += data
+            self.waiting += data
             self.last_byte = data[-1]
-            if len(self._buffer) > MAX_WAITING:
-                self.noise += len(self._buffer) - MAX_WAITING
-                del self._buffer[MAX_WAITING:]
+            if len(self.waiting) > MAX_WAITING:
+                self.noise += len(self.waiting) - MAX_WAITING
+                del self.waiting[MAX_WAITING:]
 
     def _take_damaged(self, data: Damaged) -> None:
         self.last_byte = data[-1]
         if self.in_message:
             self._is_damaged = True
             if self._step == self._check:
-                self._buffer += data  # it counts, as one of the check
+                self.waiting += data  # it counts, as one of the check
                 return
         else:
             self._step = self._idle
         # With what has come of a pair: what follows is not its other half.
-        self.noise += len(self._buffer) + len(data)
-        self._buffer.clear()
+        self.noise += len(self.waiting) + len(data)
+        self.waiting.clear()
 
     def next_symbol(self) -> Symbol | None:
         """Return the next whole symbol, or None when more bytes are needed."""
-        while self._buffer:
+        while self.waiting:
             result = self._step()
             if result is MORE:
                 return None
@@ -277,18 +277,18 @@ class FrameDecoder:
         return None
 
     def _idle(self) -> Decoded:
-        start = self._buffer.find(DLE)
+        start = self.waiting.find(DLE)
         if start:
-            skipped = len(self._buffer) if start < 0 else start
+            skipped = len(self.waiting) if start < 0 else start
             self.noise += skipped
-            del self._buffer[:skipped]
-        if len(self._buffer) < 2:
+            del self.waiting[:skipped]
+        if len(self.waiting) < 2:
             return MORE
-        pair = bytes(self._buffer[:2])
+        pair = bytes(self.waiting[:2])
         if self.noise != self._noise_told and pair == ENQ and not self._is_half_duplex:
             self._noise_told = self.noise
             return NOISE
-        del self._buffer[:2]
+        del self.waiting[:2]
         return self._begin(pair)
 
     def _begin(self, pair: bytes) -> Decoded:
@@ -313,14 +313,14 @@ class FrameDecoder:
 
     def _take_station(self, following: Callable[[], Decoded]) -> Decoded:
         """Read STN, which is stuffed like data (M 3-4), and go on to ``following``."""
-        if self._buffer[0] != Code.DLE:
-            self._station = self._buffer[0]
-            del self._buffer[:1]
-        elif len(self._buffer) < 2:
+        if self.waiting[0] != Code.DLE:
+            self._station = self.waiting[0]
+            del self.waiting[:1]
+        elif len(self.waiting) < 2:
             return MORE
-        elif self._buffer[1] == Code.DLE:
+        elif self.waiting[1] == Code.DLE:
             self._station = int(Code.DLE)
-            del self._buffer[:2]
+            del self.waiting[:2]
         else:  # another symbol broke in
             self._step = self._idle
             return None
@@ -332,63 +332,63 @@ class FrameDecoder:
 
     def _poll_station(self) -> Decoded:
         # A master that does not double STN 10: DLE ENQ 10 F0 (F0 being its BCC).
-        if self._buffer[:2] == bytes((Code.DLE, bcc(DLE))):
-            del self._buffer[:1]
+        if self.waiting[:2] == bytes((Code.DLE, bcc(DLE))):
+            del self.waiting[:1]
             self._station = int(Code.DLE)
             self._step = self._poll_check
             return None
         return self._take_station(self._poll_check)
 
     def _poll_check(self) -> Poll:
-        check = self._buffer.pop(0)
+        check = self.waiting.pop(0)
         self._step = self._idle
         assert self._station is not None
         return Poll(self._station, check == bcc(b'', self._station))
 
     def _soh_stx(self) -> Decoded:
-        if self._buffer[0] != Code.DLE:
+        if self.waiting[0] != Code.DLE:
             self._step = self._idle
-        elif len(self._buffer) < 2:
+        elif len(self.waiting) < 2:
             return MORE
-        elif self._buffer[1] == Code.STX:
-            del self._buffer[:2]
+        elif self.waiting[1] == Code.STX:
+            del self.waiting[:2]
             self._begin_data(self._station)
         else:
             self._step = self._idle
         return None
 
     def _link_data(self) -> Decoded:
-        end = self._buffer.find(DLE)
+        end = self.waiting.find(DLE)
         if end:
-            self._take_data(len(self._buffer) if end < 0 else end)
-        if len(self._buffer) < 2:
+            self._take_data(len(self.waiting) if end < 0 else end)
+        if len(self.waiting) < 2:
             return MORE
-        pair = bytes(self._buffer[:2])
+        pair = bytes(self.waiting[:2])
         if pair == ETX:
-            del self._buffer[:2]
+            del self.waiting[:2]
             self._step = self._check
             return self._check()
         if pair == _DATA_DLE:
-            del self._buffer[:1]
+            del self.waiting[:1]
             self._take_data(1)
             return None
         if pair in (ACK, NAK) and not self._is_half_duplex:
-            del self._buffer[:2]
+            del self.waiting[:2]
             self._has_response = True
             return _CONTROLS[pair]  # an embedded response (M 4-3)
         return self._frame(FrameFault.NO_ETX, pair[1])  # the pair is read again as a symbol
 
     def _take_data(self, count: int) -> None:
         """Take bytes of a message; those that are too many are dropped, up to its end (M 4-8)."""
-        self._data += self._buffer[:min(count, MAX_LINK_DATA + 1 - len(self._data))]
-        del self._buffer[:count]
+        self._data += self.waiting[:min(count, MAX_LINK_DATA + 1 - len(self._data))]
+        del self.waiting[:count]
 
     def _check(self) -> Decoded:
         size = self._checksum.size
-        if len(self._buffer) < size:
+        if len(self.waiting) < size:
             return MORE
-        received = int.from_bytes(self._buffer[:size], 'little')
-        del self._buffer[:size]
+        received = int.from_bytes(self.waiting[:size], 'little')
+        del self.waiting[:size]
         if len(self._data) > MAX_LINK_DATA:
             return self._frame(FrameFault.TOO_LONG)
         expected = self._checksum.of_message(self._data, self._station)

@@ -85,10 +85,10 @@ class ListeningDecoder(FrameDecoder):
 
     def feed(self, data: bytes) -> None:
         """Take bytes from the line."""
-        before = len(self._buffer)
+        before = len(self.waiting)
         super().feed(data)
-        self._heard += data[:max(0, len(self._buffer) - before)]
-        del self._heard[:-_MOST_KEPT - len(self._buffer)]
+        self._heard += data[:max(0, len(self.waiting) - before)]
+        del self._heard[:-_MOST_KEPT - len(self.waiting)]
 
     def reset(self) -> None:
         super().reset()
@@ -101,12 +101,12 @@ class ListeningDecoder(FrameDecoder):
         if symbol is not None:
             self._keep(symbol)
         elif not self.in_message and self._step == self._idle:
-            del self._heard[:len(self._heard) - len(self._buffer)]
+            del self._heard[:len(self._heard) - len(self.waiting)]
         return symbol
 
     def _keep(self, symbol: Symbol) -> None:
         """Put the bytes of a symbol into ``wire``."""
-        taken = len(self._heard) - len(self._buffer)
+        taken = len(self._heard) - len(self.waiting)
         heard = bytes(self._heard[:taken])
         del self._heard[:taken]
         if isinstance(symbol, Frame):
@@ -124,7 +124,7 @@ class ListeningDecoder(FrameDecoder):
     def finish(self) -> Frame | None:
         """Return a frame that waits for a second check byte, where none will come any more."""
         kind = self._kind
-        waits = self._step == self._check and len(self._buffer) == 1
+        waits = self._step == self._check and len(self.waiting) == 1
         if not waits or kind.is_certain or not self._matches(Checksum.BCC):
             return None
         if kind.checksum is None:
@@ -156,13 +156,13 @@ class ListeningDecoder(FrameDecoder):
     def _check(self) -> Decoded:
         if self._kind.checksum is not None:
             self._checksum = self._kind.checksum
-            if not self._kind.is_certain and len(self._buffer) >= self._checksum.size:
-                if len(self._buffer) == 1 and not self._matches(self._checksum) and (
+            if not self._kind.is_certain and len(self.waiting) >= self._checksum.size:
+                if len(self.waiting) == 1 and not self._matches(self._checksum) and (
                         self._matches(Checksum.CRC, 1)):
                     return MORE  # a CRC may be what it is
                 self._reconsider()
                 self._checksum = self._kind.checksum
-        elif len(self._buffer) < Checksum.CRC.size:
+        elif len(self.waiting) < Checksum.CRC.size:
             return MORE
         else:
             self._find_checksum()
@@ -192,4 +192,4 @@ class ListeningDecoder(FrameDecoder):
     def _matches(self, checksum: Checksum, count: int = 2) -> bool:
         """Tell whether the check that has come is of this kind, by its first ``count`` bytes."""
         check = checksum.encode(checksum.of_message(self._data, self._station))
-        return self._buffer.startswith(check[:count])
+        return self.waiting.startswith(check[:count])

@@ -33,6 +33,7 @@ driving loop (a thread with a port, or a test with a virtual line) does this::
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from dataclasses import dataclass
 import math
 from typing import NamedTuple, Protocol
@@ -149,13 +150,16 @@ class _Incoming(NamedTuple):
 
 
 class Background(Protocol):
-    """What has to be done in time whatever the line is busy with."""
+    """What has to be done in time whatever the line is busy with, and at the end."""
 
     def expire(self, now: float) -> None:
         """Do what needs no line, such as ending what has waited too long for it."""
 
     def next_expiry(self) -> float:
         """Return when there is something to do next (clock value in s), infinite for never."""
+
+    def ended(self, error: Exception | None) -> None:
+        """Take note that the procedure has ended, and why if that is known."""
 
 
 class Machine:
@@ -293,12 +297,14 @@ class Machine:
         self._echo.forget()
         if procedure is None:
             return
-        if error is not None:
-            try:
-                procedure.throw(error)
-            except (StopIteration, type(error)):
-                pass
-        procedure.close()
+        try:
+            if error is not None:
+                with suppress(StopIteration, type(error)):
+                    procedure.throw(error)
+            procedure.close()
+        finally:
+            if self.background is not None:
+                self.background.ended(error)
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
@@ -379,15 +385,23 @@ class Machine:
         must not count for it (M 4-8), in case that it is a PLC's after all.
         """
         while (symbol := self.decoder.next_symbol()) is not None:
-            if not self._echo.is_ours(symbol, self.has_left):
+            # A master sends no frame without a station, and no response before it hears its echo.
+            is_slaves = self._forget_on_send and (
+                symbol.station is None if isinstance(symbol, Frame)
+                else isinstance(symbol, Control) and not self._echo.is_heard)
+            if is_slaves or not self._echo.is_ours(symbol, self.has_left):
                 break
             if isinstance(symbol, Frame) and not self._is_half_duplex:
                 return NOISE
         return symbol
 
     def _deliver_symbols(self) -> None:
-        while self._is_listening and (symbol := self._next_symbol()) is not None:
-            if self._is_half_duplex or symbol in _RESPONSES:
+        while self._is_listening and self.decoder.waiting \
+                and (symbol := self._next_symbol()) is not None:
+            if self._is_half_duplex:  # what we have sent has left
+                self.rate.answered(self.counters.chars_received, self.now)
+                self._line_free = min(self._line_free, self.now)
+            elif symbol in _RESPONSES:
                 self._take_as_answer()
             if isinstance(symbol, Frame):
                 self.embeds |= symbol.has_response and symbol.fault is None
@@ -398,7 +412,7 @@ class Machine:
 
     def _take_as_answer(self) -> None:
         """Conclude from an answer that what we have sent has left, but what is still here."""
-        here = 0 if self._is_half_duplex else self._still_here
+        here = self._still_here
         if not here:
             self.rate.answered(self.counters.chars_received, self.now)
         self._line_free = min(self._line_free, self.now + here * self._timing.char_time)
@@ -427,7 +441,8 @@ class Machine:
         self._resting = step.frame is None
         if self._resting:
             self._is_listening = not self._forget_on_send
-            self._set_deadline(step, self.now)
+            self._reply_size, self._due = step.reply_size, self.now + (step.timeout or 0.0)
+            self.deadline = None if step.timeout is None else self._due
             return False
         delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
         if delay and step.delay != AT_ONCE:
@@ -452,7 +467,9 @@ class Machine:
             self._echo.sent(step.frame, self.position)
             if self._forget_on_send:
                 self.decoder.reset()
-        self._set_deadline(step, free)
+        if step.timeout != KEEP:
+            self._reply_size, self._due = step.reply_size, free + (step.timeout or 0.0)
+            self.deadline = None if step.timeout is None else self._due
         if step.timeout != 0:
             if step.frame:
                 self.rate.sent(len(step.frame), self.counters.chars_received, self.now)
@@ -473,10 +490,3 @@ class Machine:
             self._resume(_NOTHING, CommandExpired())
         elif self._put_on_line(step):
             self._resume(_NOTHING)
-
-    def _set_deadline(self, step: Step, start: float) -> None:
-        if step.timeout == KEEP:
-            return
-        self._reply_size = step.reply_size
-        self._due = start + (step.timeout or 0.0)
-        self.deadline = None if step.timeout is None else self._due

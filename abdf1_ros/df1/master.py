@@ -75,22 +75,23 @@ class HalfDuplexMaster:
         self._line.forget_forwards()
         while True:
             # In turns, or slaves that send all the time would keep our own commands from the line.
-            if self._line.has_forwards():
+            if self._line.forwards:
                 yield from self._line.forward(collect=self._collect_for_slave)
             now = self._machine.now
             task = source.next_task(now)
             if task is not None:
                 yield from self.carry_out(task)
-            elif not self._line.has_forwards():
+            elif not self._line.forwards:
                 due = source.next_due()
                 yield Step(None, None if due is None else max(due - now, 0.0))
 
     def carry_out(self, task: Task) -> Procedure:
         """Send the command of a task and end it; a broadcast has no reply but our own."""
         command = task.command
-        number = self._stations.via(command.dst)  # on this line (M 3-7)
+        # On this line (M 3-7).
+        number = self._stations.routes.get(command.dst, command.dst)
         try:
-            if number != BROADCAST and not self._stations[number].active:
+            if number != BROADCAST and not self._stations.records[number].active:
                 yield from self._line.probe(number)
             task.sent = True
             started = yield from self._line.deliver(number, command, task.expires)

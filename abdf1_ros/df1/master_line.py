@@ -45,7 +45,14 @@ from abdf1_ros.df1.machine import (
     Silence,
     Step,
 )
-from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, source, STS_NOT_DELIVERED
+from abdf1_ros.df1.packet import (
+    BROADCAST,
+    is_local_status,
+    Packet,
+    REPLY_BIT,
+    source,
+    STS_NOT_DELIVERED,
+)
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
@@ -124,7 +131,7 @@ class MasterLine:
         self._serve = serve
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
-        self._forwards: deque[Packet] = deque()
+        self.forwards: deque[Packet] = deque()
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf
                 ) -> Generator[Step, Heard, float]:
@@ -204,7 +211,7 @@ class MasterLine:
         """
         for retry in range(1, self.settings.enq_retries + 2):
             answer = yield from self._poll(number, pause, reply_size)
-            if is_good(answer):
+            if answer is Control.EOT or isinstance(answer, Frame) and answer.fault is None:
                 self.stations.heard(number, self.machine.now)
                 return answer
             pause = 0.0
@@ -286,7 +293,7 @@ class MasterLine:
         take that for its own message. So the message comes again, and is then a repetition.
         """
         src = source(frame.data)
-        if self._speaks_for(number, src) or src not in self.stations:
+        if src == number or self._speaks_for(number, src) or src not in self.stations:
             return False
         packet = Packet.decode(frame.data)
         station = self.stations[self.stations.via(packet.src)]
@@ -313,8 +320,9 @@ class MasterLine:
         """
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
-        station = self.stations[number]
-        if not self._speaks_for(number, packet.src) or packet.dst == packet.src:
+        station = self.stations.records[number]
+        is_other = packet.src != number and not self._speaks_for(number, packet.src)
+        if is_other or packet.dst == packet.src:
             if frame.data != station.last_refused:
                 station.last_refused = frame.data
                 self.counters.invalid_messages += 1
@@ -323,7 +331,7 @@ class MasterLine:
             self.counters.acks_sent += 1
             yield _ACKNOWLEDGE
             return None
-        is_to_keep = not packet.is_reply and self.settings.accept_slave_messages
+        is_to_keep = self.settings.accept_slave_messages and not packet.cmd & REPLY_BIT
         if is_to_keep and self.is_full and not station.repeats(packet):
             return None  # not acknowledged: the slave keeps it; replies make room and go on
         self.counters.acks_sent += 1
@@ -337,14 +345,15 @@ class MasterLine:
 
     def answers(self, packet: Packet, command: Packet) -> bool:
         """Tell whether a message is the reply to ``command``; a gateway may fill in its DST."""
-        if self.stations.via(command.dst) != command.dst:
+        if command.dst in self.stations.routes:
             packet = packet._replace(dst=command.src)
         return packet.answers(command)
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""
-        if not is_local_status(reply.sts):
-            self.stations.heard(reply.src, self.machine.now)
+        is_from_gateway = reply.sts and is_local_status(reply.sts)
+        if reply.src in self.stations.routes and not is_from_gateway:
+            self.stations.heard(reply.src, self.machine.now)  # others were, when it came
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 
     def take_unwanted(self, number: int, packet: Packet) -> None:
@@ -353,14 +362,14 @@ class MasterLine:
 
         It is served, kept to be passed on, or dropped and counted.
         """
-        has_room = len(self._forwards) < MAX_KEPT
+        has_room = len(self.forwards) < MAX_KEPT
         if self._is_to_forward(packet) and has_room:
-            self._forwards.append(packet)
+            self.forwards.append(packet)
             return
         is_ours = packet.dst == self.settings.station
         if is_ours and not packet.is_reply and self.settings.accept_slave_messages \
                 and self._serve is not None and has_room:
-            self._forwards.append(self._serve(packet))
+            self.forwards.append(self._serve(packet))
             return
         if packet.is_reply and is_ours:
             self.counters.stale_messages += 1
@@ -378,8 +387,8 @@ class MasterLine:
         delivered gets an error reply. ``collect`` gets the reply to a command, by the station of
         the line that has it.
         """
-        packet = next(packet for packet in self._forwards if packet.dst not in busy)
-        self._forwards.remove(packet)
+        packet = next(packet for packet in self.forwards if packet.dst not in busy)
+        self.forwards.remove(packet)
         number = self.stations.via(packet.dst)
         if not self.stations.admits_message(packet.dst, self.machine.now):
             self._refuse(packet)
@@ -399,7 +408,7 @@ class MasterLine:
     def _refuse(self, packet: Packet) -> None:
         """Answer a command that cannot be passed on."""
         if not packet.is_reply and packet.src != self.settings.station:
-            self._forwards.append(packet.reply(sts=STS_NOT_DELIVERED))
+            self.forwards.append(packet.reply(sts=STS_NOT_DELIVERED))
 
     @contextmanager
     def _probe_of(self, number: int) -> Iterator[None]:
@@ -413,17 +422,17 @@ class MasterLine:
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""
-        return bool(self._forwards) and any(
-            packet.dst not in busy for packet in self._forwards)
+        return bool(self.forwards) and any(
+            packet.dst not in busy for packet in self.forwards)
 
     @property
     def is_full(self) -> bool:
         """Tell whether no more messages can be kept to be passed on."""
-        return len(self._forwards) >= MAX_FORWARDS
+        return len(self.forwards) >= MAX_FORWARDS
 
     def forget_forwards(self) -> None:
         """Drop what waits to be passed on."""
-        self._forwards.clear()
+        self.forwards.clear()
 
     def _is_to_forward(self, packet: Packet) -> bool:
         return self.settings.accept_slave_messages and packet.dst != self.settings.station

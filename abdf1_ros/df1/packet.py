@@ -102,7 +102,7 @@ class Packet(NamedTuple):
 
     def answers(self, command: Packet) -> bool:
         """Tell whether this is a reply to ``command``; the command code is not compared."""
-        return self.is_reply and (self.src, self.dst, self.tns) == (
+        return self.cmd & REPLY_BIT != 0 and (self.src, self.dst, self.tns) == (
             command.dst, command.src, command.tns)
 
     def reply(self, data: bytes = b'', sts: int = 0) -> Packet:

@@ -80,7 +80,7 @@ class Station:
 
     def accepts(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""
-        key = packet.dst, *packet.duplicate_key
+        key = packet.dst, packet.src, packet.cmd, packet.tns  # with ``duplicate_key``
         if key == self.last_key:
             return False
         self.last_key = key
@@ -107,10 +107,11 @@ class ActiveStationList:
     list whenever it becomes active or inactive. A station outside of the list, to which a slave
     sends something, has a record as well, but no message can put it into the list.
 
-    ``routes`` gives the gateway to a station, by number: the gateway is polled in place of the
-    station, and all its stations are active while the gateway is (M 3-7). ``polled`` are the
-    stations of this line that the link polls all the time: nobody else need ask whether they are
-    there again. ``probes`` says when others may be asked; one takes ``probe_time`` seconds.
+    ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
+    the gateway to a station, by number: the gateway is polled in place of the station, and all its
+    stations are active while the gateway is (M 3-7). ``polled`` are the stations of this line that
+    the link polls all the time: nobody else need ask whether they are there again. ``probes`` says
+    when others may be asked; one takes ``probe_time`` seconds.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
@@ -118,17 +119,17 @@ class ActiveStationList:
                  routes: Mapping[int, int] | None = None, probe_time: float = 0.0) -> None:
         self.polled: Collection[int] = ()
         self.probes = Probes(probe_time)
-        self._records = _Records()
+        self.records = _Records()
         self._stations: dict[int, Station] = {}
         self._on_change = on_change
-        self._routes = {station: gateway for station, gateway in (routes or {}).items()
+        self.routes = {station: gateway for station, gateway in (routes or {}).items()
                         if station != gateway}
-        self.add((*numbers, *self._routes.values()))
+        self.add((*numbers, *self.routes.values()))
 
     def add(self, numbers: Iterable[int]) -> None:
         """Take stations into the list."""
         for number in numbers:
-            self._stations[number] = self._records[number]
+            self._stations[number] = self.records[number]
         self._stations = dict(sorted(self._stations.items()))
 
     def __iter__(self) -> Iterator[Station]:
@@ -139,19 +140,19 @@ class ActiveStationList:
 
     def __getitem__(self, number: int) -> Station:
         """Return the record of a station (0-254), of the list or not."""
-        return self._records[number]
+        return self.records[number]
 
     def via(self, number: int) -> int:
         """Return the station of this line that is polled for a station: its gateway, or itself."""
-        return self._routes.get(number, number)
+        return self.routes.get(number, number)
 
     def behind(self, number: int) -> list[int]:
         """Return a station of this line, and the stations to which it is the gateway."""
-        return [number, *(station for station, via in self._routes.items() if via == number)]
+        return [number, *(station for station, via in self.routes.items() if via == number)]
 
     def heard(self, number: int, now: float) -> None:
         """Note an answer of any kind: the station is active, and all that share its gateway."""
-        station = self._records[number]
+        station = self.records[number]
         station.last_heard = now
         if station.active:
             return  # and so are all that share its gateway

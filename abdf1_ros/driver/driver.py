@@ -303,24 +303,19 @@ class Driver:
         return self._served.serve(command)
 
     def _run(self) -> Procedure:
-        """Work as long as there is a port."""
+        """Begin to work, as long as there is a port."""
         self._reads.begin(self.machine.now)
         self.health.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)
         self._inbox.open()
         self.guests.begin()
         self.is_online = True
-        reason = 'internal error, see the log'
-        try:
-            yield from self.link.run(self)
-        except PortLost as error:
-            reason = error.args[0]
-            raise
-        finally:
-            self._went_down(PortLost(reason))
+        return self.link.run(self)
 
-    def _went_down(self, error: PortLost) -> None:
-        """Give everything a result; no old command is to be sent later."""
+    def ended(self, error: Exception | None) -> None:
+        """Give everything a result, as there is no port; no old command is to be sent later."""
+        if not isinstance(error, PortLost):
+            error = PortLost('internal error, see the log')
         self.is_online = False
         self._tasks.fail(error)
         self.guests.end()

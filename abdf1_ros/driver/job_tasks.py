@@ -167,10 +167,12 @@ class JobTask:
         try:
             request = resume(what)
         except StopIteration:
-            self._end(None)
+            self._tasks.under_way.discard(self)
+            self.job.ended(None)
             return
         except Exception as error:
-            self._end(error)
+            self._tasks.under_way.discard(self)
+            self.job.ended(error)
             if not isinstance(error, Abdf1Error):
                 raise  # a bug
             return
@@ -180,7 +182,3 @@ class JobTask:
             self.expires = max(self.expires, self.taken + line_time + self.job.patience)
         self.command = self._tasks.new_command(self.station, request)
         self._tasks.advanced(self)
-
-    def _end(self, error: Exception | None) -> None:
-        self._tasks.under_way.discard(self)
-        self.job.ended(error)

@@ -114,7 +114,8 @@ class ReadJob(Job):
             self.reply_size, self.is_under_way = self._reply_sizes[len(self._packets)], True
             return None
         data = b''.join(self._packets)
-        self._forget()
+        self._packets.clear()
+        self.reply_size, self.is_under_way = self._reply_sizes[0], False
         return data
 
     def why_too_old(self) -> str:

@@ -79,7 +79,7 @@ class Reads:
             return job
         passed_over = []
         while (job := self._due.take(now)) is not None:
-            if not self._stations[job.station].replies_in_time:
+            if not self._stations.records[job.station].replies_in_time:
                 self._set_aside(job)
             elif job.station in busy:
                 passed_over.append(job)
@@ -131,7 +131,7 @@ class Reads:
         """Take a job back after a good or failed read, unless it has been replaced."""
         if job not in self._due.jobs:
             return
-        station = self._stations[job.station]
+        station = self._stations.records[job.station]
         if not station.replies_in_time:
             is_probe = job.is_probe or station.active  # or a reply that is late once more
             self._stations.tried(job.station, job.asked, now, was_silent=is_probe)

@@ -368,7 +368,7 @@ def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: lis
         decoder.feed(part)
         for symbol in drain(decoder):
             assert not isinstance(symbol, Frame) or len(symbol.data) <= MAX_LINK_DATA + 1
-        assert len(decoder._buffer) <= 2  # a DLE, or one of two check bytes
+        assert len(decoder.waiting) <= 2  # a DLE, or one of two check bytes
         assert len(decoder._data) <= MAX_LINK_DATA + 1
 
 
@@ -376,7 +376,7 @@ def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
     decoder = FrameDecoder(CRC, Duplex.FULL)
     for _ in range(40):
         decoder.feed(ENQ * 1000)
-    assert len(decoder._buffer) == MAX_WAITING
+    assert len(decoder.waiting) == MAX_WAITING
     assert decoder.noise == 80_000 - MAX_WAITING
     assert drain(decoder) == [NOISE] + [Control(Code.ENQ)] * (MAX_WAITING // 2)
     decoder.feed(EOT)

@@ -397,7 +397,7 @@ def test_replies_to_nothing_are_not_kept_without_end() -> None:
     rig.run(3.9)
     received = rig.master.counts()['replies_received']
     assert received > MAX_KEPT
-    assert len(rig.master.link._line._forwards) == MAX_KEPT
+    assert len(rig.master.link._line.forwards) == MAX_KEPT
     assert rig.master.counts()['invalid_messages'] == received - MAX_KEPT
     assert (2510, 7, 8, MAX_KEPT) in rig.master.numbers()
 

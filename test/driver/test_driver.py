@@ -427,7 +427,7 @@ def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
     bench.listener.events = BrokenList()
     with pytest.raises(ZeroDivisionError):
         bench.run(5.0)
-    bench.lose_port('internal error')
+    bench.lose_port('internal error, see the log')  # as the thread of the link does
     assert sorted(write_results(bench)) == [
         'not written: not sent: port lost: internal error, see the log',
         'unknown whether written: port lost: internal error, see the log; not read back: no row '
@@ -447,7 +447,7 @@ def test_read_goes_on_after_the_driver_itself_has_failed() -> None:
     bench.listener.read = break_down  # type: ignore[method-assign]
     with pytest.raises(ZeroDivisionError):
         bench.run(5.0)
-    bench.lose_port('internal error')
+    bench.lose_port('internal error, see the log')  # as the thread of the link does
     assert bench.driver.points[mapping].freshness(bench.clock()) is Freshness.FAILED
     bench.listener.read = take  # type: ignore[method-assign]
     bench.open()
