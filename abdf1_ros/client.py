@@ -37,7 +37,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc import steps
@@ -58,6 +58,7 @@ from abdf1_ros.ports.settings import PortSettings
 _GLANCE = 0.2
 
 _MODES = {'full': 'Peer', 'half': 'Master'}
+_PARITIES = ('None', 'Even', 'Odd')
 
 _Result = TypeVar('_Result')
 _Choice = TypeVar('_Choice', bound=Enum)
@@ -163,7 +164,7 @@ class Client(OpenLine):
                  duplex: str = 'full', baud: int = 9600, parity: str = 'None', check: str = 'CRC',
                  own_station: int = 0, processor: str | None = None, access: str | None = None,
                  timeout: float = 1.0, cmd_timeout: float = 1.0) -> None:
-        self.station = station
+        self.station = _number('station', station)
         self._access = None if access is None else _choice(Access, access)
         self._kinds: dict[int, tuple[PlcType, Processor | None]] = {}
         self._kind: tuple[PlcType, Processor | None] | None = None
@@ -172,11 +173,14 @@ class Client(OpenLine):
                 raise FormatError(f'plc_type {plc_type} should be one of '
                                   f'{", ".join(map(str, FAMILIES))}')
             self._kind = kind, None if processor is None else _choice(Processor, processor)
-        if duplex not in _MODES:
-            raise FormatError(f'duplex {duplex} should be full or half')
+        elif processor is not None:
+            raise FormatError('processor needs plc_type; without both the PLC is asked')
+        if duplex not in _MODES or parity not in _PARITIES:
+            raise FormatError(f'duplex {duplex} should be full or half, parity {parity} one of '
+                              f'{", ".join(_PARITIES)}')
         settings = PortSettings(port, baud, parity=parity)
         super().__init__(LinkSettings(
-            _MODES[duplex], own_station, _choice(Checksum, check),
+            _MODES[duplex], _number('own_station', own_station), _choice(Checksum, check),
             LineTiming(settings.char_time), timeout=timeout, cmd_timeout=cmd_timeout), settings)
 
     @overload
@@ -195,8 +199,9 @@ class Client(OpenLine):
         ``kind`` is int16, uint16, int32, uint32, float32, bcd16 or string where the natural type
         of the file is not meant. Bits are bool; a string over words has ``length`` words.
         """
-        target = self._target(address, 1 if length is None else length, kind, word_order, station)
-        values = self.ask(self._of(station), steps.read(target))
+        number, target = self._target(
+            address, 1 if length is None else length, kind, word_order, station)
+        values = self.ask(number, steps.read(target))
         if isinstance(values, str):
             return values
         found = [*map(bool, values)] if target.codec.type is ValueType.BOOL else [*values]
@@ -210,32 +215,39 @@ class Client(OpenLine):
         is_packed = isinstance(values, str) and kind is not None
         length = (len(values) + 1) // 2 if is_packed else \
             1 if isinstance(values, str) else len(values)
-        target = self._target(address, length, kind, word_order, station)
-        self.ask(self._of(station), steps.write(target, values))
+        number, target = self._target(address, length, kind, word_order, station)
+        self.ask(number, steps.write(target, values))
 
     def identify(self, station: int | None = None) -> Identity:
         """Return what a station says of itself: model, mode, faults."""
         return self.ask(self._of(station), steps.identify())
 
     def _of(self, station: int | None) -> int:
-        return self.station if station is None else station
+        return self.station if station is None else _number('station', station)
 
     def _target(self, address: str, length: int, kind: str | None, word_order: str,
-                station: int | None) -> AddressedValues:
-        plc_type, processor = self._kind or self._asked(self._of(station))
-        return AddressedValues.of(
+                station: int | None) -> tuple[int, AddressedValues]:
+        number = self._of(station)
+        plc_type, processor = self._kind or self._asked(number)
+        return number, AddressedValues.of(
             address, plc_type, length, None if kind is None else _choice(ValueType, kind),
             word_order=_choice(WordOrder, word_order), access=self._access, processor=processor)
 
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return the family of a station, which is asked once."""
         if station not in self._kinds:
-            identity = self.ask(station, steps.identify())
+            identity = self.identify(station)
             if identity.plc_type is None:
                 raise FormatError(f'station {station} is "{identity}", and its family is not '
                                   'known; name plc_type')
             self._kinds[station] = identity.plc_type, identity.processor
         return self._kinds[station]
+
+
+def _number(name: str, station: int) -> int:
+    if not 0 <= station <= MAX_STATION:
+        raise FormatError(f'{name} {station} should be a number from 0 to {MAX_STATION}')
+    return station
 
 
 def _choice(kinds: type[_Choice], text: str) -> _Choice:

@@ -107,6 +107,8 @@ def test_errors_are_those_of_the_bridge(port: str) -> None:
         assert str(error.value).startswith('2509')
         with pytest.raises(LinkError):
             plc.identify(station=9)
+        with pytest.raises(FormatError, match='station 300'):
+            plc.read('N7:0', station=300)
 
 
 @pytest.mark.parametrize(('address', 'arguments', 'text'), [
@@ -140,6 +142,11 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
         Client(port, plc_type='s7')
     with pytest.raises(FormatError, match='duplex both should be full or half'):
         Client(port, duplex='both')
+    for wrong, text in (({'station': 255}, 'station 255 should be a number from 0 to 254'),
+                        ({'own_station': -1}, 'own_station -1'), ({'parity': 'odd'}, 'parity odd'),
+                        ({'processor': '5/02'}, 'processor needs plc_type')):
+        with pytest.raises(FormatError, match=text):
+            Client(port, **wrong)  # type: ignore[arg-type]
     with pytest.raises(FormatError, match='CRC16 should be one of BCC, CRC'):
         Client(port, check='CRC16')
     with pytest.raises(OSError, match='none'):
