@@ -238,6 +238,8 @@ class LongRun:
         self._simulator.say(f'mode {station} run')
 
     def _kill(self, seconds: float) -> None:
+        # The name would stay, and soon lead to the terminal of another program.
+        self._files.port.unlink(missing_ok=True)
         self._simulator.send(signal.SIGKILL)
         self._simulator.result()
         self.run(seconds)
