@@ -36,7 +36,7 @@ from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import GuestQueue
-from abdf1_ros.driver.heartbeats import LARGEST
+from abdf1_ros.driver.heartbeat_rows import LARGEST
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
@@ -121,7 +121,7 @@ class Driver:
         writing = WritesUnderWay(planner, self.stations, machine, self._readings, self._read_backs)
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   network.timing.tx_delay)
-        self.health = Checks(
+        self.checks = Checks(
             self.stations, {block.station for block in self.blocks}, settings.processor_period,
             machine, lambda station, error: self._readings.link_failed(station, (), error),
             self._station_told, self._status_periods())
@@ -135,7 +135,7 @@ class Driver:
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, self._reads)
         self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
-        self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.health,
+        self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self._reads, self.guests, self._tasks)
 
     @property
@@ -216,9 +216,9 @@ class Driver:
         """
         Ask for the link counters of a station; may be called from any thread, then wake the link.
 
-        ``health`` keeps the answer; without a port nothing is asked.
+        ``checks`` keeps the answer; without a port nothing is asked.
         """
-        self.health.request_counters(station)
+        self.checks.request_counters(station)
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
                values: Sequence[float] | str, request: str = '') -> None:
@@ -262,9 +262,9 @@ class Driver:
         if station.active:
             self._reads.release(station.number, self.machine.now)
             self.interlocks.contact(station.number, self.machine.now)
-            self.health.came_back(station.number, self.machine.now)
+            self.checks.came_back(station.number, self.machine.now)
         else:
-            self.health.went_away(station.number)
+            self.checks.went_away(station.number)
         self._listener.station_changed(station)
 
     def _station_of_guest(self, dst: int) -> int:
@@ -305,7 +305,7 @@ class Driver:
     def _run(self) -> Procedure:
         """Begin to work, as long as there is a port."""
         self._reads.begin(self.machine.now)
-        self.health.begin(self.machine.now)
+        self.checks.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)
         self._inbox.open()
         self.guests.begin()
@@ -319,7 +319,7 @@ class Driver:
         self.is_online = False
         self._tasks.fail(error)
         self.guests.end()
-        self.health.end(str(error))
+        self.checks.end(str(error))
         self._readings.port_lost(str(error))
         for write in self._inbox.close():
             self._end_write(write, Outcome.NOT_SENT, str(error))

@@ -28,8 +28,8 @@ import itertools
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.fallbacks import FallbackCause, FallbackRow
-from abdf1_ros.driver.heartbeats import BeatEvent, BeatState, HeartbeatRow
+from abdf1_ros.driver.fallback_rows import FallbackCause, FallbackRow
+from abdf1_ros.driver.heartbeat_rows import BeatEvent, BeatState, HeartbeatRow
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes import WriteQueue
 from abdf1_ros.driver.writing import WriteJob, WritesUnderWay

@@ -242,7 +242,7 @@ class Diagnostics:
         return [text for text in found if text is not None]
 
     def _wrong_type(self, station: int) -> str | None:
-        identity = self._driver.health.known(station).identity
+        identity = self._driver.checks.known(station).identity
         return wrong_type(station, identity, self._rows_by_type[station].values(),
                           self._map_name)
 
@@ -261,7 +261,7 @@ class Diagnostics:
             return WARN, f'station {station.number} takes commands, but does not reply in time'
         if station.last_heard is None:
             return OK, f'station {station.number} not heard yet'
-        why = processor_fault(self._driver.health.known(station.number).identity)
+        why = processor_fault(self._driver.checks.known(station.number).identity)
         if why is not None:
             return WARN, f'station {station.number} active, but {why}'
         if (wrong := self._wrong_type(station.number)) is not None:
@@ -288,7 +288,7 @@ class Diagnostics:
             'transactions without reply': str(station.failures),
             'error replies': str(station.remote_errors),
             'last event': with_age(self._last_events.get(station.number), now),
-            **health_values(self._driver.health.known(station.number), now),
+            **health_values(self._driver.checks.known(station.number), now),
         }
 
     def _judge_mappings(self, now: float) -> Judgement:

@@ -17,8 +17,8 @@
 from __future__ import annotations
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.fallbacks import FallbackRow
-from abdf1_ros.driver.heartbeats import BeatState, HeartbeatRow
+from abdf1_ros.driver.fallback_rows import FallbackRow
+from abdf1_ros.driver.heartbeat_rows import BeatState, HeartbeatRow
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.plan.interlocks import Bound, Times
 from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age

@@ -125,15 +125,15 @@ class LinkCounterService:
             self._wake_executor()
 
     def _is_waited_for(self, station: int) -> bool:
-        return self._driver.is_online and station in self._driver.health.counters_wanted
+        return self._driver.is_online and station in self._driver.checks.counters_wanted
 
     def _has_told(self, station: int) -> bool:
-        health = self._driver.health
+        health = self._driver.checks
         return station not in health.counters_wanted and bool(health.known(station).counters)
 
     def _text(self, station: int) -> str:
-        health = self._driver.health.known(station)
-        if station in self._driver.health.counters_wanted:
+        health = self._driver.checks.known(station)
+        if station in self._driver.checks.counters_wanted:
             text = 'no answer yet'
         else:
             text = health.no_counters or ', '.join(

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from abdf1_ros.driver.fallbacks import FallbackCause
+from abdf1_ros.driver.fallback_rows import FallbackCause
 from abdf1_ros.driver.points import Outcome, WriteResult
 from abdf1_ros.ros.status import Judgement, OK, WARN, with_age
 

@@ -102,11 +102,11 @@ def word(station: int = 1, command: str = 'Read', period: int | None = None,
 def test_status_at_the_start_and_every_period(network: Network, plc: str,
                                               processor: str) -> None:
     bench, _, (ears,) = make_bench(word(plc=plc), network=network, plc=plc)
-    assert bench.driver.health.known(1).processor == 'unknown (not asked yet)'
+    assert bench.driver.checks.known(1).processor == 'unknown (not asked yet)'
     bench.open()
     bench.run(3.2 * PERIOD)
     assert [round(when / PERIOD, 1) for when in ears.times(STATUS)] == [0, 1, 2, 3]
-    known = bench.driver.health.known(1)
+    known = bench.driver.checks.known(1)
     assert known.processor == processor
     assert known.told == pytest.approx(ears.times(STATUS)[-1], abs=0.1)
     assert bench.driver.stations[1].remote_errors == 0
@@ -126,12 +126,12 @@ def test_program_mode_and_fault_are_seen(network: Network) -> None:
     bench.run(1.0)
     plc.processor.setting = Setting.PROGRAM
     bench.run(PERIOD)
-    identity = bench.driver.health.known(1).identity
+    identity = bench.driver.checks.known(1).identity
     assert identity is not None
     assert (identity.is_running, identity.mode_text) == (False, 'REM PROG')
     plc.processor.setting = Setting.FAULT
     bench.run(PERIOD)
-    identity = bench.driver.health.known(1).identity
+    identity = bench.driver.checks.known(1).identity
     assert identity is not None
     assert identity.faults == (
         'major error 0x0020 (minor error at the end of a scan), processor halted',)
@@ -145,7 +145,7 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench.run(1.0)
     plc.faults = InjectedFaults(silent=True)
     bench.run_until(lambda: (1, False) in bench.listener.changes)
-    assert bench.driver.health.known(1).processor == 'unknown (the station does not answer)'
+    assert bench.driver.checks.known(1).processor == 'unknown (the station does not answer)'
     plc.processor.setting = Setting.RUN
     bench.run(10.0)
     assert len(ears.times(STATUS)) == 1
@@ -153,7 +153,7 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench.run_until(lambda: (1, True) in bench.listener.changes)
     bench.run(0.2)
     assert len(ears.times(STATUS)) == 2
-    assert bench.driver.health.known(1).processor == 'SLC 5/03 series A revision 1, RUN'
+    assert bench.driver.checks.known(1).processor == 'SLC 5/03 series A revision 1, RUN'
 
 
 def test_all_are_asked_anew_when_the_port_comes_back() -> None:
@@ -161,12 +161,12 @@ def test_all_are_asked_anew_when_the_port_comes_back() -> None:
     bench.open()
     bench.run(1.0)
     bench.lose_port()
-    assert bench.driver.health.known(1).identity is None
+    assert bench.driver.checks.known(1).identity is None
     bench.run(1.0)
     bench.open()
     bench.run(0.2)
     assert len(ears.times(STATUS)) == 2
-    assert bench.driver.health.known(1).identity is not None
+    assert bench.driver.checks.known(1).identity is not None
 
 
 def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
@@ -175,7 +175,7 @@ def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
     bench.open()
     bench.run(2.2 * PERIOD)
     assert len(ears.times(STATUS)) == 3
-    assert bench.driver.health.known(1).processor == \
+    assert bench.driver.checks.known(1).processor == \
         'unknown (STS 10: illegal command, format or length, or the file does not exist)'
     station = bench.driver.stations[1]
     assert (station.active, station.remote_errors, station.failures) == (True, 0, 0)
@@ -183,7 +183,7 @@ def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
         is Freshness.FRESH
     ears.answer_diagnostics(plc.serve)
     bench.run(PERIOD)
-    assert bench.driver.health.known(1).identity is not None
+    assert bench.driver.checks.known(1).identity is not None
 
 
 def test_reply_that_is_no_status_is_said_to_be_none() -> None:
@@ -191,7 +191,7 @@ def test_reply_that_is_no_status_is_said_to_be_none() -> None:
     ears.answer_diagnostics(lambda command: command.reply(b'\x06'))
     bench.open()
     bench.run(1.0)
-    assert bench.driver.health.known(1).processor == 'unknown (a diagnostic status of 1 bytes)'
+    assert bench.driver.checks.known(1).processor == 'unknown (a diagnostic status of 1 bytes)'
 
 
 def test_station_that_never_answers_this_is_asked_rarely() -> None:
@@ -201,11 +201,11 @@ def test_station_that_never_answers_this_is_asked_rarely() -> None:
     bench.open()
     bench.run(50.0)
     assert len(ears.times(STATUS)) == 1
-    assert bench.driver.health.known(1).processor == \
+    assert bench.driver.checks.known(1).processor == \
         'unknown (2508 ERR_COMMAND_TIMEOUT: Command Timed Out)'
     ears.answer_diagnostics(plc.serve)
     bench.run(20.0)
-    assert bench.driver.health.known(1).identity is not None
+    assert bench.driver.checks.known(1).identity is not None
 
 
 # beside reads and writes
@@ -416,17 +416,17 @@ def test_counters_on_request(network: Network) -> None:
     bench.run(2.0)
     assert ears.times(COUNTERS) == []
     bench.driver.request_counters(1)
-    assert bench.driver.health.counters_wanted == {1}
+    assert bench.driver.checks.counters_wanted == {1}
     before = plc.counters.messages_received
     bench.run(0.5)
-    assert bench.driver.health.counters_wanted == set()
+    assert bench.driver.checks.counters_wanted == set()
     assert len(ears.times(COUNTERS)) == 1
-    counters = bench.driver.health.known(1).counters
+    counters = bench.driver.checks.known(1).counters
     assert before <= int(counters['messages received']) <= plc.counters.messages_received
     assert int(counters['polls received']) > 10
     bench.run(10.0)
     assert len(ears.times(COUNTERS)) == 1
-    assert bench.driver.health.known(1).counters == counters
+    assert bench.driver.checks.known(1).counters == counters
 
 
 def test_two_requests_at_once_are_one() -> None:
@@ -445,10 +445,10 @@ def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
     bench.open()
     bench.driver.request_counters(1)
     bench.run(1.0)
-    known = bench.driver.health.known(1)
+    known = bench.driver.checks.known(1)
     assert (known.counters, known.no_counters) == (
         {}, 'STS 10: illegal command, format or length, or the file does not exist')
-    assert bench.driver.health.counters_wanted == set()
+    assert bench.driver.checks.counters_wanted == set()
 
 
 def test_absent_station_is_not_asked_for_counters() -> None:
@@ -458,8 +458,8 @@ def test_absent_station_is_not_asked_for_counters() -> None:
     bench.run(5.0)
     bench.driver.request_counters(1)
     bench.run(1.0)
-    assert bench.driver.health.known(1).no_counters == 'the station does not answer'
-    assert bench.driver.health.counters_wanted == set()
+    assert bench.driver.checks.known(1).no_counters == 'the station does not answer'
+    assert bench.driver.checks.counters_wanted == set()
 
 
 def test_station_that_falls_silent_ends_the_request() -> None:
@@ -469,8 +469,8 @@ def test_station_that_falls_silent_ends_the_request() -> None:
     plc.faults = InjectedFaults(silent=True)
     bench.driver.request_counters(1)
     bench.run(5.0)
-    assert bench.driver.health.known(1).no_counters
-    assert bench.driver.health.counters_wanted == set()
+    assert bench.driver.checks.known(1).no_counters
+    assert bench.driver.checks.counters_wanted == set()
 
 
 def test_lost_port_ends_the_request() -> None:
@@ -479,17 +479,17 @@ def test_lost_port_ends_the_request() -> None:
     bench.run(1.0)
     bench.driver.request_counters(1)
     bench.lose_port()
-    assert bench.driver.health.known(1).no_counters == 'port lost: unplugged'
-    assert bench.driver.health.counters_wanted == set()
+    assert bench.driver.checks.known(1).no_counters == 'port lost: unplugged'
+    assert bench.driver.checks.counters_wanted == set()
     bench.driver.request_counters(1)
-    assert bench.driver.health.counters_wanted == set()
+    assert bench.driver.checks.counters_wanted == set()
 
 
 def test_lost_port_ends_a_request_that_waits_for_its_turn() -> None:
     bench, _, (ears,) = make_bench(word())
     bench.open()
     bench.run(1.0)
-    health = bench.driver.health
+    health = bench.driver.checks
     bench.driver.request_counters(1)
     assert health.is_due(bench.clock())  # it is among the checks now, and not on the line yet
     bench.lose_port()

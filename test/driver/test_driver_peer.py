@@ -389,7 +389,7 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     bench = Bench([word, lamp], family='SLC', outstanding=outstanding, processor_period=2.0)
     bench.start()
     bench.run(1.0)
-    health = bench.driver.health
+    health = bench.driver.checks
     assert health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
     bench.plc.processor.setting = Setting.PROGRAM
     bench.driver.request_counters(PLC)

@@ -218,11 +218,11 @@ def test_processor_of_a_station_behind_the_master() -> None:
     bench = Bench([make_mapping('N7:0', station=PLC, plc='SLC')],
                   DriverSettings(processor_period=2.0))
     bench.run(1.0)
-    assert bench.driver.health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
+    assert bench.driver.checks.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
     bench.plc.processor.setting = Setting.TEST
     bench.driver.request_counters(PLC)
     bench.run(3.0)
-    known = bench.driver.health.known(PLC)
+    known = bench.driver.checks.known(PLC)
     assert known.processor == 'SLC 5/03 series A revision 1, REM TEST'
     assert int(known.counters['polls received']) > 0
 

@@ -28,9 +28,9 @@ import math
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.fallbacks import FallbackCause, FallbackRow
+from abdf1_ros.driver.fallback_rows import FallbackCause, FallbackRow
 from abdf1_ros.driver.guards import CounterGuard, RunGuard
-from abdf1_ros.driver.heartbeats import BeatState, LARGEST
+from abdf1_ros.driver.heartbeat_rows import BeatState, LARGEST
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
 from abdf1_ros.pccc.data_table import DataTable

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from abdf1_ros.driver.heartbeats import HeartbeatRow
+from abdf1_ros.driver.heartbeat_rows import HeartbeatRow
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat

@@ -15,10 +15,14 @@
 
 from __future__ import annotations
 
+import importlib
+from pathlib import Path
+
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.settings.heartbeats import Fallback, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+import pytest
 from support.counting import lines_run
 from support.driver_bench import DriverBench, store
 from support.mappings import make_mapping
@@ -85,3 +89,10 @@ def work_of_a_transaction(fallback: Fallback | None) -> float:
 
 def test_transaction_costs_little_more_with_900_fallbacks() -> None:
     assert work_of_a_transaction(Fallback((7,), 60_000)) < 2 * work_of_a_transaction(None)
+
+
+def test_read_in_a_loop_without_waiting_is_130_calls_at_most(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / 'benchmarks'))
+    benchmark = importlib.import_module('cpu_time')
+    assert benchmark.measure_without_waiting(loops=1)[1] <= 130

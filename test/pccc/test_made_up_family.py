@@ -179,14 +179,14 @@ def main() -> None:
                         settings=DriverSettings(processor_period=0.5))
     plc = bench.plc(1, 'TOY', ('W0', 256))
     bench.run(1.0)
-    bench.driver.health.request_counters(1)
+    bench.driver.checks.request_counters(1)
     bench.write(words, [*range(50)])
     bench.write(bit, [1])
     bench.run(2.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN] * 2, bench.listener.outcomes()
     assert bench.listener.values(words)[-1] == [*range(50)]
     assert stored(plc, 'W3') == b'\x00\x04'
-    health = bench.driver.health.known(1)
+    health = bench.driver.checks.known(1)
     assert health.identity is not None and health.identity.plc_type == TOY
     assert health.counters.keys() == {SENT, RECEIVED}
 

@@ -26,8 +26,8 @@ from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.fallbacks import FallbackCause
-from abdf1_ros.driver.heartbeats import BeatState
+from abdf1_ros.driver.fallback_rows import FallbackCause
+from abdf1_ros.driver.heartbeat_rows import BeatState
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
 from abdf1_ros.messages import Event, Message

@@ -122,7 +122,7 @@ class Desk:
         self.driver = Driver(
             Network(), mappings, DriverSettings(), Recorder(time.monotonic))
         self.driver.is_online = True
-        self.driver.health.begin(0.0)
+        self.driver.checks.begin(0.0)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.service = LinkCounterService(self.driver, self.link.wake)
         observer.node.create_service(Trigger, '~/read', self.service.answer,
@@ -135,7 +135,7 @@ class Desk:
 
     def work(self, replies: dict[int, bytes]) -> None:
         """Let stations answer; the service looks for it afterwards."""
-        wanted = self.driver.health.counters_wanted
+        wanted = self.driver.checks.counters_wanted
         self.observer.until(lambda: len(wanted) == 2, 'requests')
         while not wanted.isdisjoint(replies):
             task = self.driver.next_task(self.driver.machine.now)
@@ -182,7 +182,7 @@ def test_service_gives_up(desk: Desk) -> None:
 
 def test_service_ends_with_the_port(desk: Desk) -> None:
     desk.work({})
-    desk.driver.health.end('port lost: unplugged')
+    desk.driver.checks.end('port lost: unplugged')
     desk.service.check(time.monotonic())
     assert desk.result() == (
         False, 'station 1: port lost: unplugged; station 2: port lost: unplugged')
