@@ -43,9 +43,9 @@ from abdf1_ros.driver.interlocks import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.driver.reads import Reads
 from abdf1_ros.driver.writes import WriteQueue
+from abdf1_ros.plan.interlocks import OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
-MAX_OWN_IN_A_ROW = 7
 MOST_BETWEEN_GUESTS = 3
 
 
@@ -81,10 +81,14 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
-        is_reads_turn = self._own_in_a_row >= MAX_OWN_IN_A_ROW
+        is_reads_turn = self._own_in_a_row >= OWN_IN_A_ROW
         self._own_in_a_row *= not is_reads_turn
         if is_reads_turn and (read := self._read(now, busy)):
             return read
+        # The rest of a long fallback first: heartbeats that are always due would keep it waiting.
+        if under_way := self._tasks.first(busy, is_own=True):
+            self._own_in_a_row += 1
+            return self._tasks.take(under_way, now)
         own = self._interlocks.next(now, busy) if self._interlocks else None
         self._own_in_a_row += own is not None
         return own or self._usual(now, busy)

@@ -208,6 +208,9 @@ class FallbackRow:
             self._is_unconfirmed = True
             if self.stands:
                 self._counts_from = requested
+            elif self.state is FallbackState.DUE and not self.is_first_try:
+                # It may have been written over a fallback that the PLC has not confirmed.
+                self._due_since = max(self._due_since, requested + self.after)
         else:
             return
         self._go(FallbackEvent.MESSAGE_WRITTEN)

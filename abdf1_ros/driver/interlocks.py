@@ -56,9 +56,13 @@ class OwnWrite(WriteJob):
     It must not be sent after ``expires`` (clock value in s): its value may be wrong by then.
     """
 
+    is_own = True
+
     def __init__(self, row: OwnRow, write: Write, writing: WritesUnderWay, interlocks: Interlocks,
                  expires: float = math.inf) -> None:
         super().__init__(write, writing)
+        # Of a fallback each packet goes out: the PLC may carry out what it does not answer.
+        self.goes_on = isinstance(row, FallbackRow)
         self.row = row
         self.expires = expires
         self._interlocks = interlocks

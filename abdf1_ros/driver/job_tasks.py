@@ -48,7 +48,8 @@ class Job:
     The reply to the first command has ``reply_size`` bytes after its header, 0 where that is not
     known. That command must not be sent after ``expires`` (clock value in s); each later one has
     ``patience`` s after the command before it, without that command's own time on the line.
-    ``is_probe`` tells that a silent station is asked whether it is there again.
+    ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
+    nobody has asked for it: a heartbeat or a fallback.
     """
 
     station: int
@@ -56,6 +57,7 @@ class Job:
     expires = math.inf
     patience = 0.0
     is_probe = False
+    is_own = False
 
     def steps(self, now: float) -> Steps[None]:
         """Return what is to be done from ``now`` on (clock value in s)."""
@@ -90,9 +92,10 @@ class JobTasks:
         """Return the task of a new job with its first command."""
         return JobTask(self, job, now)
 
-    def first(self, busy: Container[int]) -> JobTask | None:
-        """Return the first that waits, but not for a ``busy`` station."""
-        return next((task for task in self.waiting if task.station not in busy), None)
+    def first(self, busy: Container[int], is_own: bool = False) -> JobTask | None:
+        """Return the first that waits, but not for a ``busy`` station; only our own if asked."""
+        return next((task for task in self.waiting if task.station not in busy
+                     and task.job.is_own >= is_own), None)
 
     def take(self, task: JobTask, now: float) -> JobTask:
         """Return a waiting task that is now to be sent."""

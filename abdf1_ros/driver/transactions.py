@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST, is_local_status
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
@@ -30,22 +30,34 @@ REWRITTEN = ('by reading the word and writing it back; a change that the PLC mad
              'lost')
 
 
-def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
-    """Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds."""
-    done, detail = 0, ''
-    try:
-        for packet in range(len(write.commands)):
+def carry_out(write: Write, clock: Callable[[], float], *,
+              goes_on: bool = False) -> Steps[WriteResult]:
+    """
+    Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
+
+    With ``goes_on`` also after one that was refused, or that the station has not replied to: it
+    may carry out the others.
+    """
+    done, detail, failed = 0, '', None
+    for packet in range(len(write.commands)):
+        try:
             detail = (yield from _send(write, packet)) or detail
             done += 1
-    except RemoteError as error:
-        outcome = Outcome.UNKNOWN if is_local_status(error.sts) else Outcome.FAILED
-        return _ended_early(write, outcome, clock(), done, error)
-    except LinkError as error:
-        outcome = Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
-        return _ended_early(write, outcome, clock(), done, error)
+        except (RemoteError, LinkError) as error:
+            failed = failed or error
+            if not goes_on or not isinstance(error, (RemoteError, CommandTimeout)):
+                break
+    if failed is not None:
+        return _ended_early(write, _outcome_of(failed), clock(), done, failed)
     is_broadcast = write.mapping.station == BROADCAST
     outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
     return write.result(outcome, detail, clock(), done)
+
+
+def _outcome_of(error: RemoteError | LinkError) -> Outcome:
+    if isinstance(error, RemoteError):
+        return Outcome.UNKNOWN if is_local_status(error.sts) else Outcome.FAILED
+    return Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
 
 
 def _send(write: Write, packet: int) -> Steps[str]:

@@ -38,12 +38,13 @@ class WriteJob(Job):
         self.station = write.mapping.station
         self.result: WriteResult | None = None
         self.begun = write.requested
+        self.goes_on = False  # also after a packet that is not confirmed
         self._writing = writing
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
         self.begun = now
-        self.result = yield from self._writing.carry_out(self.write, now)
+        self.result = yield from self._writing.carry_out(self.write, now, self.goes_on)
 
 
 class WritesUnderWay:
@@ -72,11 +73,11 @@ class WritesUnderWay:
         station = write.mapping.station
         write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
 
-    def carry_out(self, write: Write, now: float) -> Steps[WriteResult]:
+    def carry_out(self, write: Write, now: float, goes_on: bool) -> Steps[WriteResult]:
         """Send every packet of a write, in the packets that its station takes."""
         self._read_backs.overtaken(write, now)
         write.speak(self._planner.dialect(write.mapping))
-        return (yield from carry_out(write, lambda: self.line.now))
+        return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
 
     def ended(self, job: WriteJob) -> None:
         """Take note of the end of a write, and read its words at once where they have changed."""

@@ -21,7 +21,13 @@ from collections.abc import Sequence
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.transactions import carry_out, REWRITTEN
-from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
+from abdf1_ros.errors import (
+    CommandTimeout,
+    FormatError,
+    LinkError,
+    RemoteError,
+    StationInactive,
+)
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -82,6 +88,19 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
     assert (result.error is None) is (outcome is Outcome.WRITTEN)
     assert ('(after 1 of 2 packets were written)' in result.detail) is (
         outcome is Outcome.PARTLY)
+
+
+@pytest.mark.parametrize('answers, outcome, done', [
+    ([reply(), reply()], Outcome.WRITTEN, 2), ([CommandTimeout(), reply()], Outcome.PARTLY, 1),
+    ([CommandTimeout(), CommandTimeout()], Outcome.UNKNOWN, 0),
+    ([reply(sts=0x10), reply()], Outcome.PARTLY, 1), ([StationInactive(1)], Outcome.UNKNOWN, 0)])
+def test_write_that_goes_on_sends_each_packet_to_a_station_that_is_there(
+        answers: list[Packet | LinkError], outcome: Outcome, done: int) -> None:
+    write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
+    requests, result = converse(carry_out(write, clock, goes_on=True), answers)
+    assert isinstance(result, WriteResult)
+    assert requests == write.commands[:len(answers)]
+    assert (result.outcome, result.packets_done) == (outcome, done)
 
 
 @pytest.mark.parametrize('answers, is_unconfirmed', [

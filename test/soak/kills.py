@@ -291,6 +291,12 @@ def _download(cell: Cell) -> None:
     cell.plc.set_mode(Setting.REMOTE)
 
 
+def _wait_after_download(cell: Cell) -> None:
+    """Recover; a second download within a minute looks like another writer (rule 19)."""
+    cell.recover()
+    cell.rest(60.0)
+
+
 def _plug_in(cell: Cell) -> None:
     cell.plug_in()
     cell.recover()
@@ -318,7 +324,7 @@ DEATHS = {
     'port pulled': Death(Cell.pull, BY_PLC, after=_plug_in),
     'station silent': Death(_fall_silent, BY_PLC),
     'PROGRAM and RUN': Death(_program, SCANS + SLACK),
-    'download': Death(_download, SCANS + SLACK),
+    'download': Death(_download, SCANS + SLACK, after=_wait_after_download),
     'power cycle': Death(lambda cell: cell.plc.cycle_power(), SCANS + SLACK),
 }
 
