@@ -75,8 +75,10 @@ class Reads:
 
         It is of a station that answers and is not ``busy``.
         """
-        if self._aside and (job := self._probe(now, busy)):
-            return job
+        if self._aside:
+            self.is_due(now)  # sets reads aside of a station that has died in another way
+            if job := self._probe(now, busy):
+                return job
         passed_over = []
         while (job := self._due.take(now)) is not None:
             if not self._stations.records[job.station].replies_in_time:

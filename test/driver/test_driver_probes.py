@@ -197,3 +197,21 @@ def test_heartbeats_fallbacks_and_checks_of_late_stations_are_in_that_eighth(
     assert SLOTS / 2 < len(bench.asked) <= SLOTS + 1
     assert {*bench.asked} == bench.late
     assert len(bench.listener.times(bench.living)) - before > 0.8 * 4 * 8 * SLOTS
+
+
+def test_station_that_dies_on_a_write_is_probed_where_another_is_gone_already() -> None:
+    """Its reads wait in the queue of the living; a probe of the other would always come first."""
+    rows = [make_mapping('N7:0', 'ReadWrite', station=1, period=5000),
+            make_mapping('N7:0', station=2, period=100)]
+    bench = DriverBench(rows)
+    first = bench.plc(1, 'PLC5', ('N7:0', 4))
+    bench.plc(2, 'PLC5', ('N7:0', 4)).faults.silent = True
+    bench.run(2.0)
+    first.faults.silent = True
+    bench.write(rows[0], [1])
+    bench.run(20.0)
+    assert not bench.driver.stations[1].active
+    first.faults.silent = False
+    bench.listener.reads.clear()
+    bench.run(20.0)
+    assert bench.listener.values(rows[0])
