@@ -48,7 +48,9 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.numbers import decimal_number, whole_number
@@ -230,9 +232,11 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
     open_line: Callable[[], Port] = line.open
     if options.echo:
         open_line = lambda: _EchoingPort(line.open())  # noqa: E731
+    # Only a serial port has a real speed, which the timers have to take into account.
+    timing = Network(baud=options.baud).timing if options.port else LineTiming()
+    if options.radio:
+        machine = _radio(plcs, checksum, timing)
     if options.full_duplex is not None:
-        # Only a serial port has a real speed, which the timers have to take into account.
-        timing = Network(baud=options.baud).timing if options.port else LineTiming()
         machine = _full_duplex(plcs[0], checksum, timing)
 
         def open_faulty(open_port: Callable[[], Port] = open_line) -> Port:
@@ -270,8 +274,11 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--ladder', metavar='STATION', action='append', default=[],
                         help='its program watches a heartbeat in N10:0 and says when ROS is in '
                              'control (docs/tutorials/heartbeats.md); may be repeated')
-    parser.add_argument('--full-duplex', metavar='STATION',
+    duplex = parser.add_mutually_exclusive_group()
+    duplex.add_argument('--full-duplex', metavar='STATION',
                         help='this PLC alone, on a full-duplex line')
+    duplex.add_argument('--radio', action='store_true',
+                        help='all PLCs behind a DF1 radio modem (Mode Radio)')
     parser.add_argument('--echo', action='store_true',
                         help='the line gives back what it gets, as some two-wire adapters do')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
@@ -339,6 +346,20 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
     plc.be_full_duplex()
     return Machine(run, checksum=checksum, duplex=Duplex.FULL, timing=timing,
                    counters=plc.counters)
+
+
+def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming) -> Machine:
+    """Return a machine that is all PLCs behind one radio modem."""
+    def serve(command: Packet) -> Packet | None:
+        replies = [plc.serve(command) for plc in plcs
+                   if command.dst in (plc.station, BROADCAST) and not plc.faults.silent]
+        return replies[0] if replies else None
+
+    first, *others = plcs
+    settings = RadioSettings(first.station, checksum, also=[plc.station for plc in others])
+    return Machine(
+        lambda machine: RadioNode(machine, settings, ActiveStationList(), serve).run(first),
+        checksum=checksum, duplex=Duplex.FULL, timing=timing)
 
 
 def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThread,

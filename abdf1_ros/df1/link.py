@@ -31,8 +31,9 @@ class LinkSettings:
     """
     What a link has to know of its line; times in seconds.
 
-    ``mode`` is Master, Slave or Peer, ``polling`` of a master Message or Standard. ``timeout`` is
-    for each answer of a station, ``cmd_timeout`` for a reply.
+    ``mode`` is Master, Slave, Peer or Radio, ``polling`` of a master Message or Standard.
+    ``timeout`` is for each answer of a station, ``cmd_timeout`` for a reply. ``store_forward`` is
+    that of a radio modem node.
     """
 
     mode: str
@@ -44,11 +45,12 @@ class LinkSettings:
     timeout: float = 1.0
     cmd_timeout: float = 1.0
     polling: str = 'Message'
+    store_forward: tuple[int, ...] = ()
 
     @property
     def duplex(self) -> Duplex:
         """Return the line discipline of the mode."""
-        return Duplex.FULL if self.mode == 'Peer' else Duplex.HALF
+        return Duplex.FULL if self.mode in ('Peer', 'Radio') else Duplex.HALF
 
 
 @dataclass(slots=True)

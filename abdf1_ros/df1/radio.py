@@ -40,7 +40,15 @@ from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame
 from abdf1_ros.df1.link import LinkStatus, NO_STATUS
-from abdf1_ros.df1.machine import Heard, Machine, MIN_RESPONSE_TIME, Procedure, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    LineTiming,
+    Machine,
+    MIN_RESPONSE_TIME,
+    Procedure,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -63,9 +71,23 @@ _QUIET_CHARACTERS = 20
 _MOST_BACK_OFF = 8
 
 # A line that is never quiet does not keep us from it for longer (s).
-_LONGEST_WAIT = 2.0
+LONGEST_WAIT = 2.0
+
+_SHORT_FRAME = 24  # characters of a command that reads
 
 _MOMENT = 0.0001  # s after the last byte
+
+
+def usual_wait(timing: LineTiming) -> float:
+    """Return the seconds that a first try waits on a quiet line, mostly."""
+    most = MIN_RESPONSE_TIME + timing.tx_delay + _SHORT_FRAME * timing.char_time
+    return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time + most / 2
+
+
+def longest_wait(timing: LineTiming, frames_time: float) -> float:
+    """Return the seconds until a frame has left, and any that was coming in, at most."""
+    return LONGEST_WAIT + timing.tx_delay + 2 * frames_time \
+        + MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +96,8 @@ class RadioSettings:
     The settings of a node, times in seconds.
 
     A command is sent again ``retries`` times, each ``cmd_timeout`` after the one before. Packets
-    between nodes of ``store_forward`` are sent again; 255 in it stands for broadcasts.
+    between nodes of ``store_forward`` are sent again; 255 in it stands for broadcasts. ``also``
+    are further numbers that are ours: of PLCs that are simulated by one node.
     """
 
     station: int
@@ -82,6 +105,12 @@ class RadioSettings:
     retries: int = 3
     cmd_timeout: float = 1.0
     store_forward: Collection[int] = ()
+    also: Collection[int] = ()
+
+    @property
+    def numbers(self) -> set[int]:
+        """Return the numbers that this node answers to."""
+        return {self.station, *self.also}
 
 
 @dataclass(slots=True)
@@ -97,12 +126,13 @@ class RadioNode:
     """
     Carry out tasks on the line of ``machine``, one at a time, and serve commands that come.
 
-    ``serve`` executes a command and returns its reply; it is called once for each command.
+    ``serve`` executes a command and returns its reply, if it gives one; it is called once for each
+    command.
     ``report`` is called with every numbered error and notice. ``random`` gives times by chance.
     """
 
     def __init__(self, machine: Machine, settings: RadioSettings, stations: ActiveStationList,
-                 serve: Callable[[Packet], Packet],
+                 serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None,
                  random: Random | None = None) -> None:
         self._machine = machine
@@ -193,7 +223,7 @@ class RadioNode:
         quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * machine.char_time
         most = min(1 << count, _MOST_BACK_OFF) * (
             MIN_RESPONSE_TIME + machine.tx_delay + len(frame) * machine.char_time)
-        give_up = machine.now + _LONGEST_WAIT
+        give_up = machine.now + LONGEST_WAIT
         pause = quiet + self._random.uniform(0.0, most)
         begun = machine.now
         while (left := min(begun + pause, give_up) - machine.now) > 0:
@@ -232,9 +262,9 @@ class RadioNode:
             self._report(count_fault(symbol, self._settings.checksum, self._counters))
             return
         packet = Packet.decode(symbol.data)
-        if packet.src == self._settings.station:
+        if packet.src in self._settings.numbers:
             return  # ours, sent on by another node
-        is_ours = packet.dst in (self._settings.station, BROADCAST)
+        is_ours = packet.dst in self._settings.numbers or packet.dst == BROADCAST
         known = self._known(symbol.data)
         recent = known or self._remember(symbol.data)
         if known is None and {packet.src, packet.dst} <= {*self._settings.store_forward}:

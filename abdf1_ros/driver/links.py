@@ -27,6 +27,7 @@ from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
 from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
@@ -77,6 +78,10 @@ def make_link(line: LinkSettings, settings: DriverSettings, machine: Machine,
             line.checksum, line.nak_retries, line.enq_retries, line.timeout, line.cmd_timeout,
             settings.max_outstanding, settings.duplicate_detection, line.station)
         return FullDuplexPeer(machine, peer_settings, stations, serve, report)
+    if line.mode == 'Radio':
+        radio_settings = RadioSettings(line.station, line.checksum, line.nak_retries,
+                                       line.cmd_timeout, line.store_forward)
+        return RadioNode(machine, radio_settings, stations, serve, report)
     if line.mode == 'Slave':
         slave_settings = SlaveSettings(
             line.station, line.checksum, line.nak_retries,

@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
+from abdf1_ros.df1.radio import LONGEST_WAIT, usual_wait
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -41,7 +42,8 @@ PATIENCE = 4
 
 def line_model(network: Network) -> LineModel:
     """Return the line of a net CSV."""
-    return LineModel(network.checksum, network.duplex, network.timing)
+    wait = usual_wait(network.timing) if network.mode == 'Radio' else 0.0
+    return LineModel(network.checksum, network.duplex, network.timing, wait)
 
 
 def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> float:
@@ -115,11 +117,15 @@ def longest_transaction(network: Network) -> float:
 
     The time of the frames on the line has to be added.
     """
+    if network.mode == 'Radio':
+        return (network.nak_retries + 1) * (network.cmd_timeout / 1000 + LONGEST_WAIT)
     tries = network.nak_retries + 1 + network.enq_retries + 1
     return (tries * network.timeout + network.cmd_timeout) / 1000
 
 
 def longest_probe(network: Network) -> float:
-    """Return the seconds that one poll of a silent station takes."""
+    """Return the seconds that one poll of a silent station takes, or one command by radio."""
+    if network.mode == 'Radio':
+        return network.cmd_timeout / 1000 + usual_wait(network.timing)
     return max(network.timeout / 1000, MIN_RESPONSE_TIME) + network.timing.tx_delay \
         + _POLL_CHARACTERS * network.timing.char_time

@@ -27,6 +27,7 @@ import math
 
 from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
+from abdf1_ros.df1.radio import longest_wait
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.planner import Block, Planner
@@ -180,6 +181,9 @@ class Times:
     def _at_most(self, frames: float) -> float:
         """Return the seconds of a transaction whose ``frames`` take so long (s) on the line."""
         network, char_time = self._network, self._network.timing.char_time
+        if network.mode == 'Radio':  # in each try a packet of another may go before ours
+            sends = longest_wait(network.timing, self._any_frames)
+            return sends + (network.nak_retries + 1) * (2 * sends + network.cmd_timeout / 1000)
         longest = max(network.nak_retries, network.enq_retries) + 1
         # A frame that breaks off is over after a pause, and a peer pauses after NAKs and retries.
         quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time

@@ -43,11 +43,12 @@ class ReadRequest:
 
 @dataclass(frozen=True, slots=True)
 class LineModel:
-    """A line with this check, discipline and timing."""
+    """A line with this check, discipline and timing; ``wait`` is s before a command goes out."""
 
     checksum: Checksum
     duplex: Duplex
     timing: LineTiming
+    wait: float = 0.0
 
     def read_time(self, dialect: Dialect, request: ReadRequest, station: int = 0) -> float:
         """Return the seconds that a read takes of a station that answers at once."""
@@ -64,7 +65,8 @@ class LineModel:
         """
         characters = _overhead(self.duplex, self.checksum, station) + command + reply
         transmissions = 3 if self.duplex is Duplex.HALF else 2
-        return characters * self.timing.char_time + transmissions * self.timing.tx_delay
+        return self.wait + characters * self.timing.char_time \
+            + transmissions * self.timing.tx_delay
 
 
 @cache

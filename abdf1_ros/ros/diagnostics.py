@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from abdf1_ros.df1.echo import COMES_BACK
-from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import Freshness, ReadPoint, WriteResult
@@ -194,9 +193,10 @@ class Diagnostics:
 
     def echo_text(self) -> str:
         """Return what to tell of a line that echoes where that does harm, mostly nothing."""
-        is_full_duplex = self._driver.network.duplex is Duplex.FULL
+        mode = self._driver.network.mode  # by radio a node that sends on gives our packets back
         nobody_answers = not any(station.active for station in self._driver.stations)
-        does_harm = self._driver.machine.echoes and (is_full_duplex or nobody_answers)
+        does_harm = self._driver.machine.echoes and mode != 'Radio' and (
+            mode == 'Peer' or nobody_answers)
         return COMES_BACK if does_harm else ''
 
     def _link_values(self, now: float) -> dict[str, str]:

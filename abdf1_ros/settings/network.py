@@ -27,6 +27,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
@@ -35,13 +36,14 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.csv_table import read_table, Row, shown
 from abdf1_ros.settings.hints import hint
 from abdf1_ros.settings.share import share_places
-from abdf1_ros.settings.station_lists import octal_remarks
+from abdf1_ros.settings.station_lists import octal_remarks, parse_stations
 
-MODES = ('Master', 'Slave', 'Peer')
+MODES = ('Master', 'Slave', 'Peer', 'Radio')
 _MODE_WORDS = {
     'fullduplex': 'Peer', 'full': 'Peer', 'df1fullduplex': 'Peer', 'peertopeer': 'Peer',
     'halfduplex': 'Master, or Slave where another is the master', 'df1halfduplexmaster': 'Master',
-    'halfduplexmaster': 'Master', 'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave'}
+    'halfduplexmaster': 'Master', 'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave',
+    'df1radiomodem': 'Radio', 'radiomodem': 'Radio'}
 POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
@@ -126,7 +128,8 @@ class Network:
         message=Message.CRT_BAD_STATION_ID, message_args=(255,))
     mode: str = _net(
         'Mode', 'Master', 'driver mode', choices=MODES,
-        message=Message.CRT_BAD_DRIVER_MODE, message_args=MODES, other_words=_MODE_WORDS)
+        message=Message.CRT_BAD_DRIVER_MODE,
+        message_args=('Master', 'Slave, Peer', 'Radio'), other_words=_MODE_WORDS)
     plc_type: str = _net(
         'PLC_Type', 'PLC5', 'PLC that this node emulates', choices=PLC_TYPES,
         message=Message.CRT_BAD_PLC_TYPE, message_args=PLC_TYPES)
@@ -164,6 +167,9 @@ class Network:
         'pty:/name, tcp:port, tcp:address:port, or a serial device')
     share_access: str = _net(
         'Share_Access', 'Read', 'what they may do', choices=('Read', 'Write', 'All'))
+    store_forward: str = _net(
+        'Store_Forward', '', 'Mode Radio: nodes between which packets are sent on, as in 1,3-5; '
+        '255 for broadcasts')
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
@@ -177,7 +183,8 @@ class Network:
         """Return what a link has to know of it."""
         return LinkSettings(
             self.mode, self.station, self.checksum, self.timing, self.nak_retries,
-            self.enq_retries, self.timeout / 1000, self.cmd_timeout / 1000, self.polling)
+            self.enq_retries, self.timeout / 1000, self.cmd_timeout / 1000, self.polling,
+            parse_stations(self.store_forward, BROADCAST)[0])
 
     @property
     def duplex(self) -> Duplex:
@@ -256,11 +263,15 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
             checked[name] = FIELDS[name].parse(text, where)
             _check_port(name, checked[name], where)
             _check_share(name, checked, where)
+            _check_nodes(name, checked[name], where)
         except Problem as problem:
             problems.append(problem)
     if checked['share'] and checked['mode'] == 'Slave':
         problems.append(Problem(values.get('share', ('', 'Share'))[1], (
             "Share needs Mode Master or Peer: a slave cannot send a guest's commands")))
+    if checked['share'] and checked['mode'] == 'Radio':
+        problems.append(Problem(values.get('share', ('', 'Share'))[1], (
+            'Share needs Mode Master or Peer: in Mode Radio it has not been tried')))
     if problems:
         raise ConfigurationError(problems)
     given = {FIELDS[name].column for name in values}
@@ -285,6 +296,11 @@ def _check_share(name: str, checked: MappingType[str, Any], where: Place | str) 
         share_places(checked['share'])
     except ValueError as error:
         raise Problem(where, f'Share: {error}') from None
+
+
+def _check_nodes(name: str, value: int | str, where: Place | str) -> None:
+    if name == 'store_forward' and (faults := parse_stations(str(value), BROADCAST)[1]):
+        raise Problem(where, f'Store_Forward = {faults[0]}')
 
 
 def _is_url(text: str) -> bool:

@@ -42,7 +42,7 @@ def network_remarks(network: Network) -> Iterator[str]:
     if network.data_bits < 8:
         yield (f'Data_Bits {network.data_bits}: DF1 sends bytes of 8 bits; with less the check of '
                'nearly every message fails')
-    if network.mode != 'Slave':
+    if network.mode in ('Master', 'Peer'):
         yield from _time_remarks(network)
     yield from share_remarks(share_places(network.share))
 

@@ -27,15 +27,15 @@ from abdf1_ros.settings.csv_table import Row
 _LEADING_ZERO = re.compile(r'0[0-7]+')
 
 
-def parse_stations(text: str) -> tuple[tuple[int, ...], list[str]]:
+def parse_stations(text: str, most: int = MAX_STATION) -> tuple[tuple[int, ...], list[str]]:
     """Return the stations of a list in its order, each once, and what is wrong with it."""
     stations: list[int] = []
     faults: list[str] = []
     for part in filter(None, map(str.strip, text.split(','))):
         first, dash, last = map(str.strip, part.partition('-'))
         low, high = whole_number(first), whole_number(last if dash else first)
-        if low is None or high is None or not 0 <= low <= high <= MAX_STATION:
-            faults.append(f'"{part}" should be a station from 0 to {MAX_STATION}, '
+        if low is None or high is None or not 0 <= low <= high <= most:
+            faults.append(f'"{part}" should be a station from 0 to {most}, '
                           'or a range such as 3-5; put commas between them')
         else:
             stations += range(low, high + 1)

@@ -26,7 +26,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, ENQ, message_frame, NAK
 from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.radio import longest_wait, RadioNode, RadioSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event
@@ -222,6 +222,13 @@ def test_broadcast_is_sent_on_where_the_table_has_255() -> None:
     assert bench.executed == {(PLC, THEIRS.tns): 1}
 
 
+def test_numbers_that_are_ours_too_are_served() -> None:
+    bench = Bench(also=[7])
+    bench.hear(framed(THEIRS._replace(dst=7)))
+    assert len(bench.wait(1.0)) == 1
+    assert bench.executed == {(PLC, THEIRS.tns): 1}
+
+
 # Many nodes on the air
 
 
@@ -242,6 +249,11 @@ class Part(bytes):
     """Bytes of a signal."""
 
     signal: Signal
+
+    def __add__(self, other: bytes) -> bytes:
+        """Stay what it is: nothing is handed over together."""
+        assert not other
+        return self
 
 
 class Air(VirtualLine):
@@ -288,6 +300,9 @@ class Air(VirtualLine):
                     other for other in self._signals[receiver] if other.end > self.now] + [signal]
                 if receiver != sender:
                     self._arrive(data, signal, receiver)
+
+    def _rest_for(self, receiver: int) -> bytes:
+        return b''
 
     def _arrive(self, data: bytes, signal: Signal, receiver: int) -> None:
         """Let the first bytes be heard at once, so that others hold back, and the rest."""
@@ -351,3 +366,28 @@ def test_nothing_is_executed_twice_nothing_is_wrong_and_everything_ends(
         assert air.sent.count(framed(reply)) <= count + retries
     if loss == 0.0 and count == 3:
         assert good >= 15
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_transaction_ends_within_its_bound_whatever_the_others_send(seed: int) -> None:
+    random, retries = Random(seed), 2
+    nodes = [Node(RadioSettings(number, Checksum.CRC, retries, CMD_TIMEOUT), lambda: air.now, seed)
+             for number in range(1, 6)]
+    air = Air([node.machine for node in nodes], everybody, 0.3, seed)
+    air.start()
+    for node in nodes:
+        node.stations.add(range(1, 6))
+    ours = nodes[0]
+    frame = len(framed(Packet(2, 1, 0x0F, 0, 0, bytes(200)))) * char_time(BAUD)
+    sends = longest_wait(LineTiming(char_time(BAUD)), frame)
+    bound = sends + (retries + 1) * (2 * sends + CMD_TIMEOUT)
+    for tns in range(30):
+        for src, node in enumerate(nodes[1:], 2):
+            dst = random.choice([number for number in range(1, 6) if number != src])
+            node.add(Packet(dst, src, 0x0F, 0, tns, random.randbytes(200)))
+            air.wake(node.machine)
+        task = ours.add(Packet(2, 1, 0x0F, 0, tns, random.randbytes(200)))
+        ours.stations.heard(2, air.now)  # with all tries
+        air.wake(ours.machine)
+        air.run(lambda task=task: task.result is not None, 2 * bound)
+        assert task.seconds <= bound

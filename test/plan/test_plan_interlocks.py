@@ -44,7 +44,8 @@ def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mappin
 
 
 @pytest.mark.parametrize('network, seconds', [
-    (Network(), 9.0), (Network(timeout=300, cmd_timeout=500), 2.9), (QUICK, 1.3)])
+    (Network(), 9.0), (Network(timeout=300, cmd_timeout=500), 2.9), (QUICK, 1.3),
+    (replace(QUICK, mode='Radio'), 5.0)])
 def test_longest_transaction_is_that_of_the_settings(network: Network, seconds: float) -> None:
     assert longest_transaction(network) == pytest.approx(seconds)
 

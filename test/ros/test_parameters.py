@@ -218,8 +218,8 @@ def test_own_parameter_has_the_value_and_type_that_was_given(
      '2552 CRT_BAD_STATION_ID: Invalid station number (5.0) must be less than 255; '
      'Station = "5.0" should be a whole number from 0 to 254'),
     ('net.mode', 'Client',
-     '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Client), should be one of Master, Slave, or '
-     'Peer; Mode = "Client" should be one of Master, Slave, Peer'),
+     '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Client), should be one of Master, Slave, '
+     'Peer, or Radio; Mode = "Client" should be one of Master, Slave, Peer, Radio'),
     ('net.cmd_timeout', 5001,
      '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (5001) should be in range [500, 5000]; '
      'Cmd_Timeout = "5001" should be a whole number from 500 to 5000 ms'),

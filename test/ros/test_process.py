@@ -263,7 +263,7 @@ def test_every_fault_of_the_net_file_is_told(files: Files, refusal: Refusal) -> 
         f'{files.net}:2:1 (Station): 2552 CRT_BAD_STATION_ID: '
         'Invalid station number (255) must be less than 255',
         f'{files.net}:2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: '
-        'Invalid Driver Mode (Client), should be one of Master, Slave, or Peer',
+        'Invalid Driver Mode (Client), should be one of Master, Slave, Peer, or Radio',
         f'{files.net}:2:3 (PLC_Type): 2555 CRT_BAD_PLC_TYPE: '
         'Invalid or Unsupported PLC Type (PLC7) should be one of PLC2, PLC3, PLC5, SLC',
         f'{files.net}:2:4 (Error_Code): 2556 CRT_BAD_ERROR_CODE: '

@@ -199,8 +199,8 @@ def test_requires_that_names_no_write_topic(tmp_path: Path, requires: str, expec
         '!2:2 (Timeout): Timeout = "1 s" should be a whole number from 0 to 360000 ms']),
     ('Com_Port,Mode\n1,Peеr\n', [
         '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Peеr), should be one of '
-        'Master, Slave, or Peer; Mode = "Peеr" should be one of Master, Slave, Peer; character 3 '
-        'is U+0435 CYRILLIC SMALL LETTER IE, not "e"']),
+        'Master, Slave, Peer, or Radio; Mode = "Peеr" should be one of Master, Slave, Peer, '
+        'Radio; character 3 is U+0435 CYRILLIC SMALL LETTER IE, not "e"']),
 ])
 def test_what_is_told_of_a_net_file(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_net(tmp_path, text) == expected

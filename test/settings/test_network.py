@@ -19,6 +19,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.messages import Severity
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import (
@@ -71,11 +72,11 @@ def faults(path: Path, header: str, row: str) -> list[str]:
     return [str(problem).replace(str(path), 'FILE') for problem in caught.value.problems]
 
 
-def test_columns_are_those_of_the_specification_and_polling() -> None:
+def test_columns_are_those_of_the_specification_polling_and_radio() -> None:
     assert [entry.column for entry in FIELDS.values()] == [
         'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
         'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
-        'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access']
+        'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access', 'Store_Forward']
 
 
 def test_columns_that_are_left_out_have_defaults() -> None:
@@ -137,8 +138,8 @@ def test_choice_that_is_none(
      '2552 CRT_BAD_STATION_ID: Invalid station number (abc) must be less than 255; '
      'Station = "abc" should be a whole number from 0 to 254'),
     ('Mode', 'Boss',
-     '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Boss), should be one of Master, Slave, or '
-     'Peer; Mode = "Boss" should be one of Master, Slave, Peer'),
+     '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Boss), should be one of Master, Slave, '
+     'Peer, or Radio; Mode = "Boss" should be one of Master, Slave, Peer, Radio'),
     ('PLC_Type', 'PLC4',
      '2555 CRT_BAD_PLC_TYPE: Invalid or Unsupported PLC Type (PLC4) should be one of PLC2, '
      'PLC3, PLC5, SLC; PLC_Type = "PLC4" should be one of PLC2, PLC3, PLC5, SLC'),
@@ -194,7 +195,7 @@ def test_mode_in_the_words_of_other_programs_is_translated(
     problem, = faults(path, 'Mode', mode)
     assert problem.startswith('FILE:2:1 (Mode): 2553 CRT_BAD_DRIVER_MODE: ')
     assert problem.endswith(
-        f'; Mode = "{mode}" should be one of Master, Slave, Peer; "{mode}" is {meant}')
+        f'; Mode = "{mode}" should be one of Master, Slave, Peer, Radio; "{mode}" is {meant}')
 
 
 def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
@@ -297,3 +298,10 @@ def test_any_text_gives_a_network_or_a_configuration_error(name: str, text: str)
 def test_shipped_file_is_good() -> None:
     path = Path(__file__).resolve().parent.parent.parent / 'config' / 'net.csv'
     assert load_network(str(path)).baud == 19200
+
+
+def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
+    network = load(path, 'Mode,Store_Forward', 'Radio,"1-3, 7, 255"')
+    assert (network.duplex, network.line.store_forward) == (Duplex.FULL, (1, 2, 3, 7, 255))
+    with pytest.raises(ConfigurationError, match='Store_Forward = "256" should be a station from'):
+        load(path, 'Mode,Store_Forward', 'Radio,"1,256"')

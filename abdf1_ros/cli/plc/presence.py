@@ -152,11 +152,12 @@ def hint(session: Session, error: Abdf1Error) -> str:
     received, network = session.counters.chars_received, session.network
     if session.counters.messages_received + session.counters.acks_received:
         return ''
-    duplex = 'full' if network.mode == MODES['full'] else 'half'
+    kinds = {MODES['full']: 'full duplex', 'Radio': 'radio modem'}
+    duplex = kinds.get(network.mode, 'half duplex')
     cause = SILENCE if not received else (
         f'{received} characters came, but no answer that makes sense: baud rate, parity, check, '
         'duplex, or another master?')
-    return (f'asked with {network.baud} baud, parity {network.parity}, {duplex} duplex, '
+    return (f'asked with {network.baud} baud, parity {network.parity}, {duplex}, '
             f'{network.error_code}: {cause} "plc detect" tries other settings')
 
 

@@ -524,6 +524,23 @@ def test_detect_finds_nobody_in_an_echo(
     assert 'characters came' not in said.err
 
 
+def test_plcs_behind_a_radio_modem(
+        tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'line')
+    net = write_csv(tmp_path / 'net.csv', 'Mode,Cmd_Timeout', ['Radio,1000'])
+    line = ('--net', str(net), '--port', port)
+    with running_simulator('--pty', port, '--data', str(files.simulator), '--radio',
+                           '--at', '0 silent 2') as process:
+        process.wait_for('station 2: silent')
+        assert call(main, capsys, 'read', 'N7:0', *line).good_lines == ['N7:0 1200']
+        write = 'write', 'N7:0', '7', '--yes', '--station', '1'
+        assert call(main, capsys, *write, *line).status == 0
+        assert call(main, capsys, 'read', 'N7:0', *line).good_lines == ['N7:0 7']
+        silent = call(main, capsys, 'status', '2', *line)
+        assert silent.status == 1
+        assert 'Slave Station (2) Inactive' in silent.err and 'radio modem, CRC' in silent.err
+
+
 def test_commands_work_over_a_tcp_connection(
         files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:

@@ -1,0 +1,111 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver over radio modems: reads, writes, heartbeats and fallbacks of two PLCs."""
+
+from __future__ import annotations
+
+from random import Random
+
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming, Machine
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.points import Outcome
+from abdf1_ros.plan.interlocks import Times
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.network import Network
+import pytest
+from support.driver_bench import DriverBench, simulated_plc, store, stored
+from support.mappings import make_mapping
+from support.virtual_line import char_time, VirtualLine
+
+FIRST, SECOND = 1, 2
+NETWORK = Network(mode='Radio', baud=19200, cmd_timeout=500, nak_retries=1)
+
+
+class RadioBench(DriverBench):
+    """A driver, and two SLCs behind one radio modem; a share ``loss`` of all packets is lost."""
+
+    def __init__(self) -> None:
+        self.read = [make_mapping('N7:0', station=number, plc='SLC') for number in (FIRST, SECOND)]
+        self.beat = make_mapping('N10:0', 'Heartbeat', station=FIRST, plc='SLC', period=2000,
+                                 heartbeat=Heartbeat())
+        self.speed = make_mapping('N10:1', 'Write', station=FIRST, plc='SLC',
+                                  fallback=Fallback((7,), 1000))
+        rows = [*self.read, self.beat, self.speed]
+        super().__init__(rows, network=NETWORK, start=False)
+        self.loss = 0.0
+        self._random = Random(1)
+        self.plcs = {number: simulated_plc(number, 'SLC', self.clock, ('N7:0', 4), ('N10:0', 4))
+                     for number in (FIRST, SECOND)}
+        settings = RadioSettings(FIRST, also=[SECOND])
+        self.modem = Machine(
+            lambda machine: RadioNode(machine, settings, ActiveStationList(), self._serve,
+                                      random=self._random).run(self.plcs[FIRST]),
+            checksum=NETWORK.checksum, duplex=Duplex.FULL, timing=LineTiming(char_time(19200)))
+        assert isinstance(self.driver.link, RadioNode)
+        self.driver.link._random = self._random
+        self.line = VirtualLine(self.driver.machine, self.modem, baud=19200, chunk=1000)
+        self.line.noise = self
+        self.bound = next(bound for bound in Times(NETWORK, rows).bounds()
+                          if bound.mapping is self.speed)
+        self.line.start()
+
+    def damage(self, data: bytes, random: Random) -> bytes:
+        """Return a packet, or nothing."""
+        return b'' if random.random() < self.loss else data
+
+    def _serve(self, command: Packet) -> Packet | None:
+        plc = self.plcs[command.dst]
+        return None if plc.faults.silent else plc.serve(command)
+
+
+@pytest.mark.parametrize('loss', [0.0, 0.2])
+def test_values_come_over_the_air(loss: float) -> None:
+    bench = RadioBench()
+    bench.loss = loss
+    for number, value in ((FIRST, 11), (SECOND, 22)):
+        store(bench.plcs[number], 'N7:0', [value])
+    bench.run(60.0)
+    for row, value in zip(bench.read, (11, 22), strict=True):
+        assert len(bench.listener.values(row)) >= 20
+        assert {tuple(values) for values in bench.listener.values(row)} == {(value,)}
+
+
+def test_write_is_confirmed_by_its_reply() -> None:
+    bench = RadioBench()
+    bench.run(5.0)
+    bench.write(bench.speed, [5])
+    bench.run(0.9)
+    assert bench.listener.outcomes()[-1] is Outcome.WRITTEN
+    assert stored(bench.plcs[FIRST], 'N10:1') == b'\5\0'
+
+
+def test_fallback_comes_within_the_bound_that_is_printed() -> None:
+    bench = RadioBench()
+    bench.plcs[SECOND].faults.silent = True
+    bench.run(5.0)
+    for value in range(100, 104):
+        bench.write(bench.speed, [value])
+        bench.run_until(lambda value=value: (  # type: ignore[misc]
+            stored(bench.plcs[FIRST], 'N10:1')[0] == value), 30.0)
+        begun = bench.clock()
+        bench.loss = 0.1
+        bench.run_until(lambda: stored(bench.plcs[FIRST], 'N10:1') == b'\7\0', 60.0)
+        assert bench.bound.seconds is not None
+        assert bench.clock() - begun <= bench.bound.seconds
+        bench.loss = 0.0
+        bench.run(5.0)
