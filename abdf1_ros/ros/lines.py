@@ -384,9 +384,9 @@ class Lines:
         began = time.monotonic()
         nodes = [line.node for line in self.lines if line.node is not None]
         for node in nodes:
-            node.begin_end()
+            node.session.begin_end()
         for node in nodes:
-            node.finish_end(began + END_LIMIT)  # for all of them together
+            node.session.finish_end(began + END_LIMIT, 'ends')  # for all of them together
         for line in self.lines:
             line.ask_to_stop()
         for node in nodes:

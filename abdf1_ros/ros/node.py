@@ -131,12 +131,12 @@ class BridgeNode(Node):
             self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
             self.create_publisher(DiagnosticArray, '~/snapshot', 1), self._writes)
-        self._session = BridgeSession(self._surroundings, configuration)
+        self.session = BridgeSession(self._surroundings, configuration)
         self.link = self._surroundings.link = LinkThread(
             self.driver.machine, self._opener.open,
             on_state=self._port_changed, on_fault=self._fault,
-            while_sending=self._session.reads.publish_later_values)
-        self._session.begin()
+            while_sending=self.session.reads.publish_later_values)
+        self.session.begin()
         self._create_services()
 
     def _make_opener(self, configuration: Configuration) -> PortOpener:
@@ -160,11 +160,11 @@ class BridgeNode(Node):
 
     @property
     def driver(self) -> Driver:
-        return self._session.driver
+        return self.session.driver
 
     @property
     def port(self) -> str:
-        return self._session.port
+        return self.session.port
 
     @property
     def writes_taken(self) -> int:
@@ -179,15 +179,12 @@ class BridgeNode(Node):
     def start(self) -> None:
         """Open the port and begin to read."""
         self.link.start()
-        self._session.start_guests()
+        self.session.start_guests()
 
-    def begin_end(self) -> None:
-        """Have heartbeats set to 0 and fallbacks written; ``finish_end`` waits for it."""
-        self._session.begin_end()
-
-    def finish_end(self, give_up: float, what: str = 'ends') -> None:
-        """Wait until the PLCs know (rule 5 of docs/heartbeats.md), as the session does."""
-        self._session.finish_end(give_up, what)
+    def tell_plcs(self, what: str = 'ends') -> None:
+        """Have heartbeats set to 0 and fallbacks written, and wait for it (rule 5)."""
+        self.session.begin_end()
+        self.session.finish_end(time.monotonic() + END_LIMIT, what)
 
     def stop(self, patience: Duration = _LAST_WORDS) -> None:
         """
@@ -197,12 +194,11 @@ class BridgeNode(Node):
         that is stuck.
         """
         if self.link.is_alive():
-            self.begin_end()
-            self.finish_end(time.monotonic() + END_LIMIT)
+            self.tell_plcs()
         self.link.stop()
-        self._session.stop_guests()
+        self.session.stop_guests()
         self._opener.close()
-        self._session.publish_diagnostics(line_time())
+        self.session.publish_diagnostics(line_time())
         # Messages that are still under way would be lost with their publisher.
         give_up = time.monotonic() + patience.nanoseconds / 1e9
         for publisher in (self._surroundings.results, self._surroundings.diagnostics):
@@ -210,13 +206,13 @@ class BridgeNode(Node):
 
     def check(self) -> None:
         """Publish what is due."""
-        self._session.check()
+        self.session.check()
 
     def _take(self, topic: str, message: Any, info: Any) -> None:
-        self._session.write(topic, message, info)
+        self.session.write(topic, message, info)
 
     def _port_changed(self, state: PortState) -> None:
-        self._session.port_changed(state)
+        self.session.port_changed(state)
 
     def _fault(self, error: Exception) -> None:
         self.get_logger().error(f'internal error: {bug_text(error)}')
@@ -224,7 +220,7 @@ class BridgeNode(Node):
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Use the files as they are now, or go on as before where these have faults."""
         try:
-            configuration = read_again(self, self._session.configuration.parameters)
+            configuration = read_again(self, self.session.configuration.parameters)
             self._hold_ports(self.port, configuration.port)
         except ConfigurationError as error:
             for problem in error.problems:
@@ -243,15 +239,14 @@ class BridgeNode(Node):
     def _go_on_with(self, configuration: Configuration) -> bool:
         """Use the new files; return False where the link does not take them, and is broken."""
         # For heartbeats and fallbacks new files count as a start.
-        self.begin_end()
-        self.finish_end(time.monotonic() + END_LIMIT, 'goes on with new files')
-        before, self._session = self._session, BridgeSession(self._surroundings, configuration)
-        if not self.link.exchange(self.driver.machine, self._session.reads.publish_later_values,
+        self.tell_plcs('goes on with new files')
+        before, self.session = self.session, BridgeSession(self._surroundings, configuration)
+        if not self.link.exchange(self.driver.machine, self.session.reads.publish_later_values,
                                   self._opener.use(_port_settings(configuration))):
             return False
         before.end()
-        self._session.begin()
-        self._session.start_guests()
+        self.session.begin()
+        self.session.start_guests()
         declare_again(self, configuration)
         self._hold_ports(self.port)
         return True
@@ -264,21 +259,20 @@ class BridgeNode(Node):
             self.link.take()
             response.success, response.message = True, f'{self.port} is being opened'
         else:
-            self.begin_end()
-            self.finish_end(time.monotonic() + END_LIMIT, 'the port is left')
+            self.tell_plcs('the port is left')
             response.success = self.link.release()
             response.message = f'{self.port}: {self.link.state.text}'
         return response
 
     def _reset_counters(self, request: Trigger.Request,
                         response: Trigger.Response) -> Trigger.Response:
-        self._session.diagnostics.reset_counters()
+        self.session.diagnostics.reset_counters()
         response.success, response.message = True, 'all counters begin again at 0'
         return response
 
     async def _read_link_counters(self, request: Trigger.Request,
                                   response: Trigger.Response) -> Trigger.Response:
-        return await self._session.link_counters.answer(request, response)
+        return await self.session.link_counters.answer(request, response)
 
 
 def _port_settings(configuration: Configuration) -> PortSettings:
@@ -320,8 +314,7 @@ def _run(node: BridgeNode, ended: EndRequest) -> int:
 
 
 def _end(node: BridgeNode, executor: SingleThreadedExecutor) -> None:
-    node.begin_end()
-    node.finish_end(time.monotonic() + END_LIMIT)
+    node.tell_plcs()
     node.link.stop()
     take_last_writes(executor.spin_once, lambda: node.writes_taken,
                      time.monotonic() + LAST_WRITES)

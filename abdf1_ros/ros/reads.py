@@ -74,8 +74,7 @@ class ReadTopics:
         self._later: deque[tuple[Any, Any]] = deque()
         self.latest: dict[str, Values] = {}
         self._topics: dict[str, ReadTopic] = {}
-        self._to_come: dict[str, tuple[Mapping, ReadPoint]] = {}
-        self._kept_back: dict[str, Values] = {}
+        self._to_come: list[tuple[Mapping, ReadPoint]] = []
 
     def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
         """Have a publisher for each mapping that is read."""
@@ -83,7 +82,7 @@ class ReadTopics:
             earlier = self._published.get(mapping.topic)
             # DDS has one type for a topic, so a publisher of another one has to end first.
             if earlier is not None and earlier.shape[0] is not mapping.message_type:
-                self._to_come[mapping.topic] = mapping, point
+                self._to_come.append((mapping, point))
             else:
                 self._topics[mapping.topic] = self._topic(mapping, point, earlier)
 
@@ -93,18 +92,12 @@ class ReadTopics:
         for topic in self._published.values():
             if id(topic) not in kept:
                 self._node.destroy_publisher(topic.publisher)
-        for name, (mapping, point) in [*self._to_come.items()]:
-            self._topics[name] = self._topic(mapping, point, None)
-            del self._to_come[name]
-            self._publish_kept_back(name)
+        for mapping, point in self._to_come:
+            topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
+            if mapping.topic in self.latest:  # it may come twice
+                topic.publisher.publish(topic.encode(self.latest[mapping.topic]))
         self._published.clear()
         self._published.update(self._topics)
-
-    def _publish_kept_back(self, name: str) -> None:
-        values = self._kept_back.pop(name, None)
-        if values is not None:
-            topic = self._topics[name]
-            topic.publisher.publish(topic.encode(values))
 
     def _topic(self, mapping: Mapping, point: ReadPoint, old: ReadTopic | None) -> ReadTopic:
         shape = mapping.message_type, str(mapping.address), mapping.length
@@ -120,14 +113,10 @@ class ReadTopics:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Publish the values of a good read, at once or as soon as the line is busy again."""
-        name = mapping.topic
-        self.latest[name] = values
-        if name in self._to_come:
-            self._kept_back[name] = values
-            if name not in self._to_come:  # it came in this moment
-                self._publish_kept_back(name)
-            return
-        topic = self._topics[name]
+        self.latest[mapping.topic] = values
+        topic = self._topics.get(mapping.topic)
+        if topic is None:
+            return  # ``take_over`` publishes it
         if self._at_once:
             self._at_once -= 1
             topic.publisher.publish(topic.encode(values))

@@ -415,10 +415,8 @@ class BridgeSession:
         if now < self._next_look:
             return
         self._next_look = now + _FILE_PERIOD
-        names = self.configuration.files.changed()
-        if names and not self.diagnostics.changed_files:
-            self.notes.warning('the files', changed_text(names))
-        self.diagnostics.changed_files = names
+        names = self.diagnostics.changed_files = self.configuration.files.changed()
+        self._tell_news('the files', [changed_text(names)] if names else [], self.notes.warning)
 
     def _look_at_names(self, now: float) -> None:
         """Log once that another node has our name, and once that it has gone."""

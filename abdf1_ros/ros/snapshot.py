@@ -78,22 +78,19 @@ class _ValueRow:
         point = self._point
         freshness = point.freshness(now)
         level, read = _LEVELS[freshness], point.last_good
-        parts = []
-        if level == DiagnosticStatus.ERROR:
-            parts.append(point.error or point.withheld)
-        elif read is None:
-            parts.append(freshness.value)
-        if values is not None and read is not None:
-            parts.append(f'{_text(values)}, {now - read:.1f} s ago')
-        shown = [] if values is None else [
-            KeyValue(key=key, value=text) for key, text in self._values(values)]
-        times = () if read is None else (('stamp', _moment(begun + read)),
-                                         ('age_ms', f'{(now - read) * 1000:.0f}'))
+        why = point.error or point.withheld if level == DiagnosticStatus.ERROR else ''
+        texts = [why] if why else []
+        pairs: list[tuple[str, str]] = []
+        if values is None or read is None:
+            texts = texts or [freshness.value]
+        else:
+            texts.append(f'{_text(values)}, {now - read:.1f} s ago')
+            pairs = [*self._values(values), ('stamp', _moment(begun + read)),
+                     ('age_ms', f'{(now - read) * 1000:.0f}')]
         return DiagnosticStatus(
             level=level, name=self._tag, hardware_id=self._place,
-            message=f'{_WORDS[level]}: {printable("; ".join(parts))}',
-            values=[*shown, *(KeyValue(key=key, value=value) for key, value in times),
-                    *self._facts])
+            message=f'{_WORDS[level]}: {printable("; ".join(texts))}',
+            values=[*(KeyValue(key=key, value=value) for key, value in pairs), *self._facts])
 
     def _values(self, values: Values) -> Iterable[tuple[str, str]]:
         if isinstance(values, str) or len(values) != len(self._keys):

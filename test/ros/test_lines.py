@@ -182,7 +182,7 @@ class Plant:
 
     def fail(self, name: str) -> None:
         """Let a bug show in a line."""
-        self.nodes[name]._session.reads._topics = {}
+        self.nodes[name].session.reads.latest = None
 
     def end(self) -> int:
         """End the process as SIGTERM does; return its exit status."""

@@ -118,13 +118,13 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) -> None:
     speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     speeds.values([7, 8])
-    publisher = bench.node._session.reads._topics['speed'].publisher
+    publisher = bench.node.session.reads._topics['speed'].publisher
     bench.write_map(SPEED, LEVEL)
-    assert bench.reload() == (True, str(bench.node._session.configuration))
+    assert bench.reload() == (True, str(bench.node.session.configuration))
     levels = bench.observer.listen(Float32MultiArray, '/abdf1/read/level')
     assert values_in(levels.first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
-    assert bench.node._session.reads._topics['speed'].publisher is publisher
+    assert bench.node.session.reads._topics['speed'].publisher is publisher
     topics = dict(bench.node.get_publisher_names_and_types_by_node('abdf1', '/'))
     assert '/abdf1/read/level' in topics
     written = dict(bench.node.get_subscriber_names_and_types_by_node('abdf1', '/'))
@@ -310,7 +310,7 @@ def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) 
     client = bench.observer.node.create_client(Trigger, '/abdf1/read_link_counters')
     bench.observer.until(client.service_is_ready, 'the service')
     future = client.call_async(Trigger.Request())
-    bench.observer.until(lambda: bench.node._session.link_counters._done, 'the question')
+    bench.observer.until(lambda: bench.node.session.link_counters._done, 'the question')
     active = bench.observer.listen(UInt16MultiArray, '/abdf1/active_stations')
     bench.write_map('speed,Read,N7:0,2,PLC5,2')
     assert bench.reload()[0]
