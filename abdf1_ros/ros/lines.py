@@ -468,7 +468,7 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns 0 after a signal, 2 when parameters are faulty or no line can run, 1 after internal
     errors and where ROS does not start for a reason that may pass.
     """
-    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args)
+    return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args, leaves_out=True)
 
 
 def _allow_files() -> None:

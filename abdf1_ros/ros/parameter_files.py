@@ -17,8 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 import re
+from tempfile import TemporaryDirectory
+from typing import Any
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.text import printable
@@ -49,17 +52,39 @@ def parameter_tree(path: str) -> yaml.Node | None:
         raise ConfigurationError([Problem(path, ' '.join(str(error).split()))]) from None
 
 
-def check_parameter_files(args: Sequence[str]) -> None:
-    """Raise ConfigurationError for files that are not YAML, and for names that ROS refuses."""
-    problems = []
-    for path in parameter_files(args):
-        if Path(path).is_file():  # otherwise ROS says why it cannot be read
+@contextmanager
+def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
+    """
+    Give arguments with parameter files that ROS takes: all of a file or nothing.
+
+    With ``leaves_out`` sections whose names it refuses are left out, in copies of the files.
+    Raises ConfigurationError for such names otherwise, and for files that are not YAML.
+    """
+    usable, problems = list(args), []
+    with TemporaryDirectory(prefix='abdf1_') as folder:
+        for number, path in enumerate(parameter_files(args)):
+            if not Path(path).is_file():  # ROS says why it cannot be read
+                continue
+            bad = [(name, line) for name, line in _sections(parameter_tree(path))
+                   if not _NAME.fullmatch(name)]
             problems += [Problem(Place(path, line), (
-                f'"{printable(name)}" cannot name a node: letters, digits and underscores, '
-                f'as in {re.sub("[^0-9A-Za-z_/]", "_", name)}'))
-                for name, line in _sections(parameter_tree(path)) if not _NAME.fullmatch(name)]
-    if problems:
-        raise ConfigurationError(problems)
+                f'"{printable(name)}" cannot name a node: letters, digits and underscores, as in '
+                f'{re.sub("[^0-9A-Za-z_/]", "_", name)}')) for name, line in bad]
+            if bad and leaves_out:
+                copy = Path(folder, f'{number}.yaml')
+                copy.write_text(yaml.safe_dump(_without_bad_names(yaml.safe_load(
+                    Path(path).read_text(encoding='utf-8')))), encoding='utf-8')
+                usable[usable.index(path)] = str(copy)
+        if problems and not leaves_out:
+            raise ConfigurationError(problems)
+        yield usable
+
+
+def _without_bad_names(tree: Any) -> Any:
+    if not isinstance(tree, dict):
+        return tree
+    return {key: below if key == _PARAMETERS else _without_bad_names(below)
+            for key, below in tree.items() if _NAME.fullmatch(str(key))}
 
 
 def _sections(tree: yaml.Node | None) -> Iterator[tuple[str, int]]:

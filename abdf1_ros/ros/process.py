@@ -34,7 +34,7 @@ from typing import NamedTuple
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.log import bug_text
-from abdf1_ros.ros.parameter_files import check_parameter_files
+from abdf1_ros.ros.parameter_files import usable_files
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy
@@ -100,14 +100,16 @@ class Program(NamedTuple):
 
 
 def run_ros(name: str, parser: argparse.ArgumentParser,
-            make: Callable[[Sequence[str]], Program], args: Sequence[str] | None = None) -> int:
+            make: Callable[[Sequence[str]], Program], args: Sequence[str] | None = None,
+            leaves_out: bool = False) -> int:
     """
     Run in a ROS context until SIGINT, SIGTERM or SIGHUP, and return the exit status.
 
     ``make`` gets the arguments of the process (``args``, by default its own) and opens no port
     yet. What keeps it from making a program is told as ``name``: EXIT_CONFIGURATION where
     arguments, parameters or files have to be changed, EXIT_FAULT for a reason that may pass. An
-    error while the program runs is a bug, with a traceback and EXIT_FAULT.
+    error while the program runs is a bug, with a traceback and EXIT_FAULT. With ``leaves_out``
+    sections of parameter files whose names ROS refuses are not given to it.
     """
     program: Program | None = None
 
@@ -119,7 +121,9 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
     given = list(sys.argv if args is None else args)
     with EndRequest(_ending_signals(), begin_end) as ended:
         try:
-            made = _made(parser, make, given)
+            with usable_files(given, leaves_out) as usable:
+                _begin(parser, usable)
+            made = _made(make, given)
         except ConfigurationError as error:
             for problem in error.problems:
                 get_logger(name).fatal(str(problem))
@@ -146,9 +150,8 @@ def _ending_signals() -> Iterator[signal.Signals]:
         yield signal.SIGHUP
 
 
-def _made(parser: argparse.ArgumentParser, make: Callable[[Sequence[str]], Program],
-          given: list[str]) -> Program:
-    check_parameter_files(given)
+def _begin(parser: argparse.ArgumentParser, given: list[str]) -> None:
+    """Check the arguments and begin the ROS context."""
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
                      '--ros-args')
@@ -159,6 +162,9 @@ def _made(parser: argparse.ArgumentParser, make: Callable[[Sequence[str]], Progr
         if isinstance(error, REFUSALS):
             raise
         raise rclpy_implementation.RCLError(str(error)) from error  # of the log, for instance
+
+
+def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program:
     try:
         return make(given)
     except BaseException:

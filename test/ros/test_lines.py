@@ -30,7 +30,7 @@ from abdf1_ros.ros import lines as module
 from abdf1_ros.ros import process
 from abdf1_ros.ros.lines import chosen, LineName, main, sections
 from abdf1_ros.ros.node import BridgeNode
-from abdf1_ros.ros.parameter_files import check_parameter_files, parameter_files
+from abdf1_ros.ros.parameter_files import parameter_files, usable_files
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
 import pytest
@@ -98,8 +98,9 @@ def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) ->
      'hall/press_plc')])
 def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expected: str) -> None:
     path = yaml_file(tmp_path, text)
-    with pytest.raises(ConfigurationError) as error:
-        check_parameter_files(['node', '--ros-args', '--params-file', path])
+    with pytest.raises(ConfigurationError) as error, \
+            usable_files(['node', '--ros-args', '--params-file', path], leaves_out=False):
+        pass
     assert str(error.value) == f'{path}{expected}'
 
 
@@ -254,6 +255,15 @@ def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
     assert plant.speeds('b') == [7, 8]
     assert line_status(plant, OK)['running'] == '3'
+
+
+def test_line_whose_name_ros_refuses_is_told_and_the_others_run(plant: Plant) -> None:
+    plant.plcs['b-1'] = plant.plcs.pop('b')
+    plant.start()
+    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    values = line_status(plant, ERROR)
+    assert values['running'] == '2'
+    assert 'must not contain characters other than alphanumerics' in values['/hall/b-1']
 
 
 def test_faulty_line_ends_all_where_that_is_asked_for(
