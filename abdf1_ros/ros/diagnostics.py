@@ -336,6 +336,9 @@ def _judge_guests(lines: Sequence[GuestLine]) -> Judgement:
         (sum(guest.refused for guest in guests), 'commands not allowed'),
         (sum(guest.collisions for guest in guests), 'writes to words of ours')) if count]
     text = f'{connected} of {len(guests)} places are open'
+    faults = [f'{line.guest.name}: {line.fault}' for line in lines if line.fault]
+    if faults:
+        return ERROR, '; '.join(faults)
     return (WARN, '; '.join([text, *notes])) if notes else (OK, text)
 
 

@@ -379,6 +379,8 @@ class BridgeSession:
             f'~/write/{topic} has more than one publisher: its fallback value is not written '
             'while any of them goes on (a forgotten "ros2 topic pub -r"?)'
             for topic in crowded], self.notes.warning)
+        self._tell_news('guests', [f'guest {line.guest.name}: {line.fault}'
+                                   for line in self.guest_lines if line.fault], self.notes.error)
         self._tell_news('types of PLCs', diagnostics.wrong_types(), self.notes.warning)
         self._tell_deaf_stations(diagnostics.deaf_stations(now))
         echo = diagnostics.echo_text()

@@ -87,6 +87,11 @@ class GuestLine:
         text = self.link.state.text
         return WAITING if WAITING in text else text
 
+    @property
+    def fault(self) -> str:
+        """Return why nobody can connect, empty where somebody can."""
+        return self.state if self.state.startswith('cannot open') else ''
+
     def start(self) -> None:
         """Wait for the guest, and serve it."""
         self.link.start()

@@ -225,3 +225,16 @@ def test_lost_line_is_told_to_the_guest(tmp_path: Path) -> None:
         with pytest.raises(RemoteError) as refusal:
             client.read('N7:1')
         assert refusal.value.sts == 0x04
+
+
+def test_place_that_cannot_be_opened_says_why_until_it_can(tmp_path: Path) -> None:
+    (tmp_path / 'hmi').write_text('mine')
+    with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{free_port()}') as line:
+        taken, waiting = line.guests
+        assert 'is there already' in taken.fault
+        assert (waiting.state, waiting.fault) == ('waiting for a client', '')
+        assert (tmp_path / 'hmi').read_text() == 'mine'
+        (tmp_path / 'hmi').unlink()
+        wait_for(lambda: not taken.fault)
+        with client_at(tmp_path / 'hmi') as client:
+            assert client.read('N7:1') == 1
