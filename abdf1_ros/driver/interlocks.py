@@ -88,6 +88,7 @@ class _Plc:
         self.station = station
         self.heartbeats: list[HeartbeatRow] = []
         self.fallbacks: list[FallbackRow] = []
+        self.rows: list[OwnRow] = []
         self.due = math.inf
         self.failures = 0
         self.pause_end = -math.inf
@@ -98,15 +99,9 @@ class _Plc:
         """Tell whether it is out of reach."""
         return self.failures >= _FAILURES
 
-    @property
-    def rows(self) -> list[OwnRow]:
-        """Return all of its rows."""
-        return [*self.heartbeats, *self.fallbacks]
-
     def plan(self) -> None:
         """Look at its rows again when the first of them wants it."""
-        self.due = min([row.due for row in self.heartbeats]
-                       + [row.due for row in self.fallbacks], default=math.inf)
+        self.due = min([row.due for row in self.rows], default=math.inf)
 
 
 class Interlocks:
@@ -134,13 +129,11 @@ class Interlocks:
         self._plcs: dict[int, _Plc] = {}
         for beat in self.heartbeats:
             self._plc(beat).heartbeats.append(beat)
+            self._plc(beat).rows.append(beat)
         for row in self.fallbacks:
             self._plc(row).fallbacks.append(row)
+            self._plc(row).rows.append(row)
         self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
-        self._by_topic: dict[str, list[HeartbeatRow]] = {}
-        for beat in self.heartbeats:
-            for topic in beat.requires:
-                self._by_topic.setdefault(topic, []).append(beat)
         self._stations = stations
         self._writes = writes
         writes.message_ended, writes.message_expired = self.message_ended, self.message_expired
@@ -243,8 +236,9 @@ class Interlocks:
         """Take note of a message that was accepted (rule 3 d)."""
         topic = write.mapping.topic
         self._messages[topic] = max(write.requested, self._messages.get(topic, -math.inf))
-        for beat in self._by_topic.get(topic, ()):
-            self._look_again(beat)
+        for beat in self.heartbeats:
+            if topic in beat.requires:
+                self._look_again(beat)
 
     def is_overruled(self, write: Write) -> bool:
         """Tell whether a message was published before a fallback of its row went out (rule 9)."""
@@ -337,9 +331,8 @@ class Interlocks:
 
     def _free_from(self, plc: _Plc) -> float:
         """Return from when on more than first tries may be written to a PLC (clock value in s)."""
-        if self._is_ending:
-            return plc.pause_end
-        return max(plc.pause_end, self._stations.next_message(plc.station))
+        in_turn = -math.inf if self._is_ending else self._stations.next_message(plc.station)
+        return max(plc.pause_end, in_turn)
 
     def _begin(self, plc: _Plc, row: OwnRow, youngest: dict[int, float], now: float) -> OwnWrite:
         expires = math.inf
