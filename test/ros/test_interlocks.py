@@ -309,8 +309,8 @@ def test_rule_19_second_bridge_takes_control_away_and_does_not_keep_it_alive(
                              f'port:={port}')
         with Process('node', *arguments, '-r', '__node:=second') as other:
             other.wait_for('[ERROR]', 'another program writes this word')
-            until_status(cell.diagnostics, 'interlocks', WARN,
-                         lambda status: 'another writer' in details(status)['station 1'])
+            until_status(cell.diagnostics, 'interlocks', ERROR,
+                         lambda status: 'another program' in details(status)['station 1'])
             other.send(signal.SIGKILL)
         watch = Stopwatch()
         cell.until(lambda: is_in_control() or watch.seconds > 4.0, 'time')
