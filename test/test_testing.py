@@ -29,6 +29,8 @@ TUTORIAL = (SOURCE / 'docs' / 'tutorials' / 'testing.md').read_text(encoding='ut
 
 __all__ = ['abdf1_cell']
 
+Cells = Callable[..., SimulatedCell]
+
 
 def _run(text: str) -> dict[str, Any]:
     names: dict[str, Any] = {}
@@ -48,13 +50,13 @@ def test_plugin_of_the_tutorial_is_that_of_the_example() -> None:
     assert line in (EXAMPLE / 'conftest.py').read_text(encoding='utf-8')
 
 
-def test_test_of_the_tutorial_passes(abdf1_cell: Callable[..., SimulatedCell]) -> None:  # noqa: F811
+def test_test_of_the_tutorial_passes(abdf1_cell: Cells) -> None:  # noqa: F811
     block = re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[1]
     _run(block)['test_pressure'](abdf1_cell)
 
 
 def test_what_never_happens_is_named(
-        abdf1_cell: Callable[..., SimulatedCell], monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
+        abdf1_cell: Cells, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
     monkeypatch.setattr('abdf1_ros.testing.PATIENCE', 0.2)
     data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
     rows = 'Tag,Command,Address,Station,PLC_Type\npressure,Read,N7:0,1,SLC\n'

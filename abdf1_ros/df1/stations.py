@@ -123,7 +123,7 @@ class ActiveStationList:
         self._stations: dict[int, Station] = {}
         self._on_change = on_change
         self.routes = {station: gateway for station, gateway in (routes or {}).items()
-                        if station != gateway}
+                       if station != gateway}
         self.add((*numbers, *self.routes.values()))
 
     def add(self, numbers: Iterable[int]) -> None:

@@ -146,8 +146,9 @@ class WriteTopics:
         self._subscriptions: dict[str, tuple[Any, Any]] = {}
         self.taken = 0
 
-    def open(self, driver: Driver, patience: float, on_loss: Callable[[str, int], None],  # noqa: A003
-             wake: Callable[[], None]) -> dict[str, WriteTopic]:
+    def open(self, driver: Driver, patience: float,  # noqa: A003
+             on_loss: Callable[[str, int], None], wake: Callable[[], None],
+             ) -> dict[str, WriteTopic]:
         """Subscribe to each topic of a driver; subscriptions that there are stay."""
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:

@@ -174,8 +174,8 @@ FILES = {
           'I_0': '00 00', 'O_1': '00 00'}}
 
 
-@given(requests, st.sampled_from([*FAMILIES]), st.one_of(st.sampled_from((0x0F, 1, 2, 5, 8)),
-                                                     st.integers(0, 255)),
+@given(requests, st.sampled_from([*FAMILIES]),
+       st.one_of(st.sampled_from((0x0F, 1, 2, 5, 8)), st.integers(0, 255)),
        st.integers(0, 0xFFFF))
 def test_any_bytes_have_one_reply(data: bytes, family: PlcType, cmd: int, tns: int) -> None:
     words = table(family, **FILES[family])

@@ -650,7 +650,7 @@ def test_faulty_parameter_is_told_in_one_line(
 
 
 @pytest.mark.parametrize(('arguments', 'expected'), [
-    (['--ros-args', '-r', '__node:=a-b'], "a node name has letters, digits and underscores; "
+    (['--ros-args', '-r', '__node:=a-b'], 'a node name has letters, digits and underscores; '
      "Failed to parse ROS arguments: Couldn't parse remap rule: '-r __node:=a-b'."),
     (['--ros-args', '-p', 'net_file=net.csv'], 'a parameter is NAME:=VALUE, with a colon; '),
     (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
