@@ -92,10 +92,10 @@ PLC5_PID = _read_only(
     'EN', 'PV', 'ERR', 'OUT', 'TIE') | _read_only(
     _flags(1, INI=12, SPOR=11, OLL=10, OLH=9, EWD=8, DVNA=3, DVPA=2, PVLA=1, PVHA=0))
 
-# Function files of a MicroLogix: the values in the order of 1762-RM001 and 1766-RM001. A recording
-# of a 1400 has the limits of its six counters (7FFFFFFF, 80000000) where this order puts them, and
-# the inputs 0 to 7 of its interrupts. Where the bits lie is not known, so words 2 and 3 have
-# numbers only.
+# Function files of a MicroLogix; no manual that gives the order of their words was at hand. A
+# recording of a 1400 confirms HIP, LOP, OVF and UNF, by the limits of its six counters (7FFFFFFF,
+# 80000000), and IS of EII, by the inputs 0 to 7 of its interrupts. The places of the others are
+# not confirmed here. Where the bits lie is not known, so words 2 and 3 have numbers only.
 HSC = _read_only(_values(0, 'PFN', 'ER') | _values(4, 'MOD')
                  | _values(5, 'ACC', 'HIP', 'LOP', 'OVF', 'UNF', words=2)
                  | _values(15, 'OMB', 'HPO', 'LPO'))
