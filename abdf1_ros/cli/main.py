@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 import os
 from pathlib import Path
@@ -65,40 +66,16 @@ def run(name: str) -> int:
     return _ended(status)
 
 
-def node() -> int:
-    return run('node')
-
-
-def lines() -> int:
-    return run('lines')
-
-
-def monitor() -> int:
-    return run('monitor')
-
-
-def demo() -> int:
-    return run('demo')
-
-
-def simulator() -> int:
-    return run('simulator')
-
-
-def sniff() -> int:
-    return run('sniff')
-
-
-def check() -> int:
-    return run('check')
-
-
-def plc() -> int:
-    return run('plc')
-
-
-def conform() -> int:
-    return run('conform')
+# What the executables call.
+node = partial(run, 'node')
+lines = partial(run, 'lines')
+monitor = partial(run, 'monitor')
+demo = partial(run, 'demo')
+simulator = partial(run, 'simulator')
+sniff = partial(run, 'sniff')
+check = partial(run, 'check')
+plc = partial(run, 'plc')
+conform = partial(run, 'conform')
 
 
 @contextmanager
