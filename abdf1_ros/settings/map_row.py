@@ -149,7 +149,7 @@ class RowReader:
 
     def _with_conditions(self, mapping: Mapping) -> Mapping:
         """Return the mapping with its heartbeat, fallback and condition for values."""
-        row, command, fault = self._row, mapping.command, self._condition_fault
+        row, command, fault = self._row, mapping.command, self._fault
         heartbeat = None
         if command is Command.HEARTBEAT:
             heartbeat = read_heartbeat(row, fault)
@@ -177,9 +177,6 @@ class RowReader:
             fault('Publish_While', 'a row cannot depend on itself; name the tag of a counter')
         return replace(mapping, heartbeat=heartbeat, fallback=fallback,
                        publish_while=publish_while)
-
-    def _condition_fault(self, column: str, text: str, *, is_superfluous: bool = False) -> None:
-        self._fault(column, text, is_superfluous=is_superfluous)
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:

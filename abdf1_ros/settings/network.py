@@ -47,6 +47,8 @@ _MODE_WORDS = {
 POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+_WITHOUT_SHARE = {'Slave': "a slave cannot send a guest's commands",
+                  'Radio': 'in Mode Radio it has not been tried'}
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')
 URLS = ' or '.join(f'{scheme}://host:port' for scheme in DEVICE_SERVERS)
@@ -261,17 +263,15 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
     for name, (text, where) in values.items():
         try:
             checked[name] = FIELDS[name].parse(text, where)
-            _check_port(name, checked[name], where)
-            _check_share(name, checked, where)
-            _check_nodes(name, checked[name], where)
         except Problem as problem:
             problems.append(problem)
-    if checked['share'] and checked['mode'] == 'Slave':
-        problems.append(Problem(values.get('share', ('', 'Share'))[1], (
-            "Share needs Mode Master or Peer: a slave cannot send a guest's commands")))
-    if checked['share'] and checked['mode'] == 'Radio':
-        problems.append(Problem(values.get('share', ('', 'Share'))[1], (
-            'Share needs Mode Master or Peer: in Mode Radio it has not been tried')))
+        else:
+            if fault := _FAULTS[name](checked[name]) if name in _FAULTS else '':
+                problems.append(Problem(where, fault))
+    if checked['share'] and checked['mode'] in _WITHOUT_SHARE:
+        where = values.get('share', ('', 'Share'))[1]
+        problems.append(Problem(where, (
+            f'Share needs Mode Master or Peer: {_WITHOUT_SHARE[checked["mode"]]}')))
     if problems:
         raise ConfigurationError(problems)
     given = {FIELDS[name].column for name in values}
@@ -280,27 +280,29 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
     return Network(**checked)
 
 
-def _check_port(name: str, value: int | str, where: Place | str) -> None:
-    text = str(value)
-    if name == 'com_port' and not (_is_url(text) or text.startswith('/') or (
-            text.isdigit() and (whole_number(text) or 0) >= 1)):
-        raise Problem(where, f'Com_Port = "{shown(text)}" should be a number from 1, a device '
-                             f'path such as /dev/ttyUSB0, {URLS}; '
-                             f'"plc ports" lists the devices{hint(text)}')
+def _port_fault(text: str) -> str:
+    if _is_url(text) or text.startswith('/') or (
+            text.isdigit() and (whole_number(text) or 0) >= 1):
+        return ''
+    return (f'Com_Port = "{shown(text)}" should be a number from 1, a device path such as '
+            f'/dev/ttyUSB0, {URLS}; "plc ports" lists the devices{hint(text)}')
 
 
-def _check_share(name: str, checked: MappingType[str, Any], where: Place | str) -> None:
-    if name != 'share':
-        return
+def _share_fault(text: str) -> str:
     try:
-        share_places(checked['share'])
+        share_places(text)
     except ValueError as error:
-        raise Problem(where, f'Share: {error}') from None
+        return f'Share: {error}'
+    return ''
 
 
-def _check_nodes(name: str, value: int | str, where: Place | str) -> None:
-    if name == 'store_forward' and (faults := parse_stations(str(value), BROADCAST)[1]):
-        raise Problem(where, f'Store_Forward = {faults[0]}')
+def _nodes_fault(text: str) -> str:
+    _, faults = parse_stations(text, BROADCAST)
+    return f'Store_Forward = {faults[0]}' if faults else ''
+
+
+# What is wrong with the text of a field, empty for nothing.
+_FAULTS = {'com_port': _port_fault, 'share': _share_fault, 'store_forward': _nodes_fault}
 
 
 def _is_url(text: str) -> bool:
