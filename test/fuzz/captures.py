@@ -140,7 +140,7 @@ def _entries(parts: Sequence[bytes]) -> list[Entry]:
     for part in parts:
         entries += session.feed(Chunk(None, Direction.UNKNOWN, part))
         for wire in session._wires.values():
-            assert len(wire.decoder._buffer) <= 2
+            assert len(wire.decoder.waiting) <= 2
             assert len(wire.decoder._data) <= frames.MAX_LINK_DATA + 1
     return [*entries, *session.finish()]
 

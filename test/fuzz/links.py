@@ -150,8 +150,8 @@ class _Line:
                 assert symbol.fault is None
                 packet = Packet.decode(symbol.data)
                 self._last = self._last if packet.is_reply else packet
-        assert len(self._ears._buffer) == 0 and not self._ears.in_message
-        assert len(machine.decoder._buffer) <= MAX_WAITING
+        assert len(self._ears.waiting) == 0 and not self._ears.in_message
+        assert len(machine.decoder.waiting) <= MAX_WAITING
         assert not machine._out
 
 
