@@ -53,7 +53,7 @@ class SymbolKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class HeardSymbol:
+class Symbol:
     """
     One symbol: ``raw`` as it came, ``data`` its link data without doubled DLE.
 
@@ -133,25 +133,25 @@ def damaged(frame: bytes) -> bytes:
     return frame[:-1] + bytes((frame[-1] ^ 0x01,))
 
 
-def next_symbol(buffer: bytes, check: BlockCheck, is_half_duplex: bool) -> HeardSymbol | None:
+def next_symbol(buffer: bytes, check: BlockCheck, is_half_duplex: bool) -> Symbol | None:
     """Return the symbol at the beginning of ``buffer``; None where more bytes are needed."""
     if not buffer:
         return None
     if buffer[0] != DLE:
         end = buffer.find(DLE)
-        return HeardSymbol(SymbolKind.NOISE, buffer if end < 0 else buffer[:end])
+        return Symbol(SymbolKind.NOISE, buffer if end < 0 else buffer[:end])
     if len(buffer) < 2:
         return None
     for kind, pair in ((SymbolKind.ACK, ACK), (SymbolKind.NAK, NAK), (SymbolKind.EOT, EOT)):
         if buffer[:2] == pair:
-            return HeardSymbol(kind, pair)
+            return Symbol(kind, pair)
     if buffer[:2] == ENQ:
-        return _poll(buffer) if is_half_duplex else HeardSymbol(SymbolKind.ENQ, ENQ)
+        return _poll(buffer) if is_half_duplex else Symbol(SymbolKind.ENQ, ENQ)
     if buffer[1] == _STX:
         return _message(buffer, 2, check, None)
     if buffer[1] == _SOH and is_half_duplex:
         return _master_message(buffer, check)
-    return HeardSymbol(SymbolKind.NOISE, buffer[:2])
+    return Symbol(SymbolKind.NOISE, buffer[:2])
 
 
 def _station(buffer: bytes) -> tuple[int, int] | None:
@@ -161,27 +161,27 @@ def _station(buffer: bytes) -> tuple[int, int] | None:
     return (buffer[2], 4 if buffer[2:4] == b'\x10\x10' else 3)
 
 
-def _poll(buffer: bytes) -> HeardSymbol | None:
+def _poll(buffer: bytes) -> Symbol | None:
     found = _station(buffer)
     if found is None or len(buffer) <= found[1]:
         return None
     station, end = found
-    return HeardSymbol(SymbolKind.POLL, buffer[:end + 1], station=station,
+    return Symbol(SymbolKind.POLL, buffer[:end + 1], station=station,
                        is_good=buffer[end] == bcc((station,)))
 
 
-def _master_message(buffer: bytes, check: BlockCheck) -> HeardSymbol | None:
+def _master_message(buffer: bytes, check: BlockCheck) -> Symbol | None:
     found = _station(buffer)
     if found is None or len(buffer) < found[1] + 2:
         return None
     station, end = found
     if buffer[end:end + 2] != b'\x10\x02':
-        return HeardSymbol(SymbolKind.NOISE, buffer[:end])
+        return Symbol(SymbolKind.NOISE, buffer[:end])
     return _message(buffer, end + 2, check, station)
 
 
 def _message(buffer: bytes, start: int, check: BlockCheck,
-             station: int | None) -> HeardSymbol | None:
+             station: int | None) -> Symbol | None:
     """Read a message whose data begin at ``start``."""
     data, embedded, at = bytearray(), [], start
     while at < len(buffer):
@@ -199,16 +199,16 @@ def _message(buffer: bytes, start: int, check: BlockCheck,
         elif pair[1] == _ETX:
             return _ended(buffer, at + 2, bytes(data), check, station, tuple(embedded))
         else:
-            return HeardSymbol(SymbolKind.NOISE, buffer[:at])
+            return Symbol(SymbolKind.NOISE, buffer[:at])
         at += 2
     return None
 
 
 def _ended(buffer: bytes, at: int, data: bytes, check: BlockCheck, station: int | None,
-           embedded: tuple[SymbolKind, ...]) -> HeardSymbol | None:
+           embedded: tuple[SymbolKind, ...]) -> Symbol | None:
     wanted = check_bytes(data, check, station)
     end = at + len(wanted)
     if len(buffer) < end:
         return None
     kind = SymbolKind.MESSAGE if station is None else SymbolKind.MASTER_MESSAGE
-    return HeardSymbol(kind, buffer[:end], data, station, buffer[at:end] == wanted, embedded)
+    return Symbol(kind, buffer[:end], data, station, buffer[at:end] == wanted, embedded)

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.codec import HeardSymbol, SymbolKind
+from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.wire import Failed, Wire
 
 REPLY_BIT = 0x40
@@ -106,7 +106,7 @@ class AskingEnd(ABC):
     def send(self, command: bytes) -> None:
         """Send a message."""
 
-    def offer(self, command: bytes) -> HeardSymbol | None:
+    def offer(self, command: bytes) -> Symbol | None:
         """Send a message and return the response to it."""
         self.send(command)
         symbol = self.wire.hear()
@@ -127,10 +127,10 @@ class AskingEnd(ABC):
         """Wait for a message and acknowledge it; return its link data."""
 
     @abstractmethod
-    def further(self, seconds: float) -> HeardSymbol | None:
+    def further(self, seconds: float) -> Symbol | None:
         """Return the first answer within so many seconds that is not DLE EOT."""
 
-    def taken(self, symbol: HeardSymbol, acknowledge: bool = True) -> bytes:
+    def taken(self, symbol: Symbol, acknowledge: bool = True) -> bytes:
         """Acknowledge a message, and return its link data."""
         self.owed.discard(symbol.data[4:6])
         if acknowledge:
@@ -163,7 +163,7 @@ class MasterEnd(AskingEnd):
     def send(self, command: bytes) -> None:
         self.wire.send(codec.master_message(self.station, command, self.wire.check))
 
-    def poll(self) -> HeardSymbol | None:
+    def poll(self) -> Symbol | None:
         """Poll once and return what comes."""
         self.wire.send(codec.poll(self.station))
         return self.wire.hear()
@@ -176,7 +176,7 @@ class MasterEnd(AskingEnd):
             raise Failed('a message or DLE EOT as answer to a poll', str(symbol))
         return self.taken(symbol, acknowledge)
 
-    def further(self, seconds: float) -> HeardSymbol | None:
+    def further(self, seconds: float) -> Symbol | None:
         end = self.wire.now + seconds
         while self.wire.now < end:
             symbol = self.poll()
@@ -207,7 +207,7 @@ class PeerEnd(AskingEnd):
                                   _REPLY_TIMES * self.wire.answer_time)
         return self.taken(symbol, acknowledge)
 
-    def further(self, seconds: float) -> HeardSymbol | None:
+    def further(self, seconds: float) -> Symbol | None:
         return self.wire.hear(seconds)
 
 
@@ -232,18 +232,18 @@ class AnsweringEnd(ABC):
             return
 
     @abstractmethod
-    def next_command(self, what: str = 'a command') -> HeardSymbol:
+    def next_command(self, what: str = 'a command') -> Symbol:
         """Wait for a good command."""
 
     @abstractmethod
-    def finish(self, command: HeardSymbol) -> None:
+    def finish(self, command: Symbol) -> None:
         """Answer a command to its end: acknowledge, reply, hear the ACK."""
 
-    def reply_to(self, command: HeardSymbol) -> None:
+    def reply_to(self, command: Symbol) -> None:
         """Send the reply to a command; on a half-duplex line that is the answer to a poll."""
         self.wire.send(codec.message(self.serve(command.data), self.wire.check))
 
-    def _command(self, symbol: HeardSymbol) -> HeardSymbol:
+    def _command(self, symbol: Symbol) -> Symbol:
         if not symbol.is_good:
             raise Failed('a message with the right check', symbol.raw.hex(' '))
         return symbol
@@ -256,9 +256,9 @@ class SlaveEnd(AnsweringEnd):
         super().__init__(wire, serve)
         self.station = station
 
-    def next_command(self, what: str = 'a command for our station') -> HeardSymbol:
+    def next_command(self, what: str = 'a command for our station') -> Symbol:
         """Wait for a good message to us; polls before it are answered DLE EOT."""
-        def is_command(symbol: HeardSymbol) -> bool:
+        def is_command(symbol: Symbol) -> bool:
             if symbol.kind is SymbolKind.POLL and symbol.station == self.station:
                 self.wire.send(codec.EOT)
             return symbol.kind is SymbolKind.MASTER_MESSAGE and symbol.station == self.station
@@ -266,9 +266,9 @@ class SlaveEnd(AnsweringEnd):
         return self._command(self.wire.until(is_command, what, PATIENCE))
 
     def next_poll(self, what: str = 'a poll of our station',
-                  within: float = PATIENCE) -> HeardSymbol:
+                  within: float = PATIENCE) -> Symbol:
         """Wait for a poll of us; a message before it, or a reset of the line, is a failure."""
-        def is_ours(symbol: HeardSymbol) -> bool:
+        def is_ours(symbol: Symbol) -> bool:
             return symbol.station == self.station or symbol.kind is SymbolKind.NAK
 
         symbol = self.wire.until(is_ours, what, within)
@@ -276,7 +276,7 @@ class SlaveEnd(AnsweringEnd):
             raise Failed(what, str(symbol))
         return symbol
 
-    def finish(self, command: HeardSymbol) -> None:
+    def finish(self, command: Symbol) -> None:
         self.wire.send(codec.ACK)
         self.next_poll()
         self.reply_to(command)
@@ -286,11 +286,11 @@ class SlaveEnd(AnsweringEnd):
 class ServerEnd(AnsweringEnd):
     """A full-duplex node that answers the commands of another."""
 
-    def next_command(self, what: str = 'a command') -> HeardSymbol:
+    def next_command(self, what: str = 'a command') -> Symbol:
         return self._command(self.wire.until(
             lambda heard: heard.kind is SymbolKind.MESSAGE, what, PATIENCE))
 
-    def finish(self, command: HeardSymbol) -> None:
+    def finish(self, command: Symbol) -> None:
         self.wire.send(codec.ACK)
         self.reply_to(command)
         self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')

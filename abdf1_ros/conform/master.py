@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import HeardSymbol, SymbolKind
+from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.ends import PATIENCE, SlaveEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
@@ -48,7 +48,7 @@ def no_ack_repeated(end: SlaveEnd) -> None:
 def repetitions_limited(end: SlaveEnd) -> None:
     first = end.next_command()
 
-    def is_other(symbol: HeardSymbol) -> bool:
+    def is_other(symbol: Symbol) -> bool:
         return symbol.kind is not SymbolKind.MASTER_MESSAGE or symbol.data != first.data
 
     for _ in range(_MOST_REPETITIONS):

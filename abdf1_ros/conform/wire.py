@@ -23,7 +23,7 @@ import math
 from typing import Protocol
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.codec import BlockCheck, HeardSymbol, SymbolKind
+from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 
 # A symbol that has begun may take as long as the longest frame on a slow line, but not for ever.
 _FRAME_TIME = 3.0
@@ -79,13 +79,13 @@ class Wire:
         self.check = check
         self.is_half_duplex = is_half_duplex
         self.answer_time = answer_time
-        self.transcript: list[Sent | HeardSymbol] = []
+        self.transcript: list[Sent | Symbol] = []
         self.has_heard = False
         self._line = line
         self._clock = clock
         self._char_time = char_time
         self._buffer = b''
-        self._embedded: deque[HeardSymbol] = deque()
+        self._embedded: deque[Symbol] = deque()
         self._sent_until = 0.0
         self._response = codec.NAK
 
@@ -102,7 +102,7 @@ class Wire:
             self._response = raw
         self._line.write(raw)
 
-    def hear(self, within: float | None = None, *, answers: bool = True) -> HeardSymbol | None:
+    def hear(self, within: float | None = None, *, answers: bool = True) -> Symbol | None:
         """
         Return the next symbol; None where none has begun after ``within`` s.
 
@@ -116,7 +116,7 @@ class Wire:
             symbol = self._next(begun, end) if self._clock() < end else None
         return symbol
 
-    def _next(self, begun: float, end: float) -> HeardSymbol | None:
+    def _next(self, begun: float, end: float) -> Symbol | None:
         if self._embedded:
             return self._embedded.popleft()
         while True:
@@ -128,7 +128,7 @@ class Wire:
             limit = max(end, begun + longest) if self._buffer else end
             left = limit - self._clock()
             if left <= 0:
-                noise = HeardSymbol(SymbolKind.NOISE, self._buffer)
+                noise = Symbol(SymbolKind.NOISE, self._buffer)
                 return self._take(noise) if self._buffer else None
             self._read(left)
 
@@ -137,19 +137,19 @@ class Wire:
         self.has_heard = self.has_heard or bool(data)
         self._buffer = (self._buffer + data)[-_MOST_UNREAD:]
 
-    def _take(self, symbol: HeardSymbol) -> HeardSymbol:
+    def _take(self, symbol: Symbol) -> Symbol:
         symbol = replace(symbol, at=self._clock())
         self._buffer = self._buffer[len(symbol.raw):]
         self.transcript.append(symbol)
         if symbol.kind is SymbolKind.MESSAGE:
             self._response = codec.NAK  # until it has one
-        self._embedded.extend(HeardSymbol(kind, b'', at=symbol.at) for kind in symbol.embedded)
+        self._embedded.extend(Symbol(kind, b'', at=symbol.at) for kind in symbol.embedded)
         if not self._embedded:
             return symbol
         self._embedded.append(symbol)
         return self._embedded.popleft()
 
-    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> HeardSymbol:
+    def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Symbol:
         """Return the next symbol if it is of ``kind`` and good; raises Failed."""
         expected = what or kind.value
         symbol = self.hear(within, answers=kind is not SymbolKind.ENQ)
@@ -165,8 +165,8 @@ class Wire:
         if symbol is not None:
             raise Failed(f'silence: {what}', str(symbol))
 
-    def until(self, is_wanted: Callable[[HeardSymbol], bool], what: str,
-              within: float) -> HeardSymbol:
+    def until(self, is_wanted: Callable[[Symbol], bool], what: str,
+              within: float) -> Symbol:
         """Return the first symbol that ``is_wanted``, whatever comes before it."""
         end = self._clock() + within
         while (left := end - self._clock()) > 0:

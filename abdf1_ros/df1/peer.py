@@ -166,7 +166,7 @@ class FullDuplexPeer:
         yield from self._listen()  # it answers an earlier process
         while True:
             self._expire()
-            # In turns, or an other end that asks all the time would keep our commands waiting.
+            # In turns, or an end that asks all the time would keep our commands waiting.
             if self._replies:
                 yield from self._send_reply(self._replies.popleft())
             task = self._next_task(source)

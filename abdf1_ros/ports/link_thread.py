@@ -284,7 +284,7 @@ class LinkThread(threading.Thread):
         return attempt.port
 
     def _exchange(self) -> None:
-        """Put the machine on the line that is to be there."""
+        """Put a machine on the line that has been handed over, if there is one."""
         exchange, self._next = self._next, None
         if exchange is not None and exchange.claim():
             self._machine.stop(PortLost(_READ_AGAIN))

@@ -204,7 +204,7 @@ class Line:
         else:
             try:
                 node.check()
-            except Exception as error:  # the same
+            except Exception as error:  # a bug ends this line, not the others
                 self._begin_again(error)
 
     def _begin_again(self, error: Exception | str) -> None:

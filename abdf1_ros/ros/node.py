@@ -46,7 +46,7 @@ from abdf1_ros.ros.process import (
     run_ros,
     take_last_writes,
 )
-from abdf1_ros.ros.session import BridgeSession, Surroundings
+from abdf1_ros.ros.session import Session, Surroundings
 from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
@@ -131,7 +131,7 @@ class BridgeNode(Node):
             self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
             self.create_publisher(DiagnosticArray, '~/snapshot', 1), self._writes)
-        self.session = BridgeSession(self._surroundings, configuration)
+        self.session = Session(self._surroundings, configuration)
         self.link = self._surroundings.link = LinkThread(
             self.driver.machine, self._opener.open,
             on_state=self._port_changed, on_fault=self._fault,
@@ -240,7 +240,7 @@ class BridgeNode(Node):
         """Use the new files; return False where the link does not take them, and is broken."""
         # For heartbeats and fallbacks new files count as a start.
         self.tell_plcs('goes on with new files')
-        before, self.session = self.session, BridgeSession(self._surroundings, configuration)
+        before, self.session = self.session, Session(self._surroundings, configuration)
         if not self.link.exchange(self.driver.machine, self.session.reads.publish_later_values,
                                   self._opener.use(_port_settings(configuration))):
             return False

@@ -49,7 +49,7 @@ from abdf1_ros.ros.log import EventLog, LimitedLog
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.parameters import Configuration
 from abdf1_ros.ros.reads import ReadTopic, ReadTopics
-from abdf1_ros.ros.snapshot import ValueSnapshot
+from abdf1_ros.ros.snapshot import Snapshot
 from abdf1_ros.ros.station_health import LinkCounterService
 from abdf1_ros.ros.write_log import is_usual_fallback
 from abdf1_ros.ros.writes import WriteTopics
@@ -100,7 +100,7 @@ class Surroundings:
             self.node.executor.wake()
 
 
-class BridgeSession:
+class Session:
     """
     The bridge between one pair of files and ROS; the listener of its driver.
 
@@ -142,7 +142,7 @@ class BridgeSession:
         self._port_text = ''
         self._levels: list[bytes] = []
         self._next_diagnostics = self._next_look = self._next_snapshot = 0.0
-        self._snapshot: ValueSnapshot | None = None
+        self._snapshot: Snapshot | None = None
         # The nodes of a process are not to publish all at the same moment.
         self._phase = random.uniform(0.0, parameters.diagnostics_period)
 
@@ -462,7 +462,7 @@ class BridgeSession:
             return
         self._next_snapshot = now + period
         if self._surroundings.snapshot.get_subscription_count():
-            self._snapshot = self._snapshot or ValueSnapshot(self.driver.points, self.reads.latest)
+            self._snapshot = self._snapshot or Snapshot(self.driver.points, self.reads.latest)
             self._publish(self._surroundings.snapshot, self._snapshot.message(now))
 
     def _publish(self, publisher: Any, message: DiagnosticArray) -> None:

@@ -38,7 +38,7 @@ _WORDS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.STALE: 'STALE',
           DiagnosticStatus.ERROR: 'ERROR'}
 
 
-class ValueSnapshot:
+class Snapshot:
     """
     The last values of ``points``, which ``latest`` holds by topic, as one message.
 

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.codec import BlockCheck, HeardSymbol, SymbolKind
+from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 import pytest
 
 # M 5-4 and 5-5: DST 08 ... with a byte 10, which is doubled; to station 20 (hex) as a master.
@@ -45,23 +45,23 @@ def test_frames_are_those_of_the_manual(frame: bytes, printed: str) -> None:
 
 
 @pytest.mark.parametrize(('raw', 'is_half_duplex', 'symbol'), [
-    ('10 06 10', True, HeardSymbol(SymbolKind.ACK, codec.ACK)),
-    ('10 05', False, HeardSymbol(SymbolKind.ENQ, codec.ENQ)),
-    ('10 05 11 EF', True, HeardSymbol(SymbolKind.POLL, bytes.fromhex('100511EF'), station=0x11)),
-    ('10 05 11 EE', True, HeardSymbol(SymbolKind.POLL, bytes.fromhex('100511EE'), station=0x11,
+    ('10 06 10', True, Symbol(SymbolKind.ACK, codec.ACK)),
+    ('10 05', False, Symbol(SymbolKind.ENQ, codec.ENQ)),
+    ('10 05 11 EF', True, Symbol(SymbolKind.POLL, bytes.fromhex('100511EF'), station=0x11)),
+    ('10 05 11 EE', True, Symbol(SymbolKind.POLL, bytes.fromhex('100511EE'), station=0x11,
                                       is_good=False)),
-    ('55 00 10 06', True, HeardSymbol(SymbolKind.NOISE, b'\x55\x00')),
+    ('55 00 10 06', True, Symbol(SymbolKind.NOISE, b'\x55\x00')),
     ('10 02 08 10 10 10 03 E8', True,
-     HeardSymbol(SymbolKind.MESSAGE, bytes.fromhex('1002081010 1003E8'), b'\x08\x10')),
+     Symbol(SymbolKind.MESSAGE, bytes.fromhex('1002081010 1003E8'), b'\x08\x10')),
     ('10 02 08 10 06 09 10 03 EF', False,
-     HeardSymbol(SymbolKind.MESSAGE, bytes.fromhex('10020810060910 03EF'), b'\x08\x09',
+     Symbol(SymbolKind.MESSAGE, bytes.fromhex('10020810060910 03EF'), b'\x08\x09',
                  embedded=(SymbolKind.ACK,))),
     ('10 02 08 10 03 F9', True,
-     HeardSymbol(SymbolKind.MESSAGE, bytes.fromhex('100208 1003F9'), b'\x08', is_good=False)),
-    ('10 02 08 10 05', False, HeardSymbol(SymbolKind.NOISE, b'\x10\x02\x08')),
+     Symbol(SymbolKind.MESSAGE, bytes.fromhex('100208 1003F9'), b'\x08', is_good=False)),
+    ('10 02 08 10 05', False, Symbol(SymbolKind.NOISE, b'\x10\x02\x08')),
     ('10 02 08 10 03', True, None),
     ('10', True, None),
     ('', True, None),
 ])
-def test_bytes_become_symbols(raw: str, is_half_duplex: bool, symbol: HeardSymbol | None) -> None:
+def test_bytes_become_symbols(raw: str, is_half_duplex: bool, symbol: Symbol | None) -> None:
     assert codec.next_symbol(bytes.fromhex(raw), BlockCheck.BCC, is_half_duplex) == symbol

@@ -25,7 +25,7 @@ import time
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.node import BridgeNode
-from abdf1_ros.ros.snapshot import ValueSnapshot
+from abdf1_ros.ros.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -45,7 +45,7 @@ def status_of(mapping: Mapping, values: array | str | None, *others: Mapping,
         points[mapping].last_good = now - age
     points[mapping].error = error
     latest = {} if values is None else {mapping.topic: values}
-    return ValueSnapshot(points, latest).message(now).status[0]
+    return Snapshot(points, latest).message(now).status[0]
 
 
 def test_single_value_has_all_that_is_known_of_it() -> None:
@@ -117,7 +117,7 @@ def test_snapshot_comes_to_who_subscribes(inbox: Inbox) -> None:
 def test_snapshot_is_made_for_nobody(inbox: Inbox, monkeypatch: pytest.MonkeyPatch) -> None:
     inbox.first()
     made: list[float] = []
-    monkeypatch.setattr(ValueSnapshot, 'message', lambda snapshot, now: made.append(now))
+    monkeypatch.setattr(Snapshot, 'message', lambda snapshot, now: made.append(now))
     publisher_gone = time.monotonic() + 0.5
     inbox._observer.forget(inbox)
     inbox._observer.until(lambda: time.monotonic() > publisher_gone, 'half a second')
