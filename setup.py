@@ -41,7 +41,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
         (f'share/{PACKAGE}/config', sorted(glob('config/*.csv') + glob('config/*.yaml'))),
-        (f'share/{PACKAGE}/config/sros2', ['config/sros2/policy.xml']),
+        (f'share/{PACKAGE}/config/sros2', sorted(glob('config/sros2/*.xml'))),
         (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
         (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
         (f'share/{PACKAGE}/examples/testing', sorted(glob('examples/testing/*.py'))),

@@ -35,6 +35,7 @@ from support.ros_tools import needs
 
 ROOT = Path(__file__).resolve().parent.parent
 POLICY = ROOT / 'config' / 'sros2' / 'policy.xml'
+TWO_ROBOTS = POLICY.with_name('two_robots.xml')
 SECURITY = ROOT / 'docs' / 'security.md'
 
 
@@ -62,6 +63,10 @@ def unused(names: set[str], patterns: set[str]) -> set[str]:
     return {pattern for pattern in patterns
             if not any(fnmatchcase(name, pattern) for name in names)}
 
+
+# What is asked of the graph of a node, and where the policy allows it.
+ASKED = [('publisher', 'topics', 'publish'), ('subscriber', 'topics', 'subscribe'),
+         ('service', 'services', 'reply'), ('client', 'services', 'request')]
 
 Graph = Callable[[str], set[str]]
 
@@ -92,6 +97,10 @@ def keys_of(folder: Path, policy: Path) -> subprocess.CompletedProcess[str]:
     blocks = re.findall(r'^```\n(.*?)^```$', SECURITY.read_text('utf-8'), re.DOTALL | re.MULTILINE)
     block, = [block for block in blocks if 'create_keystore' in block]
     lines = [line for line in block.splitlines() if not line.startswith(('sudo ', 'POLICY='))]
+    if policy == TWO_ROBOTS:
+        other, = [block for block in blocks if policy.name in block]
+        change, = [line for line in other.splitlines() if line.startswith('ENCLAVES=')]
+        lines = [change if line.startswith('ENCLAVES=') else line for line in lines]
     return subprocess.run(
         ['bash', '-c', '\n'.join(lines)], cwd=folder, env=os.environ | {'POLICY': str(policy)},
         capture_output=True, text=True, timeout=60, check=False)
@@ -132,9 +141,7 @@ def test_policy_that_is_refused_leaves_no_keys_that_allow_everything(tmp_path: P
     assert not list((tmp_path / 'keystore' / 'enclaves').glob('*/permissions.p7s'))
 
 
-@pytest.mark.parametrize(('what', 'kind', 'qualifier'), [
-    ('publisher', 'topics', 'publish'), ('subscriber', 'topics', 'subscribe'),
-    ('service', 'services', 'reply'), ('client', 'services', 'request')])
+@pytest.mark.parametrize(('what', 'kind', 'qualifier'), ASKED)
 def test_policy_allows_the_node_exactly_what_it_does(
         graph: Graph, what: str, kind: str, qualifier: str) -> None:
     names, patterns = graph(what), allowed('abdf1', kind, qualifier)
@@ -154,20 +161,67 @@ def test_consumer_can_neither_write_nor_call() -> None:
     assert uncovered({'/abdf1/write/x'}, allowed(node, 'topics', 'subscribe'))
 
 
-def test_consumer_can_do_what_the_example_does() -> None:
+Consumer = Callable[..., Node]
+
+
+@pytest.fixture
+def consumer() -> Iterator[Consumer]:
+    """Return what makes a node of the example, in a namespace."""
     spec = importlib.util.spec_from_file_location(
         'interlock_consumer', ROOT / 'examples' / 'interlock_consumer.py')
     assert spec is not None and spec.loader is not None
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
-    rclpy.init(args=[])
-    try:
-        node = example.InterlockConsumer('/abdf1/read/cell_interlocks', [0], 2.0)
-        for what, kind, qualifier in (
-                ('publisher', 'topics', 'publish'), ('subscriber', 'topics', 'subscribe'),
-                ('service', 'services', 'reply'), ('client', 'services', 'request')):
-            names = _names(node, what)
-            assert uncovered(names, allowed('interlock_consumer', kind, qualifier)) == set()
+
+    def make(namespace: str = '/') -> Node:
+        rclpy.init(args=['--ros-args', '-r', f'__ns:={namespace}'])
+        node: Node = example.InterlockConsumer('abdf1/read/cell_interlocks', [0], 2.0)
+        return node
+
+    yield make
+    rclpy.utilities.try_shutdown()
+
+
+def test_consumer_can_do_what_the_example_does(consumer: Consumer) -> None:
+    node = consumer()
+    for what, kind, qualifier in ASKED:
+        names = _names(node, what)
+        assert uncovered(names, allowed('interlock_consumer', kind, qualifier)) == set()
+    node.destroy_node()
+
+
+# Two robots
+
+
+def dds_names(node: Node, what: str) -> set[str]:
+    """Return the DDS topics that a node publishes or subscribes to, as its graph tells."""
+    if what == 'publish':
+        return {f'rt{name}' for name in _names(node, 'publisher')} \
+            | {f'rr{name}Reply' for name in _names(node, 'service')}
+    return {f'rt{name}' for name in _names(node, 'subscriber')} \
+        | {f'rq{name}Request' for name in _names(node, 'service')}
+
+
+def test_two_robots_have_keys_for_their_own_namespace_and_no_more(
+        tmp_path: Path, consumer: Consumer) -> None:
+    needs('sros2')
+    made = keys_of(tmp_path, TWO_ROBOTS)
+    assert made.returncode == 0, made.stderr
+    assert made.stdout.splitlines()[-2:] == ['robot_1', 'robot_2'], made.stderr
+    for robot, other in (('robot_1', 'robot_2'), ('robot_2', 'robot_1')):
+        folder = tmp_path / 'keystore' / 'enclaves' / robot
+        bridge, cell = folder / 'abdf1' / 'permissions.xml', folder / 'cell' / 'permissions.xml'
+        observed = consumer(f'/{robot}')
+        node = BridgeNode(use_global_arguments=False, cli_args=[
+            *ros_args(*EXAMPLE_FILES, 'port:=/nowhere/port'), '-r', f'__ns:=/{robot}'])
+        for what in ('publish', 'subscribe'):
+            assert uncovered(dds_names(node, what), topics_of(bridge, what)) == set()
+            assert unused(dds_names(node, what), topics_of(bridge, what)) == set()
+            assert uncovered(dds_names(observed, what), topics_of(cell, what)) == set()
+            for permissions in (bridge, cell):
+                assert ElementTree.parse(permissions).getroot().findtext('.//default') == 'DENY'
+                assert not [name for name in topics_of(permissions, what) if other in name]
+        assert not [name for name in topics_of(cell, 'publish') if '/write/' in name]
         node.destroy_node()
-    finally:
+        observed.destroy_node()
         rclpy.utilities.try_shutdown()
