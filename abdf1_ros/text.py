@@ -38,6 +38,11 @@ def value_text(value: float) -> str:
     return str(value) if isinstance(value, int) else f'{value:.7g}'
 
 
+def cut(text: str, width: int) -> str:
+    """Return ``text`` in at most ``width`` characters; a longer one ends with "..."."""
+    return text if len(text) <= width else text[:max(width - 3, 0)] + '...'[:width]
+
+
 def by_number(name: str) -> list[tuple[int, str]]:
     """Return a key that sorts names as people do: line2 before line10."""
     return [(int(part) if part.isdecimal() else 0, part)

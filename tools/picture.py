@@ -30,7 +30,7 @@ import subprocess
 import sys
 from xml.sax.saxutils import escape
 
-from abdf1_ros.cli.terminal import cut
+from abdf1_ros.text import cut
 
 _CHARACTER = 7.25  # width of one in the font below, in pixels
 _LINE = 16

@@ -125,7 +125,8 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
     """Return the output for two files, and whether they have no error."""
     found = examine(options.net, options.map, options.default_period / 1000)
     report = _report(found, options)
-    return _json(found, report) if options.json else _text(found, report), not found.problems
+    text = json.dumps(_content(found, report), indent=2) if options.json else _text(found, report)
+    return text, not found.problems
 
 
 def _report(found: Findings, options: argparse.Namespace) -> Report | None:
@@ -327,11 +328,6 @@ def _times_text(report: Report) -> str:
             f'load of the line: {report.load:.0%} of the time is needed to keep the periods\n'
             f'longest transaction: {report.longest_transaction * 1000:.0f} ms with all repetitions'
             + ''.join(f'\n{printable(str(line))}' for line in (*report.bounds, *report.advice)))
-
-
-def _json(found: Findings, report: Report | None) -> str:
-    """Return the output for programs."""
-    return json.dumps(_content(found, report), indent=2)
 
 
 def _content(found: Findings, report: Report | None) -> dict[str, Any]:

@@ -242,21 +242,15 @@ def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
 def _end(options: argparse.Namespace, target: Target, wire: Wire,
          network: Network) -> MasterEnd | PeerEnd | SlaveEnd | ServerEnd:
     """Return the end that we play."""
-    first_tns = random.randrange(0x10000)
-    words = _words(options)
-    if target is Target.SLAVE:
-        return MasterEnd(wire, options.station, network.station, first_tns, words)
-    if target is Target.PEER:
-        return PeerEnd(wire, options.station, network.station, first_tns, words)
+    if target in (Target.SLAVE, Target.PEER):
+        kind = MasterEnd if target is Target.SLAVE else PeerEnd
+        file, element = options.words or (7, 0)
+        words = Words(file, element, options.count, options.family or '')
+        return kind(wire, options.station, network.station, random.randrange(0x10000), words)
     serve = _server(options, network)
     if target is Target.MASTER:
         return SlaveEnd(wire, options.station, serve)
     return ServerEnd(wire, serve)
-
-
-def _words(options: argparse.Namespace) -> Words:
-    file, element = options.words or (7, 0)
-    return Words(file, element, options.count, options.family or '')
 
 
 def _integer_words(text: str) -> tuple[int, int]:

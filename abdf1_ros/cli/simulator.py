@@ -197,21 +197,22 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
                      Checksum(options.check), time.monotonic)
     for station in options.ladder:
         _run_ladder(station, plcs)
-    if options.full_duplex is None:
-        return plcs
+    return plcs if options.full_duplex is None else [
+        _plc('--full-duplex', options.full_duplex, plcs)]
+
+
+def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPlc:
+    """Return the PLC that an option names; ValueError where there is none."""
     for plc in plcs:
-        if options.full_duplex == str(plc.station):
-            return [plc]
+        if station == str(plc.station):
+            return plc
     known = ', '.join(str(plc.station) for plc in plcs)
-    raise ValueError(f'--full-duplex: name a station ({known})')
+    raise ValueError(f'{option}: name a station ({known})')
 
 
 def _run_ladder(station: str, plcs: Sequence[SimulatedPlc]) -> None:
     """Run the ladder program of a station; changes of its lamps are printed."""
-    plc = next((plc for plc in plcs if station == str(plc.station)), None)
-    if plc is None:
-        known = ', '.join(str(plc.station) for plc in plcs)
-        raise ValueError(f'--ladder: name a station ({known})')
+    plc = _plc('--ladder', station, plcs)
 
     def tell(at: float, lamp: Lamp, is_on: bool) -> None:
         if lamp in _LAMPS:
@@ -243,22 +244,21 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
             return _FaultyPort(open_port(), plcs[0], checksum)
 
         open_line = open_faulty
-    return LinkThread(machine, open_line, on_state=_Announcer().announce,
-                      on_fault=_print_fault)
+    return LinkThread(machine, open_line, on_state=_announcer(),
+                      on_fault=traceback.print_exception)
 
 
-class _Announcer:
-    """Print the states of the line, each once."""
+def _announcer() -> Callable[[PortState], None]:
+    """Return what prints the states of the line, each once, without the normal one."""
+    last = ''
 
-    def __init__(self) -> None:
-        self._last = ''
-
-    def announce(self, state: PortState) -> None:
-        """Print a state, unless it is the last one or the normal one."""
-        is_news = state.text != self._last and not state.is_open
-        self._last = state.text
+    def announce(state: PortState) -> None:
+        nonlocal last
+        is_news = state.text != last and not state.is_open
+        last = state.text
         if is_news and WAITING not in state.text:
             _say(state.text)
+    return announce
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
@@ -406,7 +406,3 @@ def _say(text: str) -> None:
         print(f'simulator: {text}', flush=True)
     except OSError:  # the reader has left; the PLCs go on
         drop_output()
-
-
-def _print_fault(error: Exception) -> None:
-    traceback.print_exception(error)

@@ -28,7 +28,7 @@ whether its check is good. The summary comes at the end, also after Ctrl-C.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 import math
 import os
 from pathlib import Path
@@ -96,7 +96,9 @@ class _Output:
         self._options = options
         self._session: TrafficDecoder | None = None
         self._summary = Summary(options.baud)
-        self._bundle = _bundle(options)
+        self._bundle = ReportBundle(
+            options.files, options.settings, options.conformance,
+            options.anonymous) if options.report else None
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
         self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
@@ -180,11 +182,6 @@ class _Output:
             print(json_line(entry))
         elif not self._options.summary:
             print(text_line(entry, self._colour))
-
-
-def _bundle(options: argparse.Namespace) -> ReportBundle | None:
-    return ReportBundle(options.files, options.settings, options.conformance,
-                        options.anonymous) if options.report else None
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -324,13 +321,15 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
         settings['baud'] = str(baud)
     try:
         tap = Tap(names, PortSettings('', baud or _DEFAULT_BAUD, parity=options.parity))
-        _end_with(tap.stop)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: tap.stop())
         with tap:
             trace = Trace(options.save, settings, _say) if options.save else None
             _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
             return _print_heard(tap, trace, output, settings, options.seconds)
+    except BrokenPipeError:  # of our output, not of a port
+        raise
     except OSError as error:
-        _raise_broken_pipe(error)
         _say(reason_of(error.filename, error) if error.filename else str(error))
         return EXIT_USAGE
 
@@ -349,26 +348,15 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
             output.take(chunk, settings)
             sys.stdout.flush()
             idle()
+    except BrokenPipeError:
+        raise
     except OSError as error:
-        _raise_broken_pipe(error)
         _say(f'a port was lost: {error}')
         status = EXIT_LOST
     if trace:
         trace.close()
     output.end()
     return status
-
-
-def _raise_broken_pipe(error: Exception) -> None:
-    """Raise a broken pipe again: it is not a fault of port or file."""
-    if isinstance(error, BrokenPipeError):
-        raise error
-
-
-def _end_with(end: Callable[[], None]) -> None:
-    """Let SIGINT and SIGTERM call ``end``."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: end())
 
 
 def _say(text: str) -> None:

@@ -203,11 +203,6 @@ def command_parser(name: str, description: str | None,
     return parser
 
 
-def cut(line: str, width: int) -> str:
-    """Return ``line`` in at most ``width`` characters; a longer one ends with "..."."""
-    return line if len(line) <= width else line[:max(width - 3, 0)] + '...'[:width]
-
-
 class Progress:
     """
     Tell the progress of work of more than two seconds on standard error.

@@ -19,12 +19,10 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import PATIENCE, ServerEnd
+from abdf1_ros.conform.ends import MOST_REPETITIONS, PATIENCE, ServerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _CLIENT = Target.CLIENT
-
-_MOST_REPETITIONS = 12
 
 
 @case('nak-repeated', 'A message answered with DLE NAK is sent again.', 'M 4-5', _CLIENT)
@@ -41,12 +39,12 @@ def nak_repeated(end: ServerEnd) -> None:
       'M 4-5', _CLIENT)
 def nak_limit(end: ServerEnd) -> None:
     first = end.next_command()
-    for _ in range(_MOST_REPETITIONS):
+    for _ in range(MOST_REPETITIONS):
         end.wire.send(codec.NAK)
         symbol = end.wire.hear(PATIENCE)
         if symbol is None or symbol.data != first.data:
             return
-    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
 @case('silence-enquired', 'Silence is answered with DLE ENQ, not with the message; DLE ACK then '
@@ -99,8 +97,7 @@ def _refuse(end: ServerEnd, *then: bytes) -> None:
     for raw in (damaged, *then):
         end.wire.send(raw)
         end.wire.expect(SymbolKind.NAK)
-    end.reply_to(command)
-    end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
+    end.reply_and_hear(command, 'DLE ACK for the good reply')
 
 
 def _expect_ack(end: ServerEnd, what: str) -> None:

@@ -32,6 +32,8 @@ POLL_PAUSE = 0.02
 # A target that sends by itself may take so long (s) to send something.
 PATIENCE = 30.0
 
+# A case does not wait for more repetitions or enquiries than this.
+MOST_REPETITIONS = 12
 _MOST_TRIES = 3
 
 # A reply may take so many answer times.
@@ -243,6 +245,11 @@ class AnsweringEnd(ABC):
         """Send the reply to a command; on a half-duplex line that is the answer to a poll."""
         self.wire.send(codec.message(self.serve(command.data), self.wire.check))
 
+    def reply_and_hear(self, command: Symbol, what: str = 'DLE ACK for a good reply') -> None:
+        """Send the reply to a command, and hear the ACK; Failed says ``what`` was expected."""
+        self.reply_to(command)
+        self.wire.expect(SymbolKind.ACK, what)
+
     def _command(self, symbol: Symbol) -> Symbol:
         if not symbol.is_good:
             raise Failed('a message with the right check', symbol.raw.hex(' '))
@@ -279,8 +286,7 @@ class SlaveEnd(AnsweringEnd):
     def finish(self, command: Symbol) -> None:
         self.wire.send(codec.ACK)
         self.next_poll()
-        self.reply_to(command)
-        self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
+        self.reply_and_hear(command)
 
 
 class ServerEnd(AnsweringEnd):
@@ -292,5 +298,4 @@ class ServerEnd(AnsweringEnd):
 
     def finish(self, command: Symbol) -> None:
         self.wire.send(codec.ACK)
-        self.reply_to(command)
-        self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
+        self.reply_and_hear(command)

@@ -19,12 +19,10 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import Symbol, SymbolKind
-from abdf1_ros.conform.ends import PATIENCE, SlaveEnd
+from abdf1_ros.conform.ends import MOST_REPETITIONS, PATIENCE, SlaveEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _MASTER = Target.MASTER
-
-_MOST_REPETITIONS = 12
 
 
 @case('poll-form', 'A poll is DLE ENQ, the station, and a BCC, on a line with CRC too.',
@@ -51,11 +49,11 @@ def repetitions_limited(end: SlaveEnd) -> None:
     def is_other(symbol: Symbol) -> bool:
         return symbol.kind is not SymbolKind.MASTER_MESSAGE or symbol.data != first.data
 
-    for _ in range(_MOST_REPETITIONS):
+    for _ in range(MOST_REPETITIONS):
         symbol = end.wire.hear(PATIENCE)
         if symbol is None or is_other(symbol):
             return
-    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
 @case('polled-after-ack', 'After DLE ACK the master polls for the reply.', 'M 3-13', _MASTER)
@@ -72,8 +70,7 @@ def eot_polled_again(end: SlaveEnd) -> None:
     end.next_poll()
     end.wire.send(codec.EOT)
     end.next_poll('another poll after DLE EOT')
-    end.reply_to(command)
-    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
+    end.reply_and_hear(command)
 
 
 @case('bad-reply-polled-again', 'A reply with a wrong check is asked for by another poll; DLE NAK '
@@ -85,8 +82,7 @@ def bad_reply_polled_again(end: SlaveEnd) -> None:
     frame = codec.message(end.serve(command.data), end.wire.check)
     end.wire.send(codec.damaged(frame))
     end.next_poll('another poll of this station')
-    end.reply_to(command)
-    end.wire.expect(SymbolKind.ACK, 'DLE ACK for the good reply')
+    end.reply_and_hear(command, 'DLE ACK for the good reply')
 
 
 @case('duplicate-acknowledged', 'A reply that comes again, as after a lost DLE ACK, is '
@@ -99,12 +95,10 @@ def duplicate_acknowledged(end: SlaveEnd) -> None:
     if visit.kind is SymbolKind.MASTER_MESSAGE:
         end.wire.send(codec.ACK)
         end.next_poll()
-    end.reply_to(command)
-    end.wire.expect(SymbolKind.ACK, 'DLE ACK for a reply that came before')
+    end.reply_and_hear(command, 'DLE ACK for a reply that came before')
     if visit.kind is SymbolKind.MASTER_MESSAGE:
         end.next_poll()
-        end.reply_to(visit)
-        end.wire.expect(SymbolKind.ACK, 'DLE ACK for the reply after it')
+        end.reply_and_hear(visit, 'DLE ACK for the reply after it')
 
 
 @case('waits-for-slow-answer', 'A master listens for as long as an answer may take: it sends '

@@ -19,13 +19,11 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import check_reply, PeerEnd
+from abdf1_ros.conform.ends import check_reply, MOST_REPETITIONS, PeerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _PEER = Target.PEER
 
-# A case does not wait for more repetitions or enquiries than this.
-_MOST_REPETITIONS = 12
 
 # How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the
 # defaults of the products (M 7-25, 7-27).
@@ -95,7 +93,7 @@ def reply_repeated_after_nak(end: PeerEnd) -> None:
 @case('nak-limit', 'A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
 def nak_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
-    for _ in range(_MOST_REPETITIONS + 1):
+    for _ in range(MOST_REPETITIONS + 1):
         symbol = end.wire.hear(_ACK_TIMEOUT)
         if symbol is None:
             return
@@ -103,7 +101,7 @@ def nak_limit(end: PeerEnd) -> None:
             raise Failed('the message again, or silence', str(symbol))
         end.wire.send(codec.NAK)
     end.settle()
-    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
 @case('silence-is-enquired', 'A message without any response is followed by DLE ENQ; DLE ACK '
@@ -134,14 +132,14 @@ def no_needless_enquiry(end: PeerEnd) -> None:
 def enquiry_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
-    for _ in range(_MOST_REPETITIONS):
+    for _ in range(MOST_REPETITIONS):
         symbol = end.wire.hear(_ACK_TIMEOUT, answers=False)
         if symbol is None:
             return
         if symbol.kind is not SymbolKind.ENQ:
             raise Failed('DLE ENQ, or silence', str(symbol))
     end.settle()
-    raise Skipped(f'more than {_MOST_REPETITIONS} enquiries: a larger limit is set')
+    raise Skipped(f'more than {MOST_REPETITIONS} enquiries: a larger limit is set')
 
 
 @case('embedded-response', 'A response inside a message counts, and is not part of the message.',

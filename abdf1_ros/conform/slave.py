@@ -23,13 +23,11 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import check_reply, MasterEnd
+from abdf1_ros.conform.ends import check_reply, MasterEnd, MOST_REPETITIONS
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _SLAVE = Target.SLAVE
 
-# A case does not wait for more repetitions than this.
-_MOST_REPETITIONS = 12
 
 # Commands that are sent without a poll in between, to fill a slave's buffers.
 _BURST = 8
@@ -152,12 +150,12 @@ def acknowledged_dropped(end: MasterEnd) -> None:
 def repetitions_limited(end: MasterEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
-    for _ in range(_MOST_REPETITIONS):
+    for _ in range(MOST_REPETITIONS):
         symbol = end.poll()
         if symbol is None or symbol.kind is SymbolKind.EOT:
             return
     end.settle()
-    raise Skipped(f'sent more than {_MOST_REPETITIONS} times: a larger limit is set')
+    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
 @case('full-is-silent', 'A slave that can take no more messages does not acknowledge; what it has '

@@ -70,28 +70,29 @@ def beyond(words: int) -> str:
 
 def words_text(data: bytes) -> str:
     """Return words as hexadecimal numbers, their high byte first."""
-    return hexadecimal(data) if len(data) % 2 else ' '.join(
-        f'{value:04X}' for value in _unpack('H', data))
+    return _listed(data, 'H', '{:04X}'.format)
 
 
 def integers_text(data: bytes) -> str:
     """Return words as signed numbers."""
-    return hexadecimal(data) if len(data) % 2 else ' '.join(map(str, _unpack('h', data)))
+    return _listed(data, 'h')
 
 
 def longs_text(data: bytes) -> str:
     """Return pairs of words as signed numbers."""
-    return hexadecimal(data) if len(data) % 4 else ' '.join(map(str, _unpack('i', data)))
+    return _listed(data, 'i')
 
 
 def floats_text(data: bytes) -> str:
     """Return pairs of words as float32."""
-    return hexadecimal(data) if len(data) % 4 else ' '.join(
-        map(value_text, _unpack('f', data)))
+    return _listed(data, 'f', value_text)
 
 
-def _unpack(code: str, data: bytes) -> tuple[Any, ...]:
-    return struct.unpack(f'<{len(data) // struct.calcsize(code)}{code}', data)
+def _listed(data: bytes, code: str, show: Callable[[Any], str] = str) -> str:
+    """Return values of this code of ``struct``, or bytes where they are not whole values."""
+    if len(data) % struct.calcsize(code):
+        return hexadecimal(data)
+    return ' '.join(show(value) for value, in struct.iter_unpack(f'<{code}', data))
 
 
 # Types whose values are numbers; all others are shown as words.

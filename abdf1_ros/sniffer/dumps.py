@@ -22,6 +22,7 @@ characters that ``xxd`` and ``hexdump -C`` put beside them. It has neither times
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 import re
 
@@ -72,18 +73,20 @@ class Recording:
     def chunks(self) -> Iterator[Chunk]:
         """Yield the chunks; Problem names file and line where something cannot be read."""
         with self._file:
-            if not self._is_binary and is_packet_file(self._file.peek(4)):
-                yield from self._packets()
-                return
             if self._is_binary:
                 yield from self._binary()
-                return
-            lines = self._lines()
-            first = next(lines, '')
-            if is_capture_line(first):
-                yield from read_capture(self._name, _chained(first, lines), self.settings)
+            elif is_packet_file(self._file.peek(4)):
+                yield from self._packets()
             else:
-                yield from read_hex(self._name, _chained(first, lines))
+                yield from self._text()
+
+    def _text(self) -> Iterator[Chunk]:
+        lines = self._lines()
+        first = next(lines, '')
+        lines = chain([first], lines)
+        if is_capture_line(first):
+            return read_capture(self._name, lines, self.settings)
+        return read_hex(self._name, lines)
 
     def _packets(self) -> Iterator[Chunk]:
         file = PacketFile(self._name, self._file)
@@ -111,11 +114,6 @@ class Recording:
                 raise Problem(where, f'the line is longer than {_LONGEST_LINE // 1_000_000} MB; '
                               'divide it, or for a file of raw bytes give --binary')
             yield line.decode('ascii').rstrip('\r\n')
-
-
-def _chained(first: str, rest: Iterable[str]) -> Iterator[str]:
-    yield first
-    yield from rest
 
 
 def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:

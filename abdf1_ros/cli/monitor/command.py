@@ -29,7 +29,8 @@ change, or when a PLC writes to us, promise nothing.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 import curses
 import locale
 import math
@@ -120,10 +121,8 @@ class _Screen:
         self._keys = keys
         self._colours: dict[Style, int] = {}
         window.nodelay(True)
-        try:
+        with suppress(curses.error):  # a terminal that cannot hide the cursor
             curses.curs_set(0)
-        except curses.error:  # a terminal that cannot hide the cursor
-            pass
         if curses.has_colors() and 'NO_COLOR' not in os.environ:
             curses.use_default_colors()
             for style, number in _COLOURS.items():
@@ -153,19 +152,15 @@ class _Screen:
                 attributes = curses.A_BOLD
             if line.section and line.section == self._chosen:
                 attributes |= curses.A_REVERSE
-            try:
+            with suppress(curses.error):  # letters of double width, or a window just made smaller
                 self._window.addnstr(row, 0, line.text, self.width, attributes)
-            except curses.error:  # letters of double width, or a window just made smaller
-                pass
         self._bottom(f'{min(self._top + 1, last)}-{last} of {count}  {self._keys}')
         self._window.refresh()
 
     def _bottom(self, text: str) -> None:
-        try:
+        with suppress(curses.error):  # a window just made smaller
             self._window.addnstr(
                 self._window.getmaxyx()[0] - 1, 0, text, self.width, curses.A_REVERSE)
-        except curses.error:  # a window just made smaller
-            pass
 
     def ask(self, question: str) -> str:
         """Return what is typed after a question on the last line; empty for Escape or Ctrl-C."""
@@ -197,38 +192,36 @@ class _Screen:
 
     def wants_other_list(self) -> bool:
         """Take the keys that have been pressed; tell whether one ends, or chooses a line."""
-        page = self._window.getmaxyx()[0] - 2
-        steps = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
-                 curses.KEY_NPAGE: page, ord(' '): page, curses.KEY_HOME: -1_000_000,
-                 curses.KEY_END: 1_000_000}
-        while (key := self._window.getch()) != -1:
+        for key, rows in self._pressed():
             if key == ord('q'):
                 return True
             if key in _RETURN and self._chosen:
                 self.chosen = self._chosen
                 return True
-            self._clear_for(key)
-            self._step += steps.get(key, 0)
+            self._step += rows
         return False
 
-    def _clear_for(self, key: int) -> None:
-        if key in (_CONTROL_L, curses.KEY_RESIZE):
-            self._window.clearok(True)
+    def _pressed(self) -> Iterator[tuple[int, int]]:
+        """Take the keys that have been pressed, each with the rows that it goes down."""
+        page = self._window.getmaxyx()[0] - 2
+        rows = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
+                curses.KEY_NPAGE: page, ord(' '): page, curses.KEY_HOME: -1_000_000,
+                curses.KEY_END: 1_000_000}
+        while (key := self._window.getch()) != -1:
+            if key in (_CONTROL_L, curses.KEY_RESIZE):
+                self._window.clearok(True)
+            yield key, rows.get(key, 0)
 
     def wants_end(self) -> bool:
         """Take the keys that have been pressed; tell whether one of them ends."""
-        page = self._window.getmaxyx()[0] - 2
-        steps = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
-                 curses.KEY_NPAGE: page, curses.KEY_HOME: -self._top, ord(' '): page}
-        while (key := self._window.getch()) != -1:
+        for key, rows in self._pressed():
             if key == ord('q'):
                 return True
-            self._clear_for(key)
             if key == ord('t') and self._toggle is not None:
                 self._toggle()
             if (section := _SECTION_KEYS.get(key)) in self._sections:
                 self._top = self._sections[section]
-            self._top = max(0, self._top + steps.get(key, 0))
+            self._top = max(0, self._top + rows)
         return False
 
 

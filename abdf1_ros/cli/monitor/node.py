@@ -95,6 +95,12 @@ class Listening:
         return self._node.create_subscription(
             message_type, topic, callback, qos, event_callbacks=_QUIET)
 
+    def spin(self, seconds: float) -> None:
+        """Listen for so many seconds."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.spin_once(left)
+
     def spin_once(self, seconds: float) -> None:
         """Take one message, or wait so long."""
         self._executor.spin_once(timeout_sec=seconds)
@@ -139,14 +145,12 @@ class NodeWatch(Listening):
             subscription.reading.values is not None or subscription.reading.promised is None
             for subscription in self._subscriptions.values())
 
-    def spin(self, seconds: float) -> None:
-        """Listen for so many seconds."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            if time.monotonic() >= self._next_discovery:
-                self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
-                self._discover()
-            self.spin_once(min(left, _DISCOVERY_PERIOD))
+    def spin_once(self, seconds: float) -> None:
+        """Take one message, or wait so long; look for topics when it is time."""
+        if time.monotonic() >= self._next_discovery:
+            self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
+            self._discover()
+        super().spin_once(min(seconds, _DISCOVERY_PERIOD))
 
     def bridges(self) -> list[str]:
         """Return the full names of the bridges that can be seen."""

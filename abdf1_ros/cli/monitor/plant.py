@@ -26,8 +26,8 @@ from dataclasses import dataclass
 import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_status
-from abdf1_ros.cli.monitor.view import cut, SILENCE, Status, Style, TextLine
-from abdf1_ros.text import by_number, printable
+from abdf1_ros.cli.monitor.view import SILENCE, Status, Style, TextLine
+from abdf1_ros.text import by_number, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
 
 _WORDS = {Style.GOOD: 'OK', Style.WARNING: 'WARN', Style.BAD: 'ERROR'}
@@ -66,12 +66,6 @@ class PlantWatch(Listening):
         super().__init__(ros_arguments)
         self._lines: dict[str, LineState] = {}
         self.subscribe(DiagnosticArray, '/diagnostics', self._take, 1000)
-
-    def spin(self, seconds: float) -> None:
-        """Listen for so many seconds."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            self.spin_once(left)
 
     def lines(self) -> list[LineState]:
         """Return all that have been heard."""

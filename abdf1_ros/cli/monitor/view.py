@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 import textwrap
 
-from abdf1_ros.text import printable, value_text
+from abdf1_ros.text import cut, printable, value_text
 
 # After so many seconds without diagnostics the picture says so; by default they come every second.
 SILENCE = 3.0
@@ -257,8 +257,3 @@ def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[Text
 
 def _pairs(values: Mapping[str, str], keys: Sequence[str]) -> str:
     return ', '.join(f'{key} {values[key]}' for key in keys if key in values)
-
-
-def cut(text: str, width: int) -> str:
-    """Return text of at most ``width`` characters."""
-    return text if len(text) <= width else text[:max(0, width - 3)] + '...'

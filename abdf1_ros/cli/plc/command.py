@@ -259,13 +259,13 @@ def _is_wanted(question: str) -> bool:
 def _carry_out(session: Session, writing: data.Writing) -> int:
     """Write, show what the PLC holds after it, and return the exit status."""
     mapping = writing.mapping
+    place = f'{mapping.address} of station {mapping.station}'
     result = writing.carry_out(session)
     text = str(result)
     if result.outcome is not Outcome.WRITTEN:
-        _complain(f'{mapping.address} of station {mapping.station}: {text}')
+        _complain(f'{place}: {text}')
         return EXIT_UNKNOWN if result.outcome in _UNCERTAIN else EXIT_FAILED
     try:
-        place = f'{mapping.address} of station {mapping.station}'
         print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)
         _print_values(mapping, data.read(session, mapping))
         sys.stdout.flush()
@@ -389,10 +389,6 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
 
 def _init(options: argparse.Namespace) -> int:
     target = init.Files(Path(options.into))
-    try:
-        target.check()
-    except Problem as problem:
-        raise ConfigurationError([problem]) from None
     if not options.port and not options.net:
         options.port = _only_port()
     network = network_of(options)

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from abdf1_ros.cli.plc import files
@@ -26,7 +25,7 @@ from abdf1_ros.cli.plc.detect import Found
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.pccc.file_search import DataFile
-from abdf1_ros.problems import Problem
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 
 _TIMEOUT = 300  # ms; the default of a net CSV is long for a person who waits
@@ -41,32 +40,24 @@ Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,Publish_While,Fallb
 """
 
 
-@dataclass(frozen=True, slots=True)
 class Files:
-    """Where the two files are to be."""
+    """
+    Where the two files are to be: ``net`` and ``map``.
 
-    folder: Path
+    Makes the folder where there is none; ConfigurationError where a file is there already.
+    """
 
-    @property
-    def net(self) -> Path:
-        """Return the net CSV."""
-        return self.folder / 'net.csv'
-
-    @property
-    def map(self) -> Path:  # noqa: A003
-        """Return the map CSV."""
-        return self.folder / 'map.csv'
-
-    def check(self) -> None:
-        """Raise Problem where a file is there already; make the folder where there is none."""
+    def __init__(self, folder: Path) -> None:
+        self.net, self.map = folder / 'net.csv', folder / 'map.csv'
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise Problem(str(self.folder), f'cannot be made: {error.strerror}') from None
+            raise ConfigurationError([Problem(
+                str(folder), f'cannot be made: {error.strerror}')]) from None
         for path in (self.net, self.map):
             if path.exists() and path.stat().st_size:  # a pipe that failed leaves an empty one
-                raise Problem(str(path), 'is there already and stays as it is; name another '
-                                         'folder with --into')
+                raise ConfigurationError([Problem(str(path), (
+                    'is there already and stays as it is; name another folder with --into'))])
 
     def write(self, network: Network, found: Found, stations: Sequence[Presence],
               listed: Mapping[int, Sequence[DataFile]]) -> None:

@@ -107,8 +107,7 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     _complete_watch(add('watch', 'show values live until Ctrl-C',
                         'watch B3:0 N7:0 --period 0.5 --net net.csv',
                         'watch I:1.0 --radix bin --net net.csv'))
-    status = add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv')
-    _add_station(status)
+    _add_station(add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv'))
     ping = add('ping', 'measure how long a PLC takes to send something back',
                'ping 1 --count 10 --net net.csv')
     _add_station(ping)
@@ -117,19 +116,13 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     scan = add('scan', 'look for stations', 'scan 0-31 --net net.csv')
     scan.add_argument('stations', metavar='STATIONS', nargs='?', type=_stations,
                       default=tuple(range(32)), help='such as 1,5 or 0-254 (default: 0-31)')
-    search = add('detect', 'find out the settings of a line by trying them',
-                 'detect --port /dev/ttyUSB0 --stations 1-4', defaults=_DETECT_DEFAULTS)
-    search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
-                        help='who may be there in half duplex (default: 0-7)')
-    search.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
+    _complete_search(add('detect', 'find out the settings of a line by trying them',
+                         'detect --port /dev/ttyUSB0 --stations 1-4', defaults=_DETECT_DEFAULTS))
     begin = add('init', 'find port, settings and stations, and write net.csv and map.csv',
                 'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4',
                 defaults=_DETECT_DEFAULTS)
-    begin.add_argument('--into', metavar='FOLDER', default='.',
-                       help='where the files are to be (default: here)')
-    begin.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
-                       help='who may be there in half duplex (default: 0-7)')
-    begin.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
+    _add_folder(begin, 'the files are')
+    _complete_search(begin)
     _complete_files(add('files', 'tell which data files a PLC has and how long they are',
                         'files 1 --net net.csv', 'files 1 --map --net net.csv',
                         'files 1 --map map.csv --net net.csv'))
@@ -137,8 +130,7 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     clock = add('clock', "tell a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
                 'clock 1 --set --yes --net net.csv')
     _add_station(clock)
-    clock.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
-                       help='default: the PLC is asked what it is')
+    _add_plc_type(clock)
     clock.add_argument('--set', action='store_true',
                        help="write this computer's local time; a terminal is asked")
     clock.add_argument('--yes', action='store_true', help='set it without a question')
@@ -156,13 +148,10 @@ def _add_import(commands: Any) -> None:
                'exit status: 0 when all rows could be used, 1 when some are left out, 2 for files',
         allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
     command.add_argument('file', metavar='FILE', help='the export, a CSV file')
-    command.add_argument('--into', metavar='FOLDER', default='.',
-                         help='where map.csv is to be (default: here)')
+    _add_folder(command, 'map.csv is')
     command.add_argument('--station', metavar='N', type=_station, default=DEFAULT_STATION,
                          help='of the PLC (default: %(default)s)')
-    command.add_argument('--plc-type', type=str.upper, default='SLC',
-                         choices=[kind.value for kind in FAMILIES],
-                         help='of the PLC; a MicroLogix is SLC (default: %(default)s)')
+    _add_plc_type(command, 'of the PLC; a MicroLogix is SLC (default: %(default)s)', 'SLC')
 
 
 def _add_station(parser: argparse.ArgumentParser) -> None:
@@ -170,12 +159,29 @@ def _add_station(parser: argparse.ArgumentParser) -> None:
                         help=f'default: {DEFAULT_STATION}')
 
 
+def _add_plc_type(parser: argparse._ActionsContainer,
+                  text: str = 'default: the PLC is asked what it is',
+                  default: str | None = None) -> None:
+    parser.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
+                        default=default, help=text)
+
+
+def _add_folder(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument('--into', metavar='FOLDER', default='.',
+                        help=f'where {what} to be (default: here)')
+
+
+def _complete_search(search: argparse.ArgumentParser) -> None:
+    search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
+                        help='who may be there in half duplex (default: 0-7)')
+    search.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
+
+
 def _complete_files(found: argparse.ArgumentParser) -> None:
     _add_station(found)
     found.add_argument('--files', metavar='LIST', type=_stations,
                        help='numbers up to 254 (default: all that the PLC lists, or 0-31)')
-    found.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
-                       help='default: the PLC is asked what it is')
+    _add_plc_type(found)
     found.add_argument('--map', metavar='FILE', nargs='?', const='',
                        help='print rows for a map CSV; with FILE, say which of its rows lie '
                             'outside of the files')
@@ -233,9 +239,7 @@ def _add_data_options(parser: argparse.ArgumentParser,
     group = parser.add_argument_group('data')
     group.add_argument('--station', metavar='N', type=_station,
                        help=f'address of the PLC {note}')
-    group.add_argument('--plc-type', type=str.upper,
-                       choices=[kind.value for kind in FAMILIES],
-                       help='default: the PLC is asked what it is')
+    _add_plc_type(group)
     group.add_argument('--type', choices=[kind.value for kind in ValueType],
                        help='default: what is natural for the file')
     group.add_argument('--word-order', choices=[order.value for order in WordOrder],

@@ -29,7 +29,7 @@ import threading
 
 from abdf1_ros.cli.plc.data import Radix, rows
 from abdf1_ros.cli.plc.session import opened
-from abdf1_ros.cli.terminal import cut, is_terminal, table
+from abdf1_ros.cli.terminal import is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
@@ -39,7 +39,7 @@ from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.text import printable
+from abdf1_ros.text import cut, printable
 
 # Ages and errors are shown again so often (s), also without new values.
 _GLANCE = 0.25
