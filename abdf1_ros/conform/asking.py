@@ -26,8 +26,8 @@ _ASKING = (Target.MASTER, Target.CLIENT)
 _REPLY_BIT = 0x40
 
 
-@case('command-form', 'A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the '
-      'manual says.', 'M 5-2 to 5-7, 6-3', *_ASKING)
+@case('A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the manual says.',
+      'M 5-2 to 5-7, 6-3', *_ASKING)
 def command_form(end: AnsweringEnd) -> None:
     command = end.next_command()
     data = command.data
@@ -36,7 +36,7 @@ def command_form(end: AnsweringEnd) -> None:
     end.finish(command)
 
 
-@case('tns-differs', 'Each new command has another TNS.', 'M 6-7', *_ASKING)
+@case('Each new command has another TNS.', 'M 6-7', *_ASKING)
 def tns_differs(end: AnsweringEnd) -> None:
     seen = []
     for _ in range(3):

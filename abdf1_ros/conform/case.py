@@ -88,10 +88,11 @@ CaseScript = Callable[[Any], None]
 """Plays a case with the end it is given; raises Failed or Skipped."""
 
 
-def case(name: str, rule: str, source: str, *targets: Target,
+def case(rule: str, source: str, *targets: Target,
          permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], CaseScript]:
-    """Register a function as a case of ``targets``."""
+    """Register a function as a case of ``targets``, by its own name."""
     def enter(run: CaseScript) -> CaseScript:
+        name = run.__name__.replace('_', '-')
         if any(other.name == name and set(other.targets) & set(targets) for other in CASES):
             raise ValueError(f'there is a case {name} already')
         CASES.append(Case(name, rule, source, targets, run, permission))

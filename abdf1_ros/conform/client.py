@@ -25,7 +25,7 @@ from abdf1_ros.conform.wire import Failed, Skipped
 _CLIENT = Target.CLIENT
 
 
-@case('nak-repeated', 'A message answered with DLE NAK is sent again.', 'M 4-5', _CLIENT)
+@case('A message answered with DLE NAK is sent again.', 'M 4-5', _CLIENT)
 def nak_repeated(end: ServerEnd) -> None:
     first = end.next_command()
     end.wire.send(codec.NAK)
@@ -35,8 +35,7 @@ def nak_repeated(end: ServerEnd) -> None:
     end.finish(second)
 
 
-@case('nak-limit', 'A message that is always answered with DLE NAK is given up.',
-      'M 4-5', _CLIENT)
+@case('A message that is always answered with DLE NAK is given up.', 'M 4-5', _CLIENT)
 def nak_limit(end: ServerEnd) -> None:
     first = end.next_command()
     for _ in range(MOST_REPETITIONS):
@@ -47,16 +46,16 @@ def nak_limit(end: ServerEnd) -> None:
     raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
-@case('silence-enquired', 'Silence is answered with DLE ENQ, not with the message; DLE ACK then '
-      'ends the message.', 'M 4-5', _CLIENT)
+@case('Silence is answered with DLE ENQ, not with the message; DLE ACK then ends the message.',
+      'M 4-5', _CLIENT)
 def silence_enquired(end: ServerEnd) -> None:
     command = end.next_command()
     end.wire.expect(SymbolKind.ENQ, within=PATIENCE)
     end.finish(command)
 
 
-@case('no-needless-enquiry', 'DLE ENQ is for a message without a response, not for one that was '
-      'acknowledged.', 'M 4-5', _CLIENT)
+@case('DLE ENQ is for a message without a response, not for one that was acknowledged.',
+      'M 4-5', _CLIENT)
 def no_needless_enquiry(end: ServerEnd) -> None:
     command = end.next_command()
     end.wire.send(codec.ACK)
@@ -66,8 +65,7 @@ def no_needless_enquiry(end: ServerEnd) -> None:
         raise Failed('no DLE ENQ after DLE ACK', str(symbol))
 
 
-@case('enquiry-nak-repeated', 'DLE NAK as answer to DLE ENQ has the message sent again.',
-      'M 4-5, 4-13', _CLIENT)
+@case('DLE NAK as answer to DLE ENQ has the message sent again.', 'M 4-5, 4-13', _CLIENT)
 def enquiry_nak_repeated(end: ServerEnd) -> None:
     command = end.next_command()
     end.wire.expect(SymbolKind.ENQ, within=PATIENCE)
@@ -78,13 +76,12 @@ def enquiry_nak_repeated(end: ServerEnd) -> None:
     end.finish(again)
 
 
-@case('reply-acknowledged', 'A good reply is acknowledged with DLE ACK.', 'M 4-7 to 4-9', _CLIENT)
+@case('A good reply is acknowledged with DLE ACK.', 'M 4-7 to 4-9', _CLIENT)
 def reply_acknowledged(end: ServerEnd) -> None:
     end.finish(end.next_command())
 
 
-@case('bad-reply-refused', 'A reply with a wrong check is answered with DLE NAK.',
-      'M 4-7 to 4-9', _CLIENT)
+@case('A reply with a wrong check is answered with DLE NAK.', 'M 4-7 to 4-9', _CLIENT)
 def bad_reply_refused(end: ServerEnd) -> None:
     _refuse(end)
 
@@ -108,20 +105,19 @@ def _expect_ack(end: ServerEnd, what: str) -> None:
         raise Failed(what, str(symbol))
 
 
-@case('enquiry-repeats-response', 'DLE ENQ has the last response repeated.', 'M 4-13', _CLIENT)
+@case('DLE ENQ has the last response repeated.', 'M 4-13', _CLIENT)
 def enquiry_repeats_response(end: ServerEnd) -> None:
     end.finish(end.next_command())
     end.wire.send(codec.ENQ)
     _expect_ack(end, 'DLE ACK again')
 
 
-@case('enquiry-repeats-refusal', 'DLE ENQ after DLE NAK has DLE NAK repeated.', 'M 4-13', _CLIENT)
+@case('DLE ENQ after DLE NAK has DLE NAK repeated.', 'M 4-13', _CLIENT)
 def enquiry_repeats_refusal(end: ServerEnd) -> None:
     _refuse(end, codec.ENQ)
 
 
-@case('duplicate-acknowledged', 'A reply that comes again is acknowledged again.',
-      'M 4-8', _CLIENT)
+@case('A reply that comes again is acknowledged again.', 'M 4-8', _CLIENT)
 def duplicate_acknowledged(end: ServerEnd) -> None:
     command = end.next_command()
     end.finish(command)
@@ -129,8 +125,7 @@ def duplicate_acknowledged(end: ServerEnd) -> None:
     _expect_ack(end, 'DLE ACK for a reply that came before')
 
 
-@case('embedded-response', 'A response inside our reply counts, and is not part of it.',
-      'M 4-3', _CLIENT)
+@case('A response inside our reply counts, and is not part of it.', 'M 4-3', _CLIENT)
 def embedded_response(end: ServerEnd) -> None:
     command = end.next_command()
     begun, rest = codec.divided(codec.message(end.serve(command.data), end.wire.check))

@@ -59,28 +59,26 @@ def _echoed(end: AskingEnd, data: bytes, tns: int | None = None) -> None:
         raise Failed(f'the data of the echo: {data.hex(" ")}', got.hex(' '))
 
 
-@case('stuffing', 'A data byte 10 is doubled on the line and single in the message.',
+@case('A data byte 10 is doubled on the line and single in the message.',
       'M 2-7, 5-4', *_ANSWERING)
 def stuffing(end: AskingEnd) -> None:
     _echoed(end, _NASTY)
 
 
-@case('check-of-all-bytes', 'The check of a reply is right for every value of a byte.',
-      'M 5-2 to 5-7', *_ANSWERING)
+@case('The check of a reply is right for every value of a byte.', 'M 5-2 to 5-7', *_ANSWERING)
 def check_of_all_bytes(end: AskingEnd) -> None:
     for start in range(0, 256, 64):
         _echoed(end, bytes(range(start, start + 64)))
 
 
-@case('echo-sizes', 'An echo sends back what it was given, of any length up to the packet.',
+@case('An echo sends back what it was given, of any length up to the packet.',
       'M 7-3', *_ANSWERING)
 def echo_sizes(end: AskingEnd) -> None:
     for size in _ECHO_SIZES:
         _echoed(end, bytes(range(size)))
 
 
-@case('largest-packet', 'An echo of up to 243 bytes is sent back whole or refused, never cut.',
-      'M 7-3', *_ANSWERING)
+@case('An echo of up to 243 bytes is sent back whole or refused, never cut.', 'M 7-3', *_ANSWERING)
 def largest_packet(end: AskingEnd) -> None:
     for size in _LARGE_ECHO_SIZES:
         data = bytes(range(size))
@@ -97,24 +95,23 @@ def largest_packet(end: AskingEnd) -> None:
     raise Skipped(f'an echo of {size} bytes is refused: packets of this product are smaller')
 
 
-@case('tns-returned', 'A reply has the TNS of its command, whatever its bytes are.',
-      'M 6-7', *_ANSWERING)
+@case('A reply has the TNS of its command, whatever its bytes are.', 'M 6-7', *_ANSWERING)
 def tns_returned(end: AskingEnd) -> None:
     for tns in (0x0010, 0x1010, 0xFFFF, 0x0310, 0x0000):
         _echoed(end, b'', tns)
 
 
-@case('unknown-command', 'A command code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
+@case('A command code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
 def unknown_command(end: AskingEnd) -> None:
     _refused(end.ask(0x0C, b''), (_ILLEGAL,))
 
 
-@case('unknown-function', 'A function code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
+@case('A function code that is not known gets STS 10.', 'M 8-2', *_ANSWERING)
 def unknown_function(end: AskingEnd) -> None:
     _refused(end.ask(_TYPED, b'\xE7'), (_ILLEGAL, _EXTENDED))
 
 
-@case('identity', 'Diagnostic status tells what the processor is.', 'M 7-3', *_ANSWERING)
+@case('Diagnostic status tells what the processor is.', 'M 7-3', *_ANSWERING)
 def identity(end: AskingEnd) -> None:
     if not _data(end.ask(_ECHO, b'\x03')):
         raise Failed('some bytes of diagnostic status', 'none')
@@ -168,15 +165,14 @@ def _read(end: AskingEnd, count: int) -> bytes:
     return data[len(data) - 2 * count:]
 
 
-@case('read-words', 'A typed read returns the words that were asked for.',
-      'M 7-17, 7-28', *_ANSWERING)
+@case('A typed read returns the words that were asked for.', 'M 7-17, 7-28', *_ANSWERING)
 def read_words(end: AskingEnd) -> None:
     _words_of(end)
     _read(end, 1)
 
 
-@case('address-forms', 'A PLC-5 takes an address with and without its data table area, in long '
-      'form, and as text.', 'M 13-10 to 13-15', *_ANSWERING)
+@case('A PLC-5 takes an address with and without its data table area, in long form, and as text.',
+      'M 13-10 to 13-15', *_ANSWERING)
 def address_forms(end: AskingEnd) -> None:
     words = _words_of(end)
     if words.family != 'PLC5':
@@ -194,7 +190,7 @@ def address_forms(end: AskingEnd) -> None:
             raise Failed(f'STS 00 for the address {address.hex(" ")}', failure.got) from None
 
 
-@case('element-too-high', 'An element that does not exist is refused, not answered with data.',
+@case('An element that does not exist is refused, not answered with data.',
       'M 8-2 to 8-4', *_ANSWERING)
 def element_too_high(end: AskingEnd) -> None:
     words = _words_of(end)
@@ -202,7 +198,7 @@ def element_too_high(end: AskingEnd) -> None:
     _refused(end.ask(_TYPED, _read_body(beyond, 1)), (_ILLEGAL, 0x50, _EXTENDED))
 
 
-@case('write-and-read', 'What was written is what is read, bit by bit.',
+@case('What was written is what is read, bit by bit.',
       'M 7-18, 7-30', *_ANSWERING, permission=Permission.WRITE)
 def write_and_read(end: AskingEnd) -> None:
     words = _words_of(end)
@@ -217,7 +213,7 @@ def write_and_read(end: AskingEnd) -> None:
         _data(end.ask(_TYPED, _write_body(words, before)))
 
 
-@case('masked-write', 'A masked write changes the bits of its mask and no others.',
+@case('A masked write changes the bits of its mask and no others.',
       'M 7-20', *_ANSWERING, permission=Permission.WRITE)
 def masked_write(end: AskingEnd) -> None:
     words = _words_of(end)

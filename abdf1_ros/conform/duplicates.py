@@ -38,8 +38,8 @@ def _carried_out(end: AskingEnd, command: bytes) -> None:
     check_reply(command, end.collect())
 
 
-@case('duplicate-discarded', 'A message with the header of the last one is acknowledged and '
-      'discarded.', _SOURCE, *_ANSWERING)
+@case('A message with the header of the last one is acknowledged and discarded.',
+      _SOURCE, *_ANSWERING)
 def duplicate_discarded(end: AskingEnd) -> None:
     begun = end.wire.now
     command = end.command(body=_ECHO)
@@ -53,30 +53,29 @@ def duplicate_discarded(end: AskingEnd) -> None:
         raise Skipped('two replies to a message sent twice: duplicate detection is off')
 
 
-@case('new-tns-executed', 'A message with another TNS is not a duplicate.', _SOURCE, *_ANSWERING)
+@case('A message with another TNS is not a duplicate.', _SOURCE, *_ANSWERING)
 def new_tns_executed(end: AskingEnd) -> None:
     for _ in range(2):
         _carried_out(end, end.command(body=_ECHO))
 
 
-@case('other-command-executed', 'A message with the TNS of the last one and another CMD is not a '
-      'duplicate.', _SOURCE, *_ANSWERING)
+@case('A message with the TNS of the last one and another CMD is not a duplicate.',
+      _SOURCE, *_ANSWERING)
 def other_command_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     _carried_out(end, first)
     _carried_out(end, first[:2] + bytes((_OTHER_CMD,)) + first[3:6])
 
 
-@case('other-source-executed', 'A message with the TNS of the last one and another SRC is not a '
-      'duplicate.', _SOURCE, *_ANSWERING)
+@case('A message with the TNS of the last one and another SRC is not a duplicate.',
+      _SOURCE, *_ANSWERING)
 def other_source_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     _carried_out(end, first)
     _carried_out(end, first[:1] + bytes((end.own ^ 0x02,)) + first[2:])
 
 
-@case('older-header-executed', 'A message with the header of the last but one is not a '
-      'duplicate.', _SOURCE, *_ANSWERING)
+@case('A message with the header of the last but one is not a duplicate.', _SOURCE, *_ANSWERING)
 def older_header_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     for command in (first, end.command(body=_ECHO), first):

@@ -25,14 +25,12 @@ from abdf1_ros.conform.wire import Failed, Skipped
 _MASTER = Target.MASTER
 
 
-@case('poll-form', 'A poll is DLE ENQ, the station, and a BCC, on a line with CRC too.',
-      'M 5-3', _MASTER)
+@case('A poll is DLE ENQ, the station, and a BCC, on a line with CRC too.', 'M 5-3', _MASTER)
 def poll_form(end: SlaveEnd) -> None:
     end.finish(end.next_command())
 
 
-@case('no-ack-repeated', 'A message without DLE ACK is sent again, with the same TNS.',
-      'M 3-13 to 3-15', _MASTER)
+@case('A message without DLE ACK is sent again, with the same TNS.', 'M 3-13 to 3-15', _MASTER)
 def no_ack_repeated(end: SlaveEnd) -> None:
     first = end.next_command()
     second = end.next_command('the message again')
@@ -41,8 +39,7 @@ def no_ack_repeated(end: SlaveEnd) -> None:
     end.finish(second)
 
 
-@case('repetitions-limited', 'A message that is never acknowledged is given up.',
-      'M 3-13 to 3-15', _MASTER)
+@case('A message that is never acknowledged is given up.', 'M 3-13 to 3-15', _MASTER)
 def repetitions_limited(end: SlaveEnd) -> None:
     first = end.next_command()
 
@@ -56,14 +53,13 @@ def repetitions_limited(end: SlaveEnd) -> None:
     raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
-@case('polled-after-ack', 'After DLE ACK the master polls for the reply.', 'M 3-13', _MASTER)
+@case('After DLE ACK the master polls for the reply.', 'M 3-13', _MASTER)
 def polled_after_ack(end: SlaveEnd) -> None:
     command = end.next_command()
     end.finish(command)
 
 
-@case('eot-polled-again', 'After DLE EOT the master polls again for a reply that is due.',
-      'M 3-13 to 3-15', _MASTER)
+@case('After DLE EOT the master polls again for a reply that is due.', 'M 3-13 to 3-15', _MASTER)
 def eot_polled_again(end: SlaveEnd) -> None:
     command = end.next_command()
     end.wire.send(codec.ACK)
@@ -73,8 +69,8 @@ def eot_polled_again(end: SlaveEnd) -> None:
     end.reply_and_hear(command)
 
 
-@case('bad-reply-polled-again', 'A reply with a wrong check is asked for by another poll; DLE NAK '
-      'would reset the whole line.', 'M 3-14, 2-7', _MASTER)
+@case('A reply with a wrong check is asked for by another poll; DLE NAK would reset the whole '
+      'line.', 'M 3-14, 2-7', _MASTER)
 def bad_reply_polled_again(end: SlaveEnd) -> None:
     command = end.next_command()
     end.wire.send(codec.ACK)
@@ -85,8 +81,8 @@ def bad_reply_polled_again(end: SlaveEnd) -> None:
     end.reply_and_hear(command, 'DLE ACK for the good reply')
 
 
-@case('duplicate-acknowledged', 'A reply that comes again, as after a lost DLE ACK, is '
-      'acknowledged again.', 'M 3-15', _MASTER)
+@case('A reply that comes again, as after a lost DLE ACK, is acknowledged again.',
+      'M 3-15', _MASTER)
 def duplicate_acknowledged(end: SlaveEnd) -> None:
     command = end.next_command()
     end.finish(command)
@@ -101,8 +97,8 @@ def duplicate_acknowledged(end: SlaveEnd) -> None:
         end.reply_and_hear(visit, 'DLE ACK for the reply after it')
 
 
-@case('waits-for-slow-answer', 'A master listens for as long as an answer may take: it sends '
-      'nothing while a reply comes in.', 'M 3-13 to 3-15', _MASTER)
+@case('A master listens for as long as an answer may take: it sends nothing while a reply comes '
+      'in.', 'M 3-13 to 3-15', _MASTER)
 def waits_for_slow_answer(end: SlaveEnd) -> None:
     command = end.next_command()
     end.wire.send(codec.ACK)

@@ -23,8 +23,6 @@ from abdf1_ros.conform.ends import check_reply, MOST_REPETITIONS, PeerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _PEER = Target.PEER
-
-
 # How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the
 # defaults of the products (M 7-25, 7-27).
 _ACK_TIMEOUT = 6.0
@@ -35,27 +33,23 @@ def _answer(end: PeerEnd, frame: bytes, kind: SymbolKind) -> None:
     end.wire.expect(kind)
 
 
-@case('message-acknowledged', 'A good message is acknowledged with DLE ACK.',
-      'M 4-7 to 4-9', _PEER)
+@case('A good message is acknowledged with DLE ACK.', 'M 4-7 to 4-9', _PEER)
 def message_acknowledged(end: PeerEnd) -> None:
     end.deliver(end.command())
 
 
-@case('bad-check-refused', 'A message with a wrong check is answered with DLE NAK.',
-      'M 4-7 to 4-9', _PEER)
+@case('A message with a wrong check is answered with DLE NAK.', 'M 4-7 to 4-9', _PEER)
 def bad_check_refused(end: PeerEnd) -> None:
     frame = codec.message(end.command(), end.wire.check)
     _answer(end, codec.damaged(frame), SymbolKind.NAK)
 
 
-@case('short-message-refused', 'A message of fewer than six bytes is answered with DLE NAK.',
-      'M 4-4, 4-7 to 4-9', _PEER)
+@case('A message of fewer than six bytes is answered with DLE NAK.', 'M 4-4, 4-7 to 4-9', _PEER)
 def short_message_refused(end: PeerEnd) -> None:
     _answer(end, codec.message(end.command()[:5], end.wire.check), SymbolKind.NAK)
 
 
-@case('broken-message-refused', 'DLE ENQ inside a message ends it; the answer is DLE NAK.',
-      'M 4-7 to 4-9', _PEER)
+@case('DLE ENQ inside a message ends it; the answer is DLE NAK.', 'M 4-7 to 4-9', _PEER)
 def broken_message_refused(end: PeerEnd) -> None:
     end.ask(0x06, b'\x00')  # so that the last response is DLE ACK
     begun, rest = codec.divided(codec.message(end.command(), end.wire.check))
@@ -66,21 +60,19 @@ def broken_message_refused(end: PeerEnd) -> None:
         raise Failed('no answer to the rest of a message that has ended', str(symbol))
 
 
-@case('enquiry-after-ack', 'DLE ENQ has the last response repeated: DLE ACK.',
-      'M 4-5, 4-13', _PEER)
+@case('DLE ENQ has the last response repeated: DLE ACK.', 'M 4-5, 4-13', _PEER)
 def enquiry_after_ack(end: PeerEnd) -> None:
     end.ask(0x06, b'\x00')
     _answer(end, codec.ENQ, SymbolKind.ACK)
 
 
-@case('enquiry-after-nak', 'DLE ENQ has the last response repeated: DLE NAK.',
-      'M 4-5, 4-13', _PEER)
+@case('DLE ENQ has the last response repeated: DLE NAK.', 'M 4-5, 4-13', _PEER)
 def enquiry_after_nak(end: PeerEnd) -> None:
     _answer(end, codec.damaged(codec.message(end.command(), end.wire.check)), SymbolKind.NAK)
     _answer(end, codec.ENQ, SymbolKind.NAK)
 
 
-@case('reply-repeated-after-nak', 'A message answered with DLE NAK is sent again.', 'M 4-5', _PEER)
+@case('A message answered with DLE NAK is sent again.', 'M 4-5', _PEER)
 def reply_repeated_after_nak(end: PeerEnd) -> None:
     end.deliver(end.command(body=b'\x00again'))
     first = end.collect(acknowledge=False)
@@ -90,7 +82,7 @@ def reply_repeated_after_nak(end: PeerEnd) -> None:
         raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
 
 
-@case('nak-limit', 'A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
+@case('A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
 def nak_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
     for _ in range(MOST_REPETITIONS + 1):
@@ -104,8 +96,7 @@ def nak_limit(end: PeerEnd) -> None:
     raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
-@case('silence-is-enquired', 'A message without any response is followed by DLE ENQ; DLE ACK '
-      'ends it.', 'M 4-5', _PEER)
+@case('A message without any response is followed by DLE ENQ; DLE ACK ends it.', 'M 4-5', _PEER)
 def silence_is_enquired(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
@@ -120,15 +111,14 @@ def _expect_no_enquiry(end: PeerEnd) -> None:
         raise Failed('silence: the message has been acknowledged', str(symbol))
 
 
-@case('no-needless-enquiry', 'DLE ENQ is for a message without a response, not for one that was '
-      'acknowledged.', 'M 4-5', _PEER)
+@case('DLE ENQ is for a message without a response, not for one that was acknowledged.',
+      'M 4-5', _PEER)
 def no_needless_enquiry(end: PeerEnd) -> None:
     end.ask(0x06, b'\x00')
     _expect_no_enquiry(end)
 
 
-@case('enquiry-limit', 'A message that never gets a response is given up after some DLE ENQ.',
-      'M 4-5', _PEER)
+@case('A message that never gets a response is given up after some DLE ENQ.', 'M 4-5', _PEER)
 def enquiry_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
@@ -142,8 +132,7 @@ def enquiry_limit(end: PeerEnd) -> None:
     raise Skipped(f'more than {MOST_REPETITIONS} enquiries: a larger limit is set')
 
 
-@case('embedded-response', 'A response inside a message counts, and is not part of the message.',
-      'M 4-3', _PEER)
+@case('A response inside a message counts, and is not part of the message.', 'M 4-3', _PEER)
 def embedded_response(end: PeerEnd) -> None:
     first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
     end.deliver(first)
@@ -158,8 +147,7 @@ def embedded_response(end: PeerEnd) -> None:
     check_reply(second, end.taken(symbol))
 
 
-@case('noise-before-message', 'Bytes outside of a message do not spoil the next one.',
-      'M 4-7 to 4-9', _PEER)
+@case('Bytes outside of a message do not spoil the next one.', 'M 4-7 to 4-9', _PEER)
 def noise_before_message(end: PeerEnd) -> None:
     end.wire.send(b'\x55\x00\xFF\x03')
     end.deliver(end.command())

@@ -27,14 +27,11 @@ from abdf1_ros.conform.ends import check_reply, MasterEnd, MOST_REPETITIONS
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _SLAVE = Target.SLAVE
-
-
 # Commands that are sent without a poll in between, to fill a slave's buffers.
 _BURST = 8
 
 
-@case('poll-idle', 'A slave that has nothing to send answers a poll with DLE EOT.',
-      'KF2 4-31', _SLAVE)
+@case('A slave that has nothing to send answers a poll with DLE EOT.', 'KF2 4-31', _SLAVE)
 def poll_idle(end: MasterEnd) -> None:
     symbol = end.poll()
     if symbol is None:
@@ -43,15 +40,14 @@ def poll_idle(end: MasterEnd) -> None:
         raise Failed('DLE EOT', str(symbol))
 
 
-@case('message-acknowledged', 'A good message is acknowledged with DLE ACK.', 'KF2 4-31', _SLAVE)
+@case('A good message is acknowledged with DLE ACK.', 'KF2 4-31', _SLAVE)
 def message_acknowledged(end: MasterEnd) -> None:
     symbol = end.offer(end.command())
     if symbol is None or symbol.kind is not SymbolKind.ACK:
         raise Failed('DLE ACK', str(symbol or 'silence'))
 
 
-@case('reply-waits-for-poll', 'A slave sends its reply as answer to a poll, not by itself.',
-      'KF2 4-31', _SLAVE)
+@case('A slave sends its reply as answer to a poll, not by itself.', 'KF2 4-31', _SLAVE)
 def reply_waits_for_poll(end: MasterEnd) -> None:
     command = end.command()
     end.deliver(command)
@@ -59,8 +55,7 @@ def reply_waits_for_poll(end: MasterEnd) -> None:
     check_reply(command, end.collect())
 
 
-@case('poll-stuffing', 'A poll of station 16 has its station doubled and its BCC not.',
-      'M 3-4, KF2 4-31', _SLAVE)
+@case('A poll of station 16 has its station doubled and its BCC not.', 'M 3-4, KF2 4-31', _SLAVE)
 def poll_stuffing(end: MasterEnd) -> None:
     if end.station != codec.DLE:
         raise Skipped('only with station 16')
@@ -68,16 +63,14 @@ def poll_stuffing(end: MasterEnd) -> None:
         raise Failed('an answer to 10 05 10 10 F0', 'silence')
 
 
-@case('bad-check-ignored', 'A message with a wrong check is ignored; a slave never sends DLE NAK.',
-      'KF2 4-31', _SLAVE)
+@case('A message with a wrong check is ignored; a slave never sends DLE NAK.', 'KF2 4-31', _SLAVE)
 def bad_check_ignored(end: MasterEnd) -> None:
     frame = codec.master_message(end.station, end.command(), end.wire.check)
     end.wire.send(codec.damaged(frame))
     end.wire.expect_silence('the check was wrong')
 
 
-@case('crc-covers-station', "The CRC of a master's message covers its station and STX.",
-      'M 5-6, 5-7', _SLAVE)
+@case("The CRC of a master's message covers its station and STX.", 'M 5-6, 5-7', _SLAVE)
 def crc_covers_station(end: MasterEnd) -> None:
     if end.wire.check is not codec.BlockCheck.CRC:
         raise Skipped('only with CRC')
@@ -87,14 +80,13 @@ def crc_covers_station(end: MasterEnd) -> None:
     end.wire.expect_silence("the CRC was that of a slave's message")
 
 
-@case('bad-poll-ignored', 'A poll with a wrong BCC is ignored.', 'KF2 4-31', _SLAVE)
+@case('A poll with a wrong BCC is ignored.', 'KF2 4-31', _SLAVE)
 def bad_poll_ignored(end: MasterEnd) -> None:
     end.wire.send(codec.damaged(codec.poll(end.station)))
     end.wire.expect_silence('the BCC was wrong')
 
 
-@case('other-station-ignored', 'A message or poll of another station is ignored.',
-      'KF2 4-31', _SLAVE)
+@case('A message or poll of another station is ignored.', 'KF2 4-31', _SLAVE)
 def other_station_ignored(end: MasterEnd) -> None:
     # Our own address: no slave has it.
     command = bytes((end.own,)) + end.command()[1:]
@@ -104,14 +96,13 @@ def other_station_ignored(end: MasterEnd) -> None:
     end.wire.expect_silence('the poll was of another station')
 
 
-@case('short-message-ignored', 'A message of fewer than six bytes is ignored.', 'M 3-4', _SLAVE)
+@case('A message of fewer than six bytes is ignored.', 'M 3-4', _SLAVE)
 def short_message_ignored(end: MasterEnd) -> None:
     end.send(end.command()[:5])
     end.wire.expect_silence('the message was shorter than its header')
 
 
-@case('broken-message', 'A message that breaks off leaves the slave ready for the next one.',
-      'M 3-4', _SLAVE)
+@case('A message that breaks off leaves the slave ready for the next one.', 'M 3-4', _SLAVE)
 def broken_message(end: MasterEnd) -> None:
     frame = codec.master_message(end.station, end.command(body=b'\x00abc'), end.wire.check)
     end.wire.send(frame[:len(frame) // 2])
@@ -119,14 +110,13 @@ def broken_message(end: MasterEnd) -> None:
     end.deliver(end.command())
 
 
-@case('noise-before-message', 'Bytes outside of a symbol are ignored.', 'M 3-4', _SLAVE)
+@case('Bytes outside of a symbol are ignored.', 'M 3-4', _SLAVE)
 def noise_before_message(end: MasterEnd) -> None:
     end.wire.send(b'\x55\x00\xFF\x03')
     message_acknowledged(end)
 
 
-@case('unacknowledged-again', 'A reply that was not acknowledged is sent again at the next poll.',
-      'KF2 4-31', _SLAVE)
+@case('A reply that was not acknowledged is sent again at the next poll.', 'KF2 4-31', _SLAVE)
 def unacknowledged_again(end: MasterEnd) -> None:
     end.deliver(end.command(body=b'\x00again'))
     first = end.collect(acknowledge=False)
@@ -135,8 +125,7 @@ def unacknowledged_again(end: MasterEnd) -> None:
         raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
 
 
-@case('acknowledged-dropped', 'A reply that was acknowledged is not sent again.',
-      'KF2 4-31', _SLAVE)
+@case('A reply that was acknowledged is not sent again.', 'KF2 4-31', _SLAVE)
 def acknowledged_dropped(end: MasterEnd) -> None:
     end.deliver(end.command())
     end.collect()
@@ -145,8 +134,7 @@ def acknowledged_dropped(end: MasterEnd) -> None:
         raise Failed('DLE EOT', str(symbol))
 
 
-@case('repetitions-limited', 'A message that is never acknowledged is dropped after some polls.',
-      'KF2 4-31', _SLAVE)
+@case('A message that is never acknowledged is dropped after some polls.', 'KF2 4-31', _SLAVE)
 def repetitions_limited(end: MasterEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
@@ -158,8 +146,8 @@ def repetitions_limited(end: MasterEnd) -> None:
     raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
-@case('full-is-silent', 'A slave that can take no more messages does not acknowledge; what it has '
-      'acknowledged is answered.', 'KF2 4-31', _SLAVE)
+@case('A slave that can take no more messages does not acknowledge; what it has acknowledged is '
+      'answered.', 'KF2 4-31', _SLAVE)
 def full_is_silent(end: MasterEnd) -> None:
     accepted = {}
     for _ in range(_BURST):
@@ -175,8 +163,7 @@ def full_is_silent(end: MasterEnd) -> None:
         check_reply(accepted.pop(reply[4:6], command), reply)
 
 
-@case('broadcast-unanswered', 'A message to station 255 is neither acknowledged nor answered.',
-      'M 3-4', _SLAVE)
+@case('A message to station 255 is neither acknowledged nor answered.', 'M 3-4', _SLAVE)
 def broadcast_unanswered(end: MasterEnd) -> None:
     command = bytes((0xFF,)) + end.command()[1:]
     end.wire.send(codec.master_message(0xFF, command, end.wire.check))
@@ -186,8 +173,8 @@ def broadcast_unanswered(end: MasterEnd) -> None:
         raise Failed('no reply to a broadcast', end.taken(symbol).hex(' '))
 
 
-@case('nak-resets', 'DLE NAK makes every slave drop what it holds.', 'M 2-7, 3-11', _SLAVE,
-      permission=Permission.RESET)
+@case('DLE NAK makes every slave drop what it holds.',
+      'M 2-7, 3-11', _SLAVE, permission=Permission.RESET)
 def nak_resets(end: MasterEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
