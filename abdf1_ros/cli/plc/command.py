@@ -377,7 +377,7 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
         _complain(COMES_BACK)
     if found is None:
         _complain('nothing answers with any of these settings')
-        for trace in search.traces or [_ALL_TRIED_IN_VAIN]:
+        for trace in search.traces or [_ALL_TRIED_IN_VAIN] * (not search.echoes):
             _complain(trace)
         kept = [option for option, value in (
             ('--duplex', options.duplex), ('--baud', options.baud), ('--check', options.check))
@@ -434,6 +434,12 @@ def _import(options: argparse.Namespace) -> int:
         _complain(str(problem))
     left_out = f', {len(result.left_out)} left out' if result.left_out else ''
     print(f'written: {target}: {result.count} rows{left_out}')
+    nets = (target.with_name('net.csv'), Path('net.csv'))
+    net = next((path for path in nets if path.exists()), None)
+    print(f'how to go on: {called("check")} {shlex.quote(str(net or nets[1]))} '
+          f'{shlex.quote(str(target))}')
+    if net is None:
+        print(f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one')
     return EXIT_FAILED if result.left_out else 0
 
 

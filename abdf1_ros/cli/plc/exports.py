@@ -46,7 +46,7 @@ _TYPES = {
     'dword': 'uint32', 'float': 'float32', 'bcd': 'bcd16', 'string': 'string'}
 _ACCESS = {'RO': 'Read', 'READ ONLY': 'Read', 'RW': 'ReadWrite', 'R/W': 'ReadWrite',
            'READ/WRITE': 'ReadWrite', 'WO': 'Write', 'WRITE ONLY': 'Write', '': 'ReadWrite'}
-_ARRAY = re.compile(r'(?P<address>[^\[]+?)\s*(?P<sizes>(?:\[\d+\])+)')
+_ARRAY = re.compile(r'(?P<address>[^\[]+?)\s*(?P<sizes>(?:\s*\[\d+\])+)')
 
 # Rows of RSLogix about files and rungs, not about addresses.
 _OTHER_ROWS = re.compile(r'(?:DFILE|PFILE|LAD|RUNG)', re.IGNORECASE)

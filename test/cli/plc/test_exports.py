@@ -30,6 +30,7 @@ from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.exports import import_map
+from abdf1_ros.cli.terminal import called
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
@@ -71,6 +72,7 @@ def imported(folder: Path, text: str | bytes,
     ('"Recipe","N7:10 [8]",Word Array,1,WO,100,,,,,,,,,,"",',
      {'Address': 'N7:10', 'Length': '8', 'Type': 'uint16', 'Command': 'Write', 'Period': ''}),
     ('"Grid","N15:0 [4][5]",Short Array,1,RO,100,,,,,,,,,,"",', {'Length': '20'}),
+    ('"Blanks","N15:0 [4] [5]",Short Array,1,RO,100,,,,,,,,,,"",', {'Length': '20'}),
     ('"Bits","N7/12 [9]",Boolean Array,1,RO,100,,,,,,,,,,"",',
      {'Address': 'N7:0/12', 'Length': '9'}),
     ('"Levels","F8:10 [16]",Float Array,1,Read Only,100,,,,,,,,,,"",',
@@ -139,18 +141,28 @@ def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) 
     assert (mapping.tag, mapping.name, mapping.description) == ('Höhe', 'H_he', 'Höhe links [mm]')
 
 
-def test_command_writes_a_map_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_writes_a_map_once_and_says_how_to_go_on(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     source, target = tmp_path / 'symbols.csv', tmp_path / 'line' / 'map.csv'
     source.write_text(RSLOGIX, encoding='utf-8')
     options = ['import', str(source), '--into', str(target.parent), '--station', '3']
     assert main(options) == 0
-    assert capsys.readouterr().out == f'written: {target}: 4 rows\n'
+    assert capsys.readouterr().out.splitlines() == [
+        f'written: {target}: 4 rows', f'how to go on: {called("check")} net.csv {target}',
+        f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one']
     assert {mapping.station for mapping in load_mappings(str(target))[0]} == {3}
     assert main(options) == 2
     assert f'{target}: is there already' in capsys.readouterr().err
     source.write_text(f'{RSLOGIX}"N7:999",,"FAR"\n', encoding='utf-8')
-    assert main([*options[:3], str(tmp_path / 'other')]) == 1
-    assert f'{source}:5: ' in capsys.readouterr().err
+    other = tmp_path / 'other' / 'map.csv'
+    (tmp_path / 'net.csv').write_text('Station\n5\n', encoding='utf-8')
+    assert main([*options[:3], str(other.parent)]) == 1
+    said = capsys.readouterr()
+    assert f'{source}:5: ' in said.err
+    assert said.out.splitlines()[1:] == [
+        f'how to go on: {called("check")} net.csv {other}']
 
 
 @pytest.mark.parametrize('text', ['a,b\n1,2\n', '', 'Tag,Command,Address\n'])
