@@ -46,7 +46,7 @@ def plcs(tmp_path: Path) -> Iterator[Plcs]:
 
 
 def network_on(plcs: Plcs) -> Network:
-    return Network(com_port=plcs.port, baud=115200, timeout=100, nak_retries=0)
+    return Network(com_port=plcs.port, baud=115200, timeout=1000, nak_retries=0)
 
 
 class Counting(Watch):
