@@ -27,6 +27,7 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.ros.launching import parameter_types
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
+from std_srvs.srv import Trigger
 from support.ros import EVERYTHING, get_parameters, Observer, Process
 from support.ros_tools import environment, install, needs, ros2, SOURCE
 import yaml
@@ -198,6 +199,26 @@ def test_demo_runs_the_example_on_its_simulator_and_passes_arguments_on(launch: 
     assert [Path(file).samefile(config_file(name))
             for file, name in zip(files, ('net.csv', 'map.csv'))] == [True, True]
     ended(process)
+
+
+# A robot's own launch file
+
+
+def test_robot_starts_its_bridge_and_its_cell_in_its_namespace(tmp_path: Path) -> None:
+    example = SOURCE / 'examples' / 'robot.launch.xml'
+    port = tmp_path / 'plc'
+    with Observer() as observer, Process('simulator', '--pty', str(port)) as simulator:
+        simulator.wait_for('stations 1 (PLC5), 2 (SLC) on')
+        process = ros2('launch', str(example), 'robot:=robot_2', f'port:={port}')
+        try:
+            process.wait_for('not permitted: the PLC permits; waiting for a reset')
+            reset = '/robot_2/interlock_consumer/reset'
+            assert observer.call(Trigger, reset, Trigger.Request()).success
+            process.wait_for('] PERMITTED: the PLC permits')
+            assert get_parameters(observer, 'port', 'read_only', node='/robot_2/abdf1') == [
+                str(port), False]
+        finally:
+            ended(process)
 
 
 # Three lines

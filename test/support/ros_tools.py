@@ -70,10 +70,12 @@ def install(folder: Path) -> None:
     commands.mkdir(parents=True)
     for name in _INSTALLED:  # and no more: launch would find the files of a build as well
         shutil.copytree(SOURCE / name, share / 'abdf1_ros' / name, copy_function=os.symlink)
-    for name in COMMANDS:
+    started = {name: f'-m abdf1_ros {name}' for name in COMMANDS} | {
+        path.name: f'"{path}"' for path in (SOURCE / 'examples').glob('*.py')}
+    for name, arguments in started.items():
         command = commands / name
         command.write_text(
-            f'#!/bin/sh\nexec "{sys.executable}" -m abdf1_ros {name} "$@"\n', encoding='utf-8')
+            f'#!/bin/sh\nexec "{sys.executable}" {arguments} "$@"\n', encoding='utf-8')
         command.chmod(0o755)
 
 
