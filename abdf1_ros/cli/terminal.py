@@ -175,8 +175,11 @@ class _Parser(argparse.ArgumentParser):
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             option = next((text for text in unknown if text.startswith('-')), '')
-            meant = _alike(option.partition('=')[0].strip('-').lower(), [
-                name for name in self._option_string_actions if name.startswith('--')])
+            written = option.partition('=')[0]
+            word = written.strip('-').lower()
+            meant = [f'{action.metavar} without {written}' for action in self._actions
+                     if not action.option_strings and action.dest == word] or _alike(word, [
+                         name for name in self._option_string_actions if name.startswith('--')])
             hint = f'; did you mean {" or ".join(meant)}?' if meant else ''
             self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
         return found, unknown

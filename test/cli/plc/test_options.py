@@ -94,3 +94,14 @@ def test_command_line_that_is_wrong_ends_with_status_2(args: tuple[str, ...]) ->
     with pytest.raises(SystemExit) as ending:
         parse(*args)
     assert ending.value.code == 2
+
+
+@pytest.mark.parametrize(('args', 'hint'), [
+    (('files', '--station', '2'), 'did you mean STATION without --station?'),
+    (('status', '--station=2'), 'did you mean STATION without --station?'),
+    (('scan', '--stations', '0-7'), 'did you mean STATIONS without --stations?')])
+def test_place_that_is_written_as_an_option_is_told(
+        args: tuple[str, ...], hint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parse(*args)
+    assert hint in capsys.readouterr().err
