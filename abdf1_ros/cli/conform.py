@@ -130,7 +130,8 @@ def main(args: Sequence[str] | None = None) -> int:
     prepare_output()
     options = _parse(args)
     target = Target(options.target)
-    cases = _chosen(target, options.only)
+    cases = [case for case in CASES if target in case.targets
+             and (not options.only or case.name in options.only)]
     try:
         if options.list:
             for case in cases:
@@ -223,11 +224,6 @@ def _identity(end: AskingEnd) -> Identity | None:
     if identity.plc_type in (PlcType.PLC5, PlcType.SLC) and not end.words.family:
         end.words = replace(end.words, family=identity.plc_type.value)
     return identity
-
-
-def _chosen(target: Target, names: Sequence[str]) -> list[Case]:
-    return [case for case in CASES
-            if target in case.targets and (not names or case.name in names)]
 
 
 def _allowed(options: argparse.Namespace) -> frozenset[Permission]:

@@ -60,7 +60,7 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
     entry = _known().get(_code(command)) if command else None
     if command is not None and entry is not None:
         try:
-            return entry.values(entry.read(_parameters(command)), data)
+            return entry.values(entry.read(Reader(_parameters(command))), data)
         except FormatError:
             pass
     return notation.hexadecimal(data)
@@ -85,8 +85,7 @@ def _known() -> dict[CommandCode, KnownCommand]:
 
 
 def _describe_command(packet: Packet) -> str:
-    code = _code(packet)
-    parameters = packet.data[code[1] is not None:]
+    code, parameters = _code(packet), _parameters(packet)
     entry = _known().get(code)
     if entry is None:
         name = _NAMES.get(code) or f'command {command_name(packet)}'
@@ -102,8 +101,8 @@ def _code(packet: Packet) -> CommandCode:
     return cmd, packet.data[0] if cmd in _WITH_FUNCTION and packet.data else None
 
 
-def _parameters(packet: Packet) -> Reader:
-    return Reader(packet.data[_code(packet)[1] is not None:])
+def _parameters(packet: Packet) -> bytes:
+    return packet.data[_code(packet)[1] is not None:]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,10 +193,6 @@ def _identity_reply(request: object, data: bytes) -> str:
     return '; '.join([text, *notes, *identity.faults, *identity.remarks])
 
 
-def _no_parameters(reader: Reader) -> None:
-    reader.end()
-
-
 def _words_reply(request: object, data: bytes) -> str:
     return notation.words_text(data)
 
@@ -209,7 +204,7 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callab
 # What every family has, or more than one.
 _SHARED: dict[CommandCode, KnownCommand] = {
     (diagnostics.CMD, diagnostics.STATUS): KnownCommand(
-        'diagnostic status', _no_parameters, lambda request: '', _identity_reply),
+        'diagnostic status', Reader.end, lambda request: '', _identity_reply),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
         'read diagnostic counters', diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {notation.count_of(request.size, "byte")}',

@@ -222,7 +222,7 @@ class NodeWatch(Listening):
     def _promised(self, topic: str) -> float | None:
         deadlines = [endpoint.qos_profile.deadline
                      for endpoint in self._node.get_publishers_info_by_topic(topic)
-                     if _joined(endpoint.node_name, endpoint.node_namespace) == self.name]
+                     if f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}' == self.name]
         if not deadlines or deadlines[0] == Infinite:
             return None
         return float(deadlines[0].nanoseconds) / 1e9
@@ -265,7 +265,3 @@ def shown_status(status: DiagnosticStatus, node: str) -> Status:
 
 def _style(level: bytes) -> Style:
     return _STYLES.get(level, Style.BAD)
-
-
-def _joined(name: str, namespace: str) -> str:
-    return f'{namespace.rstrip("/")}/{name}'
