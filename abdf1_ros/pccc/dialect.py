@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError
@@ -53,7 +54,7 @@ def exactly(words: int, data: bytes) -> bytes:
     return data
 
 
-class Dialect(Protocol):
+class Dialect(ABC):
     """
     Turn an address and a number of words into a request, and a reply's data into words.
 
@@ -62,17 +63,21 @@ class Dialect(Protocol):
     has no command that changes single bits; ``write_bits`` then raises FormatError.
     """
 
-    writes_bits: bool
+    writes_bits = True
 
+    @abstractmethod
     def max_read(self, file_type: FileType) -> int:
         """Return the most words that one read of such a file brings, whole elements."""
 
     def sure_read(self, file_type: FileType) -> int:
         """Return the most words that every processor of the family brings in one read."""
+        return self.max_read(file_type)
 
+    @abstractmethod
     def max_write(self, file_type: FileType) -> int:
         """Return the most words that one write to such a file takes, whole elements."""
 
+    @abstractmethod
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         """
         Return a read of ``words`` words.
@@ -82,12 +87,16 @@ class Dialect(Protocol):
 
     def reply_size(self, address: Address, words: int) -> int:
         """Return the bytes after the header of the reply to that read."""
+        return 2 * words
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Return the words in the reply to that read; FormatError when they are missing."""
+        return exactly(words, data)
 
+    @abstractmethod
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
         """Return a write of whole words."""
 
+    @abstractmethod
     def write_bits(self, address: Address, mask: int, bits: int) -> Request:
         """Return a request that changes the bits of ``mask`` in one word to ``bits``."""

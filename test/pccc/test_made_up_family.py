@@ -33,7 +33,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Addressing, AddressSyntaxError
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.dialect import exactly, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.fields import Reader, word
@@ -73,24 +73,16 @@ class ToyAddressing(Addressing):
 ADDRESSING = ToyAddressing()
 
 
-class ToyDialect:
+class ToyDialect(Dialect):
     """What is said to it."""
-
-    writes_bits = True
 
     def max_read(self, file_type: FileType) -> int:
         return 20
 
-    sure_read = max_write = max_read
+    max_write = max_read
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         return CMD, bytes((READ, address.element, words))
-
-    def reply_size(self, address: Address, words: int) -> int:
-        return 2 * words
-
-    def read_data(self, address: Address, words: int, data: bytes) -> bytes:
-        return exactly(words, data)
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
         return CMD, bytes((WRITE, address.element)) + data

@@ -19,13 +19,13 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import exactly, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2 import commands as plc2
 from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, ByteChange
 
 
-class Plc2Dialect:
+class Plc2Dialect(Dialect):
     """
     Read, write and bit write without FNC.
 
@@ -43,20 +43,12 @@ class Plc2Dialect:
     def max_read(self, file_type: FileType) -> int:
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_READ) // 2
 
-    sure_read = max_read
-
     def max_write(self, file_type: FileType) -> int:
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_WRITE) // 2
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         """Return an unprotected read; there is no other."""
         return plc2.READ, BasicRead(self._first(address), 2 * words).encode()
-
-    def reply_size(self, address: Address, words: int) -> int:
-        return words * 2
-
-    def read_data(self, address: Address, words: int, data: bytes) -> bytes:
-        return exactly(words, data)
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
         return self._write, BasicWrite(self._first(address), data).encode()

@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import typed_data
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.plc5.address import FILES
@@ -27,7 +27,7 @@ from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 
 
-class Plc5Dialect:
+class Plc5Dialect(Dialect):
     """
     Typed read and write, read-modify-write for bits.
 
@@ -35,12 +35,8 @@ class Plc5Dialect:
     is whole elements.
     """
 
-    writes_bits = True
-
     def max_read(self, file_type: FileType) -> int:
         return _most_words(file_type, plc5.MAX_REPLY)
-
-    sure_read = max_read
 
     def max_write(self, file_type: FileType) -> int:
         return _most_words(file_type, plc5.MAX_WRITE - plc5.MAX_ELEMENT_ADDRESS)

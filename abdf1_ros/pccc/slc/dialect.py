@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import exactly, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor, USUAL
@@ -25,14 +25,12 @@ from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import FILES
 
 
-class SlcDialect:
+class SlcDialect(Dialect):
     """
     Protected typed logical read, write and masked write with three address fields.
 
     Packets are as long as ``processor`` takes them.
     """
-
-    writes_bits = True
 
     def __init__(self, processor: Processor = USUAL) -> None:
         self._processor = processor
@@ -49,12 +47,6 @@ class SlcDialect:
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         return slc.CMD, slc.LogicalRead(_logical_address(address), words * 2).encode()
-
-    def reply_size(self, address: Address, words: int) -> int:
-        return words * 2
-
-    def read_data(self, address: Address, words: int, data: bytes) -> bytes:
-        return exactly(words, data)
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:
         return slc.CMD, slc.LogicalWrite(_logical_address(address), data).encode()

@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import exactly, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, exactly, Request, Transfer
 from abdf1_ros.pccc.file_types import FileType, Layout
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.pccc.word_range.commands import (
@@ -32,7 +32,7 @@ from abdf1_ros.pccc.word_range.commands import (
 
 
 @dataclass(slots=True, eq=False)
-class WordRangeDialect:
+class WordRangeDialect(Dialect):
     """
     Word range read and write; several packets of one transfer carry their offset in it.
 
@@ -46,13 +46,10 @@ class WordRangeDialect:
     address_size: int
     to_line: Callable[[Address], WireAddress]
     bit_write: Callable[[Address, int, int], bytes]
-    writes_bits: bool = True
 
     def max_read(self, file_type: FileType) -> int:
         words = self.files[file_type].words
         return word_range.MAX_READ // 2 // words * words
-
-    sure_read = max_read
 
     def max_write(self, file_type: FileType) -> int:
         words = self.files[file_type].words
@@ -63,9 +60,6 @@ class WordRangeDialect:
         return word_range.CMD, WordRangeRead(
             self.to_line(whole.start), 2 * words, address.offset - whole.start.offset,
             whole.words).encode()
-
-    def reply_size(self, address: Address, words: int) -> int:
-        return words * 2
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:
         """Check the length of the reply and return its words."""
