@@ -308,8 +308,6 @@ def _ping(options: argparse.Namespace) -> int:
             for _ in range(options.count):
                 try:
                     times.append(presence.ping(session, options.station))
-                except PortLost:
-                    raise
                 except Abdf1Error as error:
                     failures += 1
                     _failed(options, session, error)
@@ -540,8 +538,7 @@ def _extent(entry: DataFile) -> str:
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
     'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files,
-    'clock': _clock,
-    'import': _import}
+    'clock': _clock, 'import': _import}
 
 
 def _complain(text: str) -> None:
