@@ -60,9 +60,9 @@ class Words:
         return f'N{self.file}:{self.element}'
 
 
-def header(dst: int, src: int, cmd: int, tns: int, sts: int = 0) -> bytes:
-    """Return the six bytes before FNC or data (M 6-3)."""
-    return bytes((dst, src, cmd, sts)) + tns.to_bytes(2, 'little')
+def header(dst: int, src: int, cmd: int, tns: int) -> bytes:
+    """Return the six bytes of a command before FNC or data (M 6-3)."""
+    return bytes((dst, src, cmd, 0)) + tns.to_bytes(2, 'little')
 
 
 def check_reply(command: bytes, reply: bytes) -> bytes:
@@ -150,7 +150,7 @@ class MasterEnd(AskingEnd):
     """A half-duplex master that talks to one slave, ``station``; ``own`` is its own address."""
 
     def settle(self) -> None:
-        self.wire.drain()
+        self.wire.drain(_REPLY_TIMES * self.wire.answer_time)
         end = self.wire.now + _REPLY_TIMES * self.wire.answer_time
         while self.wire.now < end:
             symbol = self.poll()
@@ -272,13 +272,12 @@ class SlaveEnd(AnsweringEnd):
 
         return self._command(self.wire.until(is_command, what, PATIENCE))
 
-    def next_poll(self, what: str = 'a poll of our station',
-                  within: float = PATIENCE) -> Symbol:
+    def next_poll(self, what: str = 'a poll of our station') -> Symbol:
         """Wait for a poll of us; a message before it, or a reset of the line, is a failure."""
         def is_ours(symbol: Symbol) -> bool:
             return symbol.station == self.station or symbol.kind is SymbolKind.NAK
 
-        symbol = self.wire.until(is_ours, what, within)
+        symbol = self.wire.until(is_ours, what, PATIENCE)
         if symbol.kind is not SymbolKind.POLL or not symbol.is_good:
             raise Failed(what, str(symbol))
         return symbol

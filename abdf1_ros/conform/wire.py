@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-import math
 from typing import Protocol
 
 from abdf1_ros.conform import codec
@@ -30,6 +29,7 @@ _FRAME_TIME = 3.0
 _LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is doubled
 
 _MOST_UNREAD = 65536
+_QUIET = 0.2  # s without a byte
 
 
 class RawLine(Protocol):
@@ -181,8 +181,8 @@ class Wire:
         while (left := end - self._clock()) > 0:
             self._read(left)
 
-    def drain(self, quiet: float = 0.2, limit: float = math.inf) -> None:
-        """Hear and drop all until nothing has come for ``quiet`` s, at most ``limit`` s."""
+    def drain(self, limit: float) -> None:
+        """Hear and drop all until the line is quiet, at most ``limit`` s."""
         end = self._clock() + limit
-        while self._clock() < end and self.hear(quiet) is not None:
+        while self._clock() < end and self.hear(_QUIET) is not None:
             pass

@@ -314,14 +314,12 @@ def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
                    f'{_ms(period)} takes {part:.0%} of the time')
 
 
-def guard_faults(mappings: Sequence[Mapping], planner: Planner,
-                 response_time: float = forecast.USUAL_RESPONSE_TIME
-                 ) -> Iterator[tuple[Mapping, str]]:
+def guard_faults(mappings: Sequence[Mapping], planner: Planner) -> Iterator[tuple[Mapping, str]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
     counters = {mapping: (condition.text, condition.timeout) for mapping in mappings
                 if (condition := mapping.publish_while) and condition.timeout is not None}
     blocks = planner.plan(mappings) if counters else []
-    expected = forecast.intervals(blocks, response_time)
+    expected = forecast.intervals(blocks, forecast.USUAL_RESPONSE_TIME)
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():
         needed = _READS_IN_TIME * found.get(tag, 0.0)

@@ -16,8 +16,10 @@
 
 from __future__ import annotations
 
+from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, CASES, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck
+from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd
 from abdf1_ros.conform.wire import Failed, Wire
 import pytest
 from support.cases import for_all
@@ -181,22 +183,40 @@ def test_plc5_that_refuses_an_area_fails_address_forms() -> None:
         'address-forms: expected STS 00 for the address 07 00 07 02, got STS 10']
 
 
+class Babble:
+    """A line on which others send all the time."""
+
+    def __init__(self, data: bytes) -> None:
+        self.now = 0.0
+        self.sent = b''
+        self._data = data
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def read(self, timeout: float) -> bytes:
+        """Let time pass."""
+        self.now += min(timeout, 0.3)
+        assert self.now < 60.0, 'no end'
+        return self._data
+
+    def write(self, data: bytes) -> None:
+        """Take what is sent."""
+        self.sent += data
+
+
 def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
-    class Babble:
-        now = 0.0
-
-        def clock(self) -> float:
-            return self.now
-
-        def read(self, timeout: float) -> bytes:
-            self.now += min(timeout, 0.3)
-            return b'\x10\x06'
-
-        def write(self, data: bytes) -> None:
-            raise AssertionError(data)
-
-    line = Babble()
+    line = Babble(codec.ACK)
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False)
     with pytest.raises(Failed, match='nothing of the kind in 2 s'):
         wire.until(lambda symbol: False, 'a poll', 2.0)
-    assert line.now == pytest.approx(2.0)
+    assert (line.now, line.sent) == (pytest.approx(2.0), b'')
+
+
+@pytest.mark.parametrize('kind', [MasterEnd, PeerEnd])
+def test_line_that_is_never_quiet_keeps_no_case_waiting(kind: type[AskingEnd]) -> None:
+    line = Babble(b'\x55')
+    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=kind is MasterEnd)
+    kind(wire, 1, 0, 0).settle()
+    assert line.now <= 12.0
