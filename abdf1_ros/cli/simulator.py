@@ -229,21 +229,20 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
                  options: argparse.Namespace) -> LinkThread:
     """Return the thread that plays ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
-    machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
-    open_line: Callable[[], Port] = line.open
-    if options.echo:
-        open_line = lambda: _EchoingPort(line.open())  # noqa: E731
+    is_full_duplex = options.full_duplex is not None
     # Only a serial port has a real speed, which the timers have to take into account.
     timing = Network(baud=options.baud).timing if options.port else LineTiming()
-    if options.radio:
-        machine = _radio(plcs, checksum, timing)
-    if options.full_duplex is not None:
+    if is_full_duplex:
         machine = _full_duplex(plcs[0], checksum, timing)
+    elif options.radio:
+        machine = _radio(plcs, checksum, timing)
+    else:
+        machine = Machine(multidrop(stations_of(plcs, checksum)), checksum=checksum)
 
-        def open_faulty(open_port: Callable[[], Port] = open_line) -> Port:
-            return _FaultyPort(open_port(), plcs[0], checksum)
+    def open_line() -> Port:
+        port: Port = _EchoingPort(line.open()) if options.echo else line.open()
+        return _FaultyPort(port, plcs[0], checksum) if is_full_duplex else port
 
-        open_line = open_faulty
     return LinkThread(machine, open_line, on_state=_announcer(),
                       on_fault=traceback.print_exception)
 
