@@ -167,7 +167,7 @@ def _poll(buffer: bytes) -> Symbol | None:
         return None
     station, end = found
     return Symbol(SymbolKind.POLL, buffer[:end + 1], station=station,
-                       is_good=buffer[end] == bcc((station,)))
+                  is_good=buffer[end] == bcc((station,)))
 
 
 def _master_message(buffer: bytes, check: BlockCheck) -> Symbol | None:
