@@ -22,8 +22,8 @@ writers to one topic can tell their results apart. A text has no label: this pro
 first result that has its tag. So give a topic of texts one writer.
 
 With --station the command is sent only while the bridge says, in the status "interlocks" of
-/diagnostics, that its heartbeat counts at that station; otherwise it is told why not. The PLC has
-the last word: its program ignores commands until a person has reset.
+/diagnostics, that it is in control of that station; otherwise it is told why not. Where no row of
+the map Confirms that, a heartbeat that counts has to do: the PLC may still wait for a reset.
 
 A command whose result does not come is neither done nor not done. Look at the read topic before
 you send it again; for a pulse, a second one may be the wrong one.
@@ -79,12 +79,13 @@ class CommandWriter(Node):
         self._control: dict[str, str] = {}
 
     def why_not_in_control(self, station: int, timeout: float) -> str:
-        """Return why the heartbeat does not count at a station, empty where it does."""
+        """Return why ROS is not in control of a station, empty where it is."""
         told = self.create_subscription(DiagnosticArray, '/diagnostics', self._take_control, 10)
         self._spin_until(lambda: self._control, timeout)
         self.destroy_subscription(told)
         text = self._control.get(f'station {station}', 'the bridge has no heartbeat there')
-        return '' if text.startswith('heartbeat counts') else text.removeprefix('not in control: ')
+        is_good = text.startswith(('in control', 'heartbeat counts'))
+        return '' if is_good else text.removeprefix('not in control: ')
 
     def _take_control(self, array: DiagnosticArray) -> None:
         for status in array.status:
@@ -184,7 +185,7 @@ def main() -> int:
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
     parser.add_argument('--tags', nargs='+', help='of the mappings (default: the topic)')
     parser.add_argument('--station', type=int,
-                        help='write only while the heartbeat counts at this station')
+                        help='write only while ROS is in control of this station')
     parser.add_argument('--timeout', type=float, default=6.0,
                         help='seconds to wait for the bridge, then for the result; longer than '
                              'twice its write_timeout, for a write that is read back '

@@ -359,6 +359,7 @@ class Demo:
     def _take_control(self) -> Speed:
         """Let a person press reset, and the publisher command a speed."""
         assert self._speed is not None
+        self._speed.live()
         for _ in range(_RESETS):
             self._wait('a steady heartbeat', lambda: time.monotonic() > 4.5 + self._lamps.get(
                 _ALIVE, math.inf))
@@ -407,8 +408,6 @@ class Demo:
         self._simulator.command('run 2')
         self._wait('values', lambda: self._level('mappings') == _OK)
         self._print_statuses('mappings')
-        if self._speed:
-            self._speed.live()
 
     def _show_death_of_bridge(self) -> None:
         self._title('The bridge dies (kill -9); first another reset, as control is gone')
@@ -433,6 +432,11 @@ class Demo:
 
     def _show_diagnostics(self) -> None:
         self._title('Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
+        if self._speed:  # the bridge has come back, and nobody has pressed reset
+            self._wait('the reset to be missed', lambda: 'does not confirm' in
+                       self._watcher.statuses['interlocks'].message)
+            self._print_statuses('interlocks')
+            self._take_control()
         # After a write that was not confirmed, as on a busy machine, they say so for ten seconds.
         self._wait('all statuses to be OK', lambda: all(
             status.level == _OK for status in self._watcher.statuses.values()))

@@ -127,6 +127,7 @@ class Session:
         self.diagnostics = Diagnostics(
             node.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
             configuration.map_problems, Path(parameters.map_file).name)
+        self.diagnostics.interlocks.latest = self.reads.latest
         self.guest_lines = self._make_guest_lines()
         self.diagnostics.show_guests(self.guest_lines)
         self._interlocks = InterlockWatch(node, self.driver)

@@ -78,6 +78,8 @@ MAP_COLUMNS = (
            'published only while it holds'),
     Column('Heartbeat_Timeout', 'none',
            'ms that the counter of Publish_While may stay unchanged'),
+    Column('Confirms', 'none',
+           'of a Read of the one bit "ROS in control": the tag of the Heartbeat row it goes with'),
     Column('Via', 'Station',
            'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
            'Station is'),

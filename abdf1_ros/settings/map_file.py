@@ -77,6 +77,8 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFau
         for topic in mapping.heartbeat.requires if mapping.heartbeat else ():
             if topic not in topics:
                 yield mapping, CellFault('Requires', _no_topic(topic, mappings))
+        if mapping.confirms and (text := _no_confirmation(mapping, tags, mappings)):
+            yield mapping, CellFault('Confirms', f'"{shown(mapping.confirms)}" {text}')
         condition = mapping.publish_while
         if condition is None or condition.tag is None:
             continue
@@ -104,6 +106,16 @@ def _no_topic(topic: str, mappings: Sequence[Mapping]) -> str:
     other = next((mapping for mapping in mappings if mapping.writes and topic in (
         mapping.tag, f'/{mapping.topic}', f'~/write/{mapping.topic}')), None)
     return f'{text}; did you mean {other.topic}?' if other else text
+
+
+def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping],
+                     mappings: Sequence[Mapping]) -> str:
+    """Return why a row cannot confirm control by a heartbeat, empty if it can (rule 22)."""
+    beat = tags.get(mapping.confirms)
+    first = next(other for other in mappings if other.confirms == mapping.confirms)
+    is_right = beat and beat.heartbeat and beat.station == mapping.station and first is mapping
+    return '' if is_right else 'should be the tag of a good Heartbeat row of station ' \
+        f'{mapping.station} that no row before it confirms'
 
 
 def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping]) -> str:

@@ -124,6 +124,7 @@ class RowReader:
             'maximum': self._decimal('Max', math.inf),
             'word_order': self._choice('Word_Order', WordOrder, WordOrder.LOW),
             'scaling': self._scaling(),
+            'confirms': self._row.get('Confirms'),
             'description': self._row.get('Description')}
 
     def _dependent(self) -> dict[str, Any]:
@@ -175,6 +176,9 @@ class RowReader:
             row, command.value, mapping.publish is Publish.ALWAYS, fault)
         if publish_while and publish_while.tag == mapping.tag:
             fault('Publish_While', 'a row cannot depend on itself; name the tag of a counter')
+        if mapping.confirms and (command, mapping.type, mapping.length) != (
+                Command.READ, ValueType.BOOL, 1):
+            fault('Confirms', 'Confirms is for a Read row of one bit (bool, Length 1)')
         return replace(mapping, heartbeat=heartbeat, fallback=fallback,
                        publish_while=publish_while)
 

@@ -67,6 +67,7 @@ class Mapping:
     is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
     ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
+    ``confirms`` is the tag of the heartbeat whose control the bit tells, empty for none.
     ``description`` is for people. ``remarks`` say what is odd about the row.
     """
 
@@ -95,6 +96,7 @@ class Mapping:
     heartbeat: Heartbeat | None = None
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None
+    confirms: str = ''
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False, compare=False)

@@ -129,7 +129,9 @@ def answered(write: Write) -> Iterator[Answered]:
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
         diagnostics = observer.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         stations = {'station 1': 'heartbeat counts since 2.0 s',
-                    'station 2': 'not in control: no message of speed in time'}
+                    'station 2': 'not in control: no message of speed in time',
+                    'station 4': 'in control since 1.0 s',
+                    'station 5': 'unknown: in_control is stale'}
         status = DiagnosticStatus(name='fake: interlocks', values=[
             KeyValue(key=key, value=value) for key, value in stations.items()])
         observer.node.create_timer(
@@ -196,7 +198,9 @@ def test_text_of_a_result_decides_the_exit_status(message: str, status: int) -> 
     ('1', (0, ['lamps: written (1.0 ms)'])),
     ('2', (1, ['not written: ROS is not in control of station 2: no message of speed in time'])),
     ('3', (1, ['not written: ROS is not in control of station 3: the bridge has no heartbeat '
-               'there']))])
+               'there'])),
+    ('4', (0, ['lamps: written (1.0 ms)'])),
+    ('5', (1, ['not written: ROS is not in control of station 5: unknown: in_control is stale']))])
 def test_command_goes_only_to_a_plc_that_ros_is_in_control_of(
         answered: Answered, station: str, expected: tuple[int, list[str]]) -> None:
     assert answered(lambda data: [('lamps', 'written', OURS)], '--station', station) == expected

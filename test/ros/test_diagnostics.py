@@ -81,8 +81,9 @@ class Listener:
 class Bench:
     """Diagnostics of a driver that no port moves; tests set its state."""
 
-    def __init__(self, folder: Path, rows: tuple[str, ...] = ROWS, mode: str = 'Master') -> None:
-        mappings, left_out = load_mappings(str(write_csv(folder / 'map.csv', HEADER, rows)))
+    def __init__(self, folder: Path, rows: tuple[str, ...] = ROWS, mode: str = 'Master',
+                 header: str = HEADER) -> None:
+        mappings, left_out = load_mappings(str(write_csv(folder / 'map.csv', header, rows)))
         self.folder = folder
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Listener())
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
@@ -115,8 +116,8 @@ class Bench:
 
 @pytest.fixture
 def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., Bench]:
-    def make(*rows: str, mode: str = 'Master') -> Bench:
-        bench = Bench(tmp_path, rows or ROWS, mode)
+    def make(*rows: str, mode: str = 'Master', header: str = HEADER) -> Bench:
+        bench = Bench(tmp_path, rows or ROWS, mode, header)
         request.addfinalizer(bench.close)
         return bench
     return make
@@ -509,6 +510,49 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
     assert values['alive'] == 'heartbeat 0, 4.0 s ago; does not count: not confirmed for 4.0 s'
     assert values['station 1'] == 'not in control: not confirmed for 4.0 s'
     assert values['bound of alive'].startswith('PLC timer presets ')
+
+
+def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
+        make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,',
+                       'ruled,Read,B12:0/2,1,PLC5,1000,alive', header=f'{HEADER},Confirms')
+    beat, bit = bench.driver.interlocks.heartbeats[0], bench.point('ruled')
+    latest = bench.diagnostics.interlocks.latest = {}
+
+    def station(value: int | None, now: float) -> tuple[bytes, str]:
+        if value is not None:
+            latest['ruled'] = bit.update(bytes([value << 2, 0]), now)
+        status = bench.status('interlocks', now)
+        return status.level, details(status)['station 1']
+
+    assert station(1, NOW - 1) == (
+        WARN, 'not in control: the PLC has not confirmed it yet')
+    beat.confirmed, beat.state = NOW, BeatState.COUNTS
+    assert station(None, NOW) == (
+        WARN, 'unknown: ruled has not been read since the heartbeat counts')
+    assert station(1, NOW + 1) == (OK, 'in control since 0.0 s')
+    assert station(1, NOW + 2.5) == (OK, 'in control since 1.5 s')
+    assert station(0, NOW + 3) == (
+        WARN, 'not in control: the heartbeat counts, but ruled is 0: somebody has to press reset '
+        '(docs/tutorials/heartbeats.md)')
+    assert bench.says('interlocks', NOW + 3)[1] == (
+        'WARN: 1 of 1 heartbeats count; alive: the PLC does not confirm that ROS is in control')
+    assert station(1, NOW + 4) == (OK, 'in control since 0.0 s')
+    assert station(None, NOW + 30) == (WARN, 'unknown: ruled is stale')
+    bit.fail('no reply')
+    assert station(None, NOW + 30) == (WARN, 'unknown: ruled is failed: no reply')
+    assert station(1, NOW + 31) == (OK, 'in control since 0.0 s')
+    beat.reason = 'no message'
+    assert station(None, NOW + 31) == (WARN, 'not in control: no message')
+    beat.reason = ''
+    assert station(1, NOW + 32) == (OK, 'in control since 0.0 s')
+
+
+def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(*(f'beat_{word},Heartbeat,N10:{word},1,PLC5,1000' for word in range(3)))
+    for beat in bench.driver.interlocks.heartbeats[::2]:
+        beat.confirmed, beat.state = NOW, BeatState.COUNTS
+    assert details(bench.status('interlocks'))['station 1'].startswith('not in control: ')
 
 
 def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(

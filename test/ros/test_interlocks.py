@@ -43,6 +43,7 @@ from support.ros import (
     ERROR,
     Inbox,
     Observer,
+    OK,
     Process,
     ros_args,
     until_status,
@@ -317,3 +318,26 @@ def test_rule_19_second_bridge_takes_control_away_and_does_not_keep_it_alive(
         assert (cell.word('N10:0'), cell.word('N11:2'), is_in_control()) == (0, 0, False)
         assert cell.call(Trigger, 'reload', Trigger.Request()).success
         cell.until(is_in_control, 'control by a bridge that is alone')
+
+
+def test_rule_22_status_says_whether_ros_is_in_control_and_what_is_missing(cell: Cell) -> None:
+    plc = cell.plcs[1]
+    ladder = PageLadder(plc.table, 150)
+    plc.run_ladder(ladder)
+    head, *rows = MAP.replace(',7,400', ',0,400').splitlines()
+    rows = [f'{head},Confirms', *(f'{row},' for row in rows),
+            'ruled,Read,B12:0/2,1,SLC,50,,,,beat']
+    cell.map.write_text('\n'.join(rows), encoding='utf-8')
+    assert cell.call(Trigger, 'reload', Trigger.Request()).success
+    until_status(cell.diagnostics, 'interlocks', WARN,
+                 lambda status: 'ruled is 0: somebody has to press reset' in
+                 details(status)['station 1'])
+
+    def is_in_control() -> bool:
+        ladder.press_reset()
+        plc.advance()
+        return ladder.is_on(Lamp.IN_CONTROL)
+
+    cell.until(is_in_control, 'a reset that is accepted')
+    until_status(cell.diagnostics, 'interlocks', OK,
+                 lambda status: details(status)['station 1'].startswith('in control since'))

@@ -36,7 +36,7 @@ def test_columns_are_those_of_the_interface() -> None:
                        'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',
                        'Offset', 'Access', 'Processor', 'Fallback', 'Fallback_After',
                        'Requires', 'Requires_Timeout', 'Publish_While', 'Heartbeat_Timeout',
-                       'Via', 'Description')
+                       'Confirms', 'Via', 'Description')
 
 
 def test_every_column_is_there_once_and_described() -> None:

@@ -29,6 +29,7 @@ WRITE = {'Tag': 'speed', 'Command': 'Write', 'Address': 'N10:1'}
 COUNTER = {'Tag': 'counter', 'Command': 'Read', 'Address': 'N11:3', 'Period': '100'}
 DOORS = {'Tag': 'doors', 'Command': 'Read', 'Address': 'B3:0/0', 'Publish_While': 'counter',
          'Heartbeat_Timeout': '1000'}
+BIT = {'Tag': 'bit', 'Command': 'Read', 'Address': 'B12:0/2', 'Confirms': 'beat'}
 
 
 def tags_of(*rows: str) -> list[str]:
@@ -191,6 +192,36 @@ def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
     rows = (row(**bad), row(**BEAT, Requires='speed', Requires_Timeout='500'))
     assert tags_of(*rows) == []
     assert len(faults(*rows)) == 2
+
+
+def test_rule_22_bit_confirms_a_heartbeat_of_its_station() -> None:
+    bit, rest = load_rows(row(**BIT), row(**BEAT))[0]
+    assert (bit.confirms, bit.cell('Confirms'), rest.cell('Confirms')) == ('beat', 'beat', '')
+
+
+@pytest.mark.parametrize('cells', [
+    {'Command': 'ReadWrite'}, {'Length': '2'}, {'Address': 'N12:0'}])
+def test_rule_22_what_is_not_a_bit_that_is_read_confirms_nothing(cells: dict[str, str]) -> None:
+    assert 'Confirms is for a Read row of one bit' in faults(row(**BIT | cells), row(**BEAT))[0]
+
+
+@pytest.mark.parametrize('cells', [
+    {'Confirms': 'nobody'}, {'Confirms': 'bit'}, {'Confirms': 'speed'}, {'Station': '2'}])
+def test_rule_22_what_a_bit_cannot_confirm(cells: dict[str, str]) -> None:
+    cells = BIT | cells
+    station = cells.get('Station', '1')
+    assert faults(row(**cells), row(**BEAT), row(**WRITE)) == [
+        f'2:24 (Confirms): Item: 1, "{cells["Confirms"]}" should be the tag of a good Heartbeat '
+        f'row of station {station} that no row before it confirms']
+
+
+def test_rule_22_a_heartbeat_is_confirmed_once() -> None:
+    other = BIT | {'Tag': 'other', 'Address': 'B12:0/3'}
+    assert tags_of(row(**BIT), row(**other), row(**BEAT)) == ['bit', 'beat']
+
+
+def test_rule_15_a_heartbeat_left_out_takes_its_bit_along() -> None:
+    assert tags_of(row(**BIT), row(**BEAT | {'Period': '1'}), row(**WRITE)) == ['speed']
 
 
 def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
