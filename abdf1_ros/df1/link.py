@@ -16,14 +16,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import LineTiming, Procedure
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
+from abdf1_ros.messages import Event
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,3 +94,22 @@ class Link(Protocol):
 
     def status(self) -> LinkStatus:
         """Return the details of this link; may be called from any thread."""
+
+
+class EqualNode:
+    """What a node has on a line where everybody may send at any time, and no master polls."""
+
+    def __init__(self, machine: Machine, stations: ActiveStationList,
+                 serve: Callable[[Packet], Packet | None],
+                 report: Callable[[Event], None]) -> None:
+        self._machine = machine
+        self._counters = machine.counters
+        self._stations = stations
+        self._serve = serve
+        self._report = report
+        self._accounting = Accounting(machine.counters, stations, report)
+        self._note = self._accounting.note
+
+    def status(self) -> LinkStatus:
+        """Return that there are no details."""
+        return NO_STATUS

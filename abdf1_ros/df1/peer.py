@@ -49,10 +49,10 @@ from dataclasses import dataclass
 import math
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
+from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
-from abdf1_ros.df1.link import LinkStatus, NO_STATUS
+from abdf1_ros.df1.link import EqualNode
 from abdf1_ros.df1.machine import (
     Heard,
     Machine,
@@ -127,7 +127,7 @@ class _Accepted:
     may_come_again: bool = False
 
 
-class FullDuplexPeer:
+class FullDuplexPeer(EqualNode):
     """
     Carry out tasks on the line of ``machine`` and answer the commands that come in.
 
@@ -140,20 +140,10 @@ class FullDuplexPeer:
     def __init__(self, machine: Machine, settings: PeerSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None) -> None:
-        self._machine = machine
-        self._counters = machine.counters
+        super().__init__(machine, stations, serve, report)
         self._settings = settings
-        self._stations = stations
-        self._serve = serve
-        self._report = report
-        self._accounting = Accounting(machine.counters, stations, report)
-        self._note = self._accounting.note
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._forget()
-
-    def status(self) -> LinkStatus:
-        """Return that there are no details."""
-        return NO_STATUS
 
     @property
     def replies(self) -> deque[Packet]:

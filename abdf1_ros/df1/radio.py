@@ -36,10 +36,10 @@ from dataclasses import dataclass
 from random import Random
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
+from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame
-from abdf1_ros.df1.link import LinkStatus, NO_STATUS
+from abdf1_ros.df1.link import EqualNode
 from abdf1_ros.df1.machine import (
     Heard,
     LineTiming,
@@ -122,7 +122,7 @@ class _Recent:
     reply: Packet | None = None
 
 
-class RadioNode:
+class RadioNode(EqualNode):
     """
     Carry out tasks on the line of ``machine``, one at a time, and serve commands that come.
 
@@ -135,19 +135,10 @@ class RadioNode:
                  serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None,
                  random: Random | None = None) -> None:
-        self._machine = machine
-        self._counters = machine.counters
+        super().__init__(machine, stations, serve, report)
         self._settings = settings
-        self._stations = stations
-        self._serve = serve
-        self._report = report
         self._random = random or Random()
-        self._accounting = Accounting(machine.counters, stations, report)
         self._forget()
-
-    def status(self) -> LinkStatus:
-        """Return that there are no details."""
-        return NO_STATUS
 
     def _forget(self) -> None:
         self._waiting: deque[bytes] = deque()  # link data to be sent
@@ -185,8 +176,8 @@ class RadioNode:
         for count in range(tries):
             if count:
                 self._counters.nak_retries += 1
-                self._accounting.note(Message.NTC_NAK_RETRY, count,
-                                      Message.ERR_COMMAND_TIMEOUT.number, station=number)
+                self._note(Message.NTC_NAK_RETRY, count, Message.ERR_COMMAND_TIMEOUT.number,
+                           station=number)
             yield from self._transmit(task, count)
             yield from self._await_reply()
             if self._task is None:
@@ -194,7 +185,7 @@ class RadioNode:
         self._task = None
         self._accounting.late(number, keeps_others_waiting=True)
         self._stations.lost(number, self._machine.now)
-        self._accounting.note(Message.ERR_INACTIVE_STATION, number, station=number)
+        self._note(Message.ERR_INACTIVE_STATION, number, station=number)
         task.fail(StationInactive(number))
 
     def _transmit(self, task: Task, count: int) -> Procedure:
