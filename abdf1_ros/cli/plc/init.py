@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+import os
 from pathlib import Path
 
 from abdf1_ros.cli.plc import files
@@ -44,16 +45,16 @@ class Files:
     """
     Where the two files are to be: ``net`` and ``map``.
 
-    Makes the folder where there is none; ConfigurationError where a file is there already.
+    ConfigurationError where a file is there already, or the folder cannot be made; it is made by
+    ``write``.
     """
 
     def __init__(self, folder: Path) -> None:
         self.net, self.map = folder / 'net.csv', folder / 'map.csv'
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConfigurationError([Problem(
-                str(folder), f'cannot be made: {error.strerror}')]) from None
+        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        if not there.is_dir() or not os.access(there, os.W_OK):
+            raise ConfigurationError([Problem(str(folder), (
+                f'cannot be used: {there} is not a folder that can be written to'))])
         for path in (self.net, self.map):
             if path.exists() and path.stat().st_size:  # a pipe that failed leaves an empty one
                 raise ConfigurationError([Problem(str(path), (
@@ -61,10 +62,15 @@ class Files:
 
     def write(self, network: Network, found: Found, stations: Sequence[Presence],
               listed: Mapping[int, Sequence[DataFile]]) -> None:
-        """Write both, with the files that stations have listed; raises OSError."""
+        """Write both, with the files that stations have listed; raises ConfigurationError."""
         numbers = [presence.station for presence in stations]
-        self.net.write_text(net_csv(network, found, numbers) + '\n', encoding='utf-8')
-        self.map.write_text(_HEAD + ''.join(map_rows(stations, listed)), encoding='utf-8')
+        try:
+            self.net.parent.mkdir(parents=True, exist_ok=True)
+            self.net.write_text(net_csv(network, found, numbers) + '\n', encoding='utf-8')
+            self.map.write_text(_HEAD + ''.join(map_rows(stations, listed)), encoding='utf-8')
+        except OSError as error:
+            raise ConfigurationError([Problem(
+                str(self.net.parent), f'cannot be written: {error.strerror}')]) from None
 
 
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:

@@ -107,7 +107,14 @@ def test_init_leaves_files_alone_that_are_there(
     assert 'map.csv: is there already' in capsys.readouterr().err
     assert not (tmp_path / 'net.csv').exists()
     assert main(['init', '--port', port, '--into', str(tmp_path / 'map.csv')]) == 2
-    assert 'map.csv: cannot be made: File exists' in capsys.readouterr().err
+    assert 'map.csv is not a folder that can be written to' in capsys.readouterr().err
+
+
+def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output) -> None:
+    into = tmp_path / 'plant' / 'line_1'
+    assert main(['init', '--port', str(tmp_path / 'unplugged'), '--into', str(into)]) != 0
+    assert 'unplugged' in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(('station', 'found'), [
