@@ -83,10 +83,10 @@ class Identity:
     ``plc_type`` is None where the family is unknown; ``mode`` None where the reply has none or
     one without a name, which is then in ``mode_text``. ``faults`` keep a processor from doing its
     work, ``remarks`` do not. ``name`` is in the processor's own words with control characters
-    made visible, ``memory`` in its own unit. ``interface`` is the code of the port that was
-    asked. Its counters have a ``counter_layout``, or are bytes of the module: at
-    ``counter_address``, ``counter_size`` of them. ``processor`` is what the map file would call
-    it, None where it has no word for it. ``inquiry`` tells more about a fault.
+    made visible, ``memory`` in its own unit, empty where it does not say. ``interface`` is the
+    code of the port that was asked. Its counters have a ``counter_layout``, or are bytes of the
+    module: at ``counter_address``, ``counter_size`` of them. ``processor`` is what the map file
+    would call it, None where it has no word for it. ``inquiry`` tells more about a fault.
     """
 
     plc_type: PlcType | None

@@ -56,7 +56,8 @@ def test_slc_of_the_vectors() -> None:
 def test_plc5_of_the_vectors() -> None:
     identity = decode_identity(PLC5)
     assert str(identity) == 'PLC-5/40 series C revision C, REM RUN'
-    assert (identity.plc_type, identity.memory) == (PlcType.PLC5, '98304')
+    assert (identity.plc_type, identity.memory) == (
+        PlcType.PLC5, '98304 (unit not documented)')
     assert identity.is_running
     assert (identity.faults, identity.remarks) == ((), ())
 
@@ -197,7 +198,7 @@ def test_old_plc5_ends_with_the_byte_about_its_ram(start: str, model: str) -> No
     assert str(identity) == f'{model} series C revision C, RUN'
     assert identity.faults == ('major processor fault (word S:11 says which)', 'bad RAM')
     assert identity.remarks == ('forces active', 'forces installed', 'memory protected')
-    assert identity.memory == '98304'
+    assert identity.memory == '98304 (unit not documented)'
     with pytest.raises(FormatError, match=f'{len(data) - 1} bytes; .* {len(data)} or more'):
         decode_identity(data[:-1])
 

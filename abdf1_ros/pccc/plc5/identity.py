@@ -106,8 +106,9 @@ def decode(data: bytes) -> Identity | None:
         'download in progress': data[0] & 0x10, 'testing edits': data[0] & 0x40,
         'edits in the processor': data[0] & 0x80, 'forces active': fields[12] & 0x01,
         'forces installed': fields[12] & 0x10, 'memory protected': fields[13]})
+    size = int.from_bytes(fields[:4], 'little')
     identity = Identity(PlcType.PLC5, model, *letters(fields[4]), mode, mode_text, faults, remarks,
-                        memory=str(int.from_bytes(fields[:4], 'little')),
+                        memory=f'{size} (unit not documented)' if size else '',
                         counter_layout=COUNTERS)
     if _UNNAMED_FAULT not in faults:
         return identity

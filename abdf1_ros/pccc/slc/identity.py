@@ -123,8 +123,8 @@ def decode(data: bytes) -> Identity | None:
         'testing edits': data[0] & 0x40, 'edits in the processor': data[0] & 0x80,
         'program directory corrupted': data[23] & 0x01})
     return Identity(PlcType.SLC, model, *release(data[4]), mode, mode_text, faults, remarks, name,
-                    word_at(data, 20), f'{data[22]} K', data[2], processor=processor,
-                    counter_layout=_counters(processor, data[2]))
+                    word_at(data, 20), f'{data[22]} K' if data[22] else '', data[2],
+                    processor=processor, counter_layout=_counters(processor, data[2]))
 
 
 def _counters(processor: Processor | None, interface: int) -> CounterLayout:
