@@ -30,7 +30,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, STS_ILLEGAL_COMMAND
-from abdf1_ros.pccc.structures import type_fault, write_fault
+from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
 
 # What libplctag's users report of an SLC 5/05 and of MicroLogix (its issues 121, 479 and 657).
@@ -56,12 +56,11 @@ class AddressedValues:
         Raises FormatError, saying what would be right.
         """
         address = parse_address(text, plc_type, access)
-        types = types_of(address)
-        kind = kind or types[0]
+        kind = kind or types_of(address)[0]
         packed = kind is ValueType.STRING and address.file_type is not FileType.STRING
         codec = Codec(kind, length, address.bit or 0, word_order, packed)
-        if kind not in types:
-            raise FormatError(f'{address} can be {", ".join(entry.value for entry in types)}')
+        if fault := wrong_type(address, kind):
+            raise FormatError(fault)
         if length < 1 or address.offset + codec.words > address.area_size:
             last = address.at_offset(address.area_size - 1)
             raise FormatError(f'{length} elements do not fit at {address}; the last word there '

@@ -12,14 +12,36 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a structure in a PLC have which type, and which may be written."""
+"""Which type the words at an address have, and which words of a structure may be written."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from abdf1_ros.pccc.address import Address, BITS
-from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.pccc.values import types_of, ValueType
+
+
+def wrong_type(address: Address, kind: ValueType) -> str | None:
+    """Return what would be right where an address has no values of a type, None where it has."""
+    types = types_of(address)
+    if kind in types:
+        return None
+    text = f'{address} can be {", ".join(right.value for right in types)}'
+    if kind is ValueType.BOOL:
+        return f'{text}; a bool needs a bit address such as B3:0/5'
+    if address.bit is None:
+        return text
+    if values := ', '.join(value_addresses(address)):
+        return f'{text}: it is a bit; the values of this element are {values}'
+    return f'{text}: it is a bit; its word is {replace(address, bit=None)}'
+
+
+def value_addresses(address: Address) -> list[str]:
+    """Return the values of an element of a structure, without its word of bits."""
+    return [str(replace(address, word=member.word, bit=None))
+            for member in address.layout.members.values() if member.word and member.bit is None]
 
 
 def type_fault(address: Address, kind: ValueType, length: int) -> str | None:

@@ -216,7 +216,7 @@ def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
                   if mapping.shares_words(other)}.values()
         read = [other for other in others if other.command is Command.READ]
         written = [other for other in others if other.writes and other.item < mapping.item]
-        about = f'line {mapping.file_line} of the map: {mapping.tag} writes {mapping.address}'
+        about = f'{mapping.place}: {mapping.tag} writes {mapping.address}'
         if read and mapping.command is Command.WRITE:
             yield Remark(RemarkKind.SETTING, (
                 f'{about}, which {_tags(read)} reads, so a message sets what the PLC is '

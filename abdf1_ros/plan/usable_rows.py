@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
@@ -24,14 +25,14 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.interlocks import guard_faults
 from abdf1_ros.plan.planner import Planner
-from abdf1_ros.problems import Place, Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.map_file import broken_links
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
 
-def line_problems(mappings: Sequence[Mapping], network: Network,
-                  path: str) -> list[tuple[Mapping, Problem]]:
+def line_problems(mappings: Sequence[Mapping],
+                  network: Network) -> list[tuple[Mapping, Problem]]:
     """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
     found: list[tuple[Mapping, Problem]] = []
     table = DataTable(PlcType(network.plc_type))
@@ -47,13 +48,12 @@ def line_problems(mappings: Sequence[Mapping], network: Network,
         elif mapping.via == network.station and network.mode == 'Master':
             text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
         if text is not None:
-            where = Place(path, mapping.file_line)
-            found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
+            found.append((mapping, Problem(mapping.place, f'Item: {mapping.item}, {text}')))
     return found
 
 
-def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: float,
-                path: str) -> tuple[list[Mapping], list[Problem]]:
+def usable_rows(mappings: Sequence[Mapping], network: Network,
+                default_period: float) -> tuple[list[Mapping], list[Problem]]:
     """
     Return the rows that can be used on this line, and the faults of the others.
 
@@ -61,7 +61,7 @@ def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: f
     for its Heartbeat_Timeout cannot be used, nor a row that depends on one that cannot
     (docs/heartbeats.md, rules 14 and 15).
     """
-    found = line_problems(mappings, network, path)
+    found = line_problems(mappings, network)
     problems = [problem for _, problem in found]
     left = [mapping for mapping in mappings if mapping not in dict(found)]
     planner = Planner(line_model(network), default_period)
@@ -69,7 +69,7 @@ def usable_rows(mappings: Sequence[Mapping], network: Network, default_period: f
               for mapping, text in guard_faults(left, planner)] or _broken(left)
     while faults:
         for mapping, column, text in faults:
-            where = Place(path, mapping.file_line, column=column)
+            where = replace(mapping.place, column=column)
             problems.append(Problem(where, f'Item: {mapping.item}, {text}'))
             left = [other for other in left if other is not mapping]
         faults = _broken(left)

@@ -76,15 +76,14 @@ class Diagnostics:
 
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``has_duplicate_name`` is to be set when another node has its name. ``left_out`` are the
-    faults of the rows that the map was read without, ``map_name`` is what the file is called.
+    faults of the rows that the map was read without.
     ``changed_files`` are the names of files that have changed since they were read.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
-                 left_out: Sequence[Problem] = (), map_name: str = 'map') -> None:
+                 left_out: Sequence[Problem] = ()) -> None:
         self.has_duplicate_name = False
         self._left_out = left_out
-        self._map_name = map_name
         self._rows_by_type = _rows_by_type(driver.mappings)
         self._driver = driver
         self._port = port
@@ -243,8 +242,7 @@ class Diagnostics:
 
     def _wrong_type(self, station: int) -> str | None:
         identity = self._driver.checks.known(station).identity
-        return wrong_type(station, identity, self._rows_by_type[station].values(),
-                          self._map_name)
+        return wrong_type(station, identity, self._rows_by_type[station].values())
 
     def _judge_station(self, station: Station, now: float) -> Judgement:
         if self._link is None or not self._link.state.is_open:

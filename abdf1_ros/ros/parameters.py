@@ -207,7 +207,7 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
         map_file = _needed('map_file', parameters.map_file, problems)
         mappings, map_problems = load_mappings(map_file)
         mappings, unusable = usable_rows(
-            mappings, network, parameters.default_period / 1000, map_file)
+            mappings, network, parameters.default_period / 1000)
         map_problems += unusable
     except ConfigurationError as error:
         problems += error.problems

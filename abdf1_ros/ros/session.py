@@ -25,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 import random
 from typing import Any
 
@@ -126,7 +125,7 @@ class Session:
         self.reads.open(self.driver.points)
         self.diagnostics = Diagnostics(
             node.get_fully_qualified_name().lstrip('/'), self.driver, configuration.port,
-            configuration.map_problems, Path(parameters.map_file).name)
+            configuration.map_problems)
         self.diagnostics.interlocks.latest = self.reads.latest
         self.guest_lines = self._make_guest_lines()
         self.diagnostics.show_guests(self.guest_lines)

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
@@ -42,8 +43,8 @@ def processor_fault(identity: Identity | None) -> str | None:
     return f'in {identity.mode.words} mode ({identity.mode_text})'
 
 
-def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping],
-               file: str) -> str | None:
+def wrong_type(station: int, identity: Identity | None,
+               rows: Iterable[Mapping]) -> str | None:
     """
     Return that a PLC is not what a row of the map says, None when it is.
 
@@ -61,7 +62,7 @@ def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping],
             continue
         article = 'an' if identity.model.startswith('SLC') else 'a'
         return (f'station {station} is {article} {identity.model}, '
-                f'{file}:{row.file_line} says {said}')
+                f'{Path(row.place.file).name}:{row.place.line} says {said}')
     return None
 
 

@@ -69,9 +69,9 @@ class Row:
     cells: dict[str, str]
     columns: dict[str, int]
 
-    def where(self, column: str) -> Place:
+    def where(self, column: str | None = None) -> Place:
         """Return the place of a cell, without its number where the file has no such column."""
-        return Place(self.file, self.line, self.columns.get(column), column)
+        return Place(self.file, self.line, self.columns.get(column or ''), column)
 
     def get(self, column: str) -> str:
         """Return a cell, empty where the file has no such column."""

@@ -167,7 +167,7 @@ class _Clashes:
 
         def clash(column: str, other: Mapping, text: str) -> None:
             faults.append(CellFault(column, (
-                f'{text} of item {other.item} (line {other.file_line}, tag '
+                f'{text} of item {other.item} (line {other.place.line}, tag '
                 f'"{shown(other.tag)}")')))
 
         if other := self._names.get(mapping.name):

@@ -31,7 +31,7 @@ from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxErro
 from abdf1_ros.pccc.families import accesses_of, FAMILIES, family_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.structures import type_fault, write_fault
+from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import NEEDED
@@ -105,7 +105,7 @@ class RowReader:
         cells = self._dependent() | self._independent()
         if self.faults:
             return None
-        mapping = Mapping(item=self._row.item, file_line=self._row.line, **cells)
+        mapping = Mapping(item=self._row.item, place=self._row.where(), **cells)
         self._check(mapping)
         mapping = self._with_conditions(mapping)
         if self.faults:
@@ -322,12 +322,8 @@ class RowReader:
             self._fault('Min', 'Min is greater than Max')
 
     def _check_type(self, mapping: Mapping) -> None:
-        types = types_of(mapping.address)
-        if mapping.type not in types:
-            right = ', '.join(entry.value for entry in types)
-            hint = '; a bool needs a bit address such as B3:0/5' \
-                if mapping.type is ValueType.BOOL else ''
-            self._fault('Type', f'{mapping.address} can be {right}{hint}')
+        if fault := wrong_type(mapping.address, mapping.type):
+            self._fault('Type', fault)
         if mapping.address.file_type is FileType.STRING and mapping.length != 1:
             self._fault('Length', 'a string mapping has Length 1')
 

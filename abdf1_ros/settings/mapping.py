@@ -30,7 +30,7 @@ from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
-from abdf1_ros.problems import Problem
+from abdf1_ros.problems import Place, Problem
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, values_text
 from abdf1_ros.settings.scaling import Scaling
 
@@ -60,7 +60,7 @@ class Mapping:
     """
     One checked row.
 
-    ``item`` counts data rows from 1, ``file_line`` lines of the file. ``name`` is the tag and
+    ``item`` counts data rows from 1, ``place`` is file and line. ``name`` is the tag and
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
     line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
@@ -72,7 +72,7 @@ class Mapping:
     """
 
     item: int
-    file_line: int
+    place: Place = field(compare=False)
     tag: str
     name: str
     command: Command

@@ -24,6 +24,7 @@ from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.structures import value_addresses
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.csv_table import Row
@@ -116,13 +117,10 @@ def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
     if 0 < period < _SHORT_PERIOD:
         yield _at(row, 'Period', f'Period {period} is in ms; {period} s would be {period * 1000}')
     address = mapping.address
-    values = [f'{address.file_type.value}{address.file}:{address.element}.{name}'
-              for name, member in address.layout.members.items()
-              if member.word and member.bit is None]
     if address.file_type.is_structure and mapping.length == 1 and address.bit is None \
             and not re.search('[./]', row.get('Address')):
         yield _at(row, 'Address', f'{row.get("Address")} is the control word of the element; its '
-                                  f'values are {", ".join(values)}')
+                                  f'values are {", ".join(value_addresses(address))}')
 
 
 def _at(row: Row, column: str, text: str) -> Problem:

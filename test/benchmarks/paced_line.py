@@ -52,6 +52,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.problems import Place
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -118,7 +119,7 @@ def block_of(station: int) -> Mapping:
     """Return the row that reads ten words of a station, as often as the line allows."""
     name = f's{station}'
     return Mapping(
-        item=station, file_line=station, tag=name, name=name, command=Command.READ,
+        item=station, place=Place('map.csv', station), tag=name, name=name, command=Command.READ,
         address=parse_address('N7:0', PlcType.SLC), station=station, plc_type=PlcType.SLC,
         length=WORDS, type=ValueType.INT16, topic=name, period=0)
 

@@ -38,7 +38,7 @@ def one_input(data: bytes) -> None:
         problems = error.problems
         assert problems
         mappings = []
-    bad = line_problems(mappings, Network(), 'map.csv')
+    bad = line_problems(mappings, Network())
     problems += [problem for _, problem in bad]
     assert all(str(problem).isprintable() for problem in problems)
     left_out = [mapping for mapping, _ in bad]

@@ -54,7 +54,7 @@ def test_write_over_what_another_row_reads_is_odd() -> None:
     odd = report_of(
         bits, make_mapping('B3:2/2', 'Write', tag='rip', item=4)).remarks()
     assert odd == [Remark(RemarkKind.SETTING, (
-        'line 5 of the map: rip writes B3:2/2, which il reads, so a message sets what the PLC is '
+        'map.csv:5: rip writes B3:2/2, which il reads, so a message sets what the PLC is '
         'to tell; ReadWrite in one row if that is meant, otherwise another address'), 1)]
     assert report_of(bits, make_mapping('B3:1', 'Write', length=2)).remarks()
     # Other bits, other stations and all of them, and rows that say that they do both.

@@ -33,7 +33,7 @@ def row(text: str, plc: str = 'PLC5', length: int = 1) -> Mapping:
 
 def texts(*mappings: Mapping, network: Network = PEER) -> list[str]:
     """Return the text of every problem."""
-    return [str(problem) for _, problem in line_problems(mappings, network, 'map.csv')]
+    return [str(problem) for _, problem in line_problems(mappings, network)]
 
 
 def test_rows_that_fit() -> None:
@@ -95,7 +95,7 @@ def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> 
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
     counter = make_mapping('N11:3', tag='alive', item=1)
     guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 250))
-    good, (problem,) = usable_rows([counter, guarded], Network(baud=19200), 0.1, 'map.csv')
+    good, (problem,) = usable_rows([counter, guarded], Network(baud=19200), 0.1)
     assert good == [counter]
     assert str(problem) == (
         'map.csv:3 (Heartbeat_Timeout): Item: 2, Heartbeat_Timeout 250 ms is shorter than 3 reads '
@@ -109,7 +109,7 @@ def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it()
     word = make_mapping('N7:5', 'Write', tag='speed', topic='speed', item=3)
     beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500, station=2, item=4,
                         heartbeat=Heartbeat(('speed',), 500))
-    good, problems = usable_rows([counter, guarded, word, beat], own, 0.1, 'map.csv')
+    good, problems = usable_rows([counter, guarded, word, beat], own, 0.1)
     assert good == []
     assert [problem.text.partition(',')[0] for problem in problems] == [
         'Item: 1', 'Item: 2', 'Item: 3', 'Item: 4']
@@ -117,4 +117,4 @@ def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it()
 
 def test_problems_go_with_their_rows() -> None:
     good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
-    assert [mapping for mapping, _ in line_problems([good, bad], PEER, 'm')] == [bad]
+    assert [mapping for mapping, _ in line_problems([good, bad], PEER)] == [bad]

@@ -85,7 +85,7 @@ LEVEL = make_mapping('N7:0', plc='SLC', item=6)
     (SLC, [make_mapping('N7:0', plc='SLC', item=6, processor='5/02')], None)])
 def test_plc_of_another_family_than_its_rows(
         identity: Identity | None, rows: list[Mapping], text: str | None) -> None:
-    assert wrong_type(1, identity, rows, 'map.csv') == text
+    assert wrong_type(1, identity, rows) == text
 
 
 def test_values_before_anything_is_known() -> None:

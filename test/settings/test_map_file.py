@@ -35,7 +35,7 @@ def test_needed_column_that_the_file_does_not_have() -> None:
 def test_bad_row_is_left_out_and_the_rest_stays() -> None:
     mappings, problems = load_rows(
         row(Tag='a'), '', row(Tag='b', Station='x'), '# c', row(Tag='d'), row(Tag='e', Min='?'))
-    assert [(mapping.tag, mapping.item, mapping.file_line) for mapping in mappings] == [
+    assert [(mapping.tag, mapping.item, mapping.place.line) for mapping in mappings] == [
         ('a', 1, 2), ('d', 3, 6)]
     assert [str(problem).split('map.csv:')[1].split(' ')[0] for problem in problems] == [
         '4:4', '7:11']

@@ -38,7 +38,8 @@ def test_row_with_every_column() -> None:
                   Period='250', Publish='change', Min='-1.5', Max='99',
                   Description='"Roller, hall 3"')
     assert mapping == Mapping(
-        item=1, file_line=2, tag='Line speed', name='Line_speed', command=Command.READ_WRITE,
+        item=1, place=mapping.place, tag='Line speed', name='Line_speed',
+        command=Command.READ_WRITE,
         address=mapping.address, station=254, plc_type=PlcType.SLC, length=4,
         type=ValueType.FLOAT32, topic='cell/t1_speed', period=250, publish=Publish.CHANGE,
         minimum=-1.5, maximum=99.0, access=Access.SLOT, description='Roller, hall 3')
@@ -87,7 +88,9 @@ def test_other_type_that_fits(address: str, kind: str) -> None:
     ('B3:0', 'string', 'B3:0 can be uint16, int16, bcd16, int32, uint32, float32'),
     ('N7:0', 'bool', 'N7:0 can be int16, uint16, bcd16, int32, uint32, float32, string; '
                      'a bool needs a bit address such as B3:0/5'),
-    ('B3:0/5', 'int16', 'B3:0/5 can be bool')])
+    ('B3:0/5', 'int16', 'B3:0/5 can be bool: it is a bit; its word is B3:0'),
+    ('T4:0.DN', 'int16', 'T4:0/DN can be bool: it is a bit; the values of this element are '
+                         'T4:0.PRE, T4:0.ACC')])
 def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
     assert fault(Address=address, Type=kind) == f'2:7 (Type): Item: 1, {right}'
 

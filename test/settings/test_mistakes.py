@@ -122,14 +122,14 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
 
 @for_all(('text', 'expected'), [
     (f'{HEAD}\na,Write,N7:0,1,SLC\nb,Write,N7:0,1,SLC\n', [
-        'line 3 of the map: b writes N7:0, of which a writes a part or all too: each undoes what '
+        '3: b writes N7:0, of which a writes a part or all too: each undoes what '
         'the other has written']),
     (f'{HEAD},Length\na,Write,N7:0,1,SLC,5\nb,ReadWrite,N7:4,1,SLC,\nc,Write,N7:5,1,SLC,\n', [
-        'line 3 of the map: b writes N7:4, of which a writes a part or all too: each undoes what '
+        '3: b writes N7:4, of which a writes a part or all too: each undoes what '
         'the other has written']),
     (f'{HEAD}\nword,Write,B3:0,1,SLC\nbit,Write,B3:0/5,1,SLC\nsame,Write,B3:1/5,1,SLC\n'
      'next,Write,B3:1/6,1,SLC\n', [
-        'line 3 of the map: bit writes B3:0/5, of which word writes a part or all too: each '
+        '3: bit writes B3:0/5, of which word writes a part or all too: each '
         'undoes what the other has written']),
     (f'{HEAD},Min,Max\na,Read,N7:0,1,SLC,1,5\n', [
         '2:6 (Min): Min has no effect in a Read row', '2:7 (Max): Max has no effect in a Read row',

@@ -25,7 +25,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
-from abdf1_ros.problems import Problem
+from abdf1_ros.problems import Place, Problem
 from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
@@ -47,7 +47,7 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
     address = parse_address(text, PlcType(plc), way)
     name = tag or f'{text}_{station}_{command}_{length}'
     return Mapping(
-        item=item, file_line=item + 1, tag=name, name=name, command=Command(command),
+        item=item, place=Place('map.csv', item + 1), tag=name, name=name, command=Command(command),
         address=address, station=station, plc_type=PlcType(plc), length=length,
         type=ValueType(kind) if kind else types_of(address)[0], topic=topic or name,
         publish=Publish(publish), word_order=WordOrder(word_order), access=way,

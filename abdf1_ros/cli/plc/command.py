@@ -509,7 +509,7 @@ def _files(options: argparse.Namespace) -> int:
         except Abdf1Error as error:
             return _failed(options, session, error)
     if options.map:
-        faults = [*files.outside(found, mappings, options.station, options.map)]
+        faults = [*files.outside(found, mappings, options.station)]
         print('\n'.join(map(str, faults)) or f'all rows of station {options.station} lie inside')
         return EXIT_FAILED if faults else 0
     if options.map is not None:

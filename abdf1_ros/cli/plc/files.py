@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
@@ -25,7 +26,7 @@ from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.problems import Place, Problem
+from abdf1_ros.problems import Problem
 from abdf1_ros.settings.mapping import Mapping
 
 # Period of the proposed rows (ms): reading all files of a PLC is a lot for a slow line.
@@ -75,8 +76,8 @@ def listed(session: Session, station: int, identity: Identity | None) -> list[Da
         return []
 
 
-def outside(found: Sequence[DataFile], mappings: Sequence[Mapping], station: int,
-            path: str) -> Iterator[Problem]:
+def outside(found: Sequence[DataFile], mappings: Sequence[Mapping],
+            station: int) -> Iterator[Problem]:
     """Yield the rows of a map that lie outside of the files of a station, and why."""
     files = {entry.number: entry for entry in found if not entry.type.is_function}
     for mapping in mappings:
@@ -92,7 +93,7 @@ def outside(found: Sequence[DataFile], mappings: Sequence[Mapping], station: int
         elif mapping.extent.end > entry.elements * address.layout.words:
             fault = f'{entry} has {entry.elements} elements'
         if fault:
-            yield Problem(Place(path, mapping.file_line, column='Address'),
+            yield Problem(replace(mapping.place, column='Address'),
                           f'{address}, Length {mapping.length}: {fault}')
 
 
