@@ -15,8 +15,6 @@
 
 """What holds for all tests: the examples of property tests, and which files begin."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import gc
 import os

@@ -22,8 +22,6 @@ the folder of ``--work``, with the corpus and the examples that failed. At the e
 tried. The same seed draws the same, as far as time does not decide. Status 1 when a part failed.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -14,8 +14,6 @@
 
 """The linters that every ROS package runs, as they come with Jazzy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from support.ros_tools import needs

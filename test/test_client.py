@@ -14,8 +14,6 @@
 
 """The blocking client on a line with simulated PLCs, and what it does without."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 import time

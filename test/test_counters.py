@@ -14,8 +14,6 @@
 
 """The status counters: numbers and mnemonics are those of the specification."""
 
-from __future__ import annotations
-
 from abdf1_ros.counters import Counters, numbered
 import pytest
 from support.vectors import load_tables

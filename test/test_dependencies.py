@@ -14,8 +14,6 @@
 
 """What the package depends on: keys that rosdep knows, and exact versions for tests and tools."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 import re

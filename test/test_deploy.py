@@ -14,8 +14,6 @@
 
 """Deployment files: what can be checked of them without installing them."""
 
-from __future__ import annotations
-
 import configparser
 from fnmatch import fnmatch
 import json
@@ -86,8 +84,7 @@ def test_unit_starts_again_after_what_may_pass_only(path: Path) -> None:
 def test_unit_may_open_serial_ports_only(path: Path) -> None:
     service = unit(path)['Service']
     assert service['DevicePolicy'] == ['closed']
-    assert set(service['DeviceAllow']) == {
-        'char-ttyS rw', 'char-ttyUSB rw', 'char-ttyACM rw'}
+    assert set(service['DeviceAllow']) == {'char-ttyS rw', 'char-ttyUSB rw', 'char-ttyACM rw'}
     assert service['SupplementaryGroups'] == ['dialout']
     assert service['User'] != ['root']
     assert service['CapabilityBoundingSet'] == ['']

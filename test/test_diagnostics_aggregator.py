@@ -14,8 +14,6 @@
 
 """The example for diagnostic_aggregator knows every status that a bridge publishes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray

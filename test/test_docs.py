@@ -14,8 +14,6 @@
 
 """The documentation names only what exists, links to it, and says nothing twice."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from collections.abc import Iterator
@@ -189,8 +187,7 @@ def test_files_that_pages_name_exist(name: str) -> None:
 
 @for_all('name', documents.NAMES)
 def test_columns_that_pages_name_exist(name: str) -> None:
-    known = {entry.column for entry in FIELDS.values()} | {
-        column.name for column in MAP_COLUMNS}
+    known = {entry.column for entry in FIELDS.values()} | {column.name for column in MAP_COLUMNS}
     for column in re.findall(r'`(\w+)` = ', documents.text(name)):
         assert column in known
 

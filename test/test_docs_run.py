@@ -14,8 +14,6 @@
 
 """The blocks of the documentation that are marked to run do what they show."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 from pathlib import Path
@@ -28,8 +26,7 @@ from support import documents
 from support.ros import Process
 
 PORT = '/tmp/plc'
-PAGES = [name for name in documents.NAMES
-         if documents.blocks(documents.text(name), only_run=True)]
+PAGES = [name for name in documents.NAMES if documents.blocks(documents.text(name), only_run=True)]
 
 
 @pytest.fixture(scope='module')

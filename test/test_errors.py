@@ -14,8 +14,6 @@
 
 """The exception tree: what callers catch, and the numbered texts."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import (
     Abdf1Error,
     CommandTimeout,
@@ -31,8 +29,7 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 import pytest
 
 
-@pytest.mark.parametrize('error', [
-    CommandTimeout, StationInactive, WrongCommandCode, PortLost])
+@pytest.mark.parametrize('error', [CommandTimeout, StationInactive, WrongCommandCode, PortLost])
 def test_failed_transactions_are_link_errors(error: type[LinkError]) -> None:
     assert issubclass(error, LinkError)
     assert issubclass(error, Abdf1Error)

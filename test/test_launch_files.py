@@ -14,8 +14,6 @@
 
 """The launch files, started by the real ``ros2 launch``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
@@ -74,8 +72,7 @@ def ended(process: Process) -> str:
     process.result()
     assert 'process has died' not in process.text
     # Python may tell of a Ctrl-C that it has ignored, in ros2 itself.
-    assert not [line for line in process.lines
-                if line.startswith('[node') and 'Traceback' in line]
+    assert not [line for line in process.lines if line.startswith('[node') and 'Traceback' in line]
     return process.text
 
 

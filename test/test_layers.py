@@ -14,8 +14,6 @@
 
 """The arrows between the layers point one way, as the imports tell."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -14,15 +14,12 @@
 
 """The numbered messages: numbers, names and texts are those of the specification."""
 
-from __future__ import annotations
-
 from abdf1_ros.messages import Event, Message, Severity
 import pytest
 from support.cases import for_all
 from support.vectors import load_tables
 
-SPECIFIED: list[tuple[int, str, str]] = [
-    tuple(row) for row in load_tables()['messages']]
+SPECIFIED: list[tuple[int, str, str]] = [tuple(row) for row in load_tables()['messages']]
 
 
 def test_exactly_the_specified_messages_exist() -> None:

@@ -14,8 +14,6 @@
 
 """Numbers as people write them, and what Python alone takes for one."""
 
-from __future__ import annotations
-
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from hypothesis import given
 from hypothesis import strategies as st

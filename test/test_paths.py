@@ -14,8 +14,6 @@
 
 """Where the files of the package are found."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import sys
 from types import ModuleType
@@ -53,8 +51,7 @@ def _ament_index(monkeypatch: pytest.MonkeyPatch, share: Path | Exception) -> No
     monkeypatch.setitem(sys.modules, 'ament_index_python.packages', module)
 
 
-def test_file_of_the_installed_package(
-        installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_of_the_installed_package(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _ament_index(monkeypatch, installed / 'share')
     assert paths.config_file('net.csv') == installed / 'share' / 'config' / 'net.csv'
 

@@ -14,8 +14,6 @@
 
 """The generated parts of the documentation are those of the code as it is now."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.counters import numbered

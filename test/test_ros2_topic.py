@@ -14,8 +14,6 @@
 
 """What the documentation says of ``ros2 topic`` and ``ros2 param``, with the real commands."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 import re

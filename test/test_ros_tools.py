@@ -14,8 +14,6 @@
 
 """Which of the real ROS tools were here, so that a report of skipped tests can be judged."""
 
-from __future__ import annotations
-
 import pytest
 from support.ros_tools import are_demanded, found, TOOLS
 

@@ -14,8 +14,6 @@
 
 """The SROS2 policy: well formed, and neither more nor less than the nodes need."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 import importlib.util
@@ -54,8 +52,7 @@ def allowed(node: str, kind: str, qualifier: str) -> set[str]:
 
 def uncovered(names: set[str], patterns: set[str]) -> set[str]:
     """Return the names that no pattern matches."""
-    return {name for name in names
-            if not any(fnmatchcase(name, pattern) for pattern in patterns)}
+    return {name for name in names if not any(fnmatchcase(name, pattern) for pattern in patterns)}
 
 
 def unused(names: set[str], patterns: set[str]) -> set[str]:

@@ -14,8 +14,6 @@
 
 """The fixture for tests of cells: the whole example, and the test that its tutorial shows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import re
 from typing import Any

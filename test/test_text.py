@@ -14,8 +14,6 @@
 
 """Text that is shown cannot pass for something else."""
 
-from __future__ import annotations
-
 from abdf1_ros.text import by_number, printable
 from hypothesis import given, strategies
 import pytest

@@ -14,8 +14,6 @@
 
 """The data set of vectors/: schema, manifest and files agree, and what is wrong is found."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import json
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """The words of CONTRIBUTING.md: one term for one thing, and no two classes of one name."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from collections.abc import Iterator

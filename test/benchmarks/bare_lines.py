@@ -22,8 +22,6 @@ time-outs, no decoding, no diagnostics, nobody who could call: what is left is w
 system, Python, rclpy and DDS take.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 import signal

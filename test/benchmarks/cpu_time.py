@@ -36,8 +36,6 @@ calls of Python functions (entries of generators included) and of C functions a 
 Run it as "python test/benchmarks/cpu_time.py"; without ROS it needs nothing but the package.
 """
 
-from __future__ import annotations
-
 import argparse
 from array import array
 from collections import Counter

@@ -36,8 +36,6 @@ time is that of the whole process, as part of one core. The neighbours are maste
 Run it as "python test/benchmarks/hostile_neighbours.py"; it needs ROS, or the wheels of it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress

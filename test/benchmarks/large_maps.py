@@ -26,8 +26,6 @@ counter of the PLC runs, and without that condition; the counter stands still fo
 Run it as "python test/benchmarks/large_maps.py"; it needs nothing but the package.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

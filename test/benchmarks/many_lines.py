@@ -32,8 +32,6 @@ package (bare_lines.py) as often as the line allows, and says nothing.
 Run it as "python test/benchmarks/many_lines.py"; it needs ROS, or the wheels of it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -25,8 +25,6 @@ is less than 3 % at 19200 baud.
 Run it as "python test/benchmarks/node_cpu.py"; it needs ROS, or the wheels of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import time

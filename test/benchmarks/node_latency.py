@@ -31,8 +31,6 @@ published one after the other from the same reply: what the last waits for are t
 Run it as "python test/benchmarks/node_latency.py"; it needs ROS, or the wheels of it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -166,8 +164,7 @@ def main() -> None:
     print(f'{options.mappings} mappings, {options.period} ms each, one {options.fast} ms; '
           f'load of the machine {os.getloadavg()[0]:.1f}; in ms')
     print('row      values   least  median    99 %  longest')
-    for tag, latencies in {
-            'no node': measure_without_node(options), **measure(options)}.items():
+    for tag, latencies in {'no node': measure_without_node(options), **measure(options)}.items():
         latencies.sort()
         figures = (latencies[0], median(latencies), latencies[int(0.99 * len(latencies))],
                    latencies[-1])

@@ -20,8 +20,6 @@ to a file, so that the rows of a file are read together. ``running_node`` starts
 pseudo-terminal; everything stays on this machine, in a domain of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import os

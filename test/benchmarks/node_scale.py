@@ -28,8 +28,6 @@ to the next: where the cost is constant they are alike. The goals: 1000 mappings
 Run it as "python test/benchmarks/node_scale.py"; it needs ROS, or the wheels of it.
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 from itertools import pairwise

@@ -24,8 +24,6 @@ knows what it will answer while the question is still "on the line". So its answ
 the exact time, and all that is lost is lost by the driver and the operating system.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass

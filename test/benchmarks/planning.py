@@ -32,8 +32,6 @@ measure the planner's own processor time.
 Run it as "python test/benchmarks/planning.py"; it needs nothing but the package.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import defaultdict
 from collections.abc import Sequence

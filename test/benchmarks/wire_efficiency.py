@@ -29,8 +29,6 @@ can do better on this machine in this minute.
 Run it as "python test/benchmarks/wire_efficiency.py"; it needs nothing but the package.
 """
 
-from __future__ import annotations
-
 import argparse
 from itertools import pairwise
 import os

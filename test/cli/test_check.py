@@ -14,8 +14,6 @@
 
 """The command ``check``: every error of both files, the plan, and the exit status."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 import shlex
@@ -260,8 +258,7 @@ def test_output_that_cannot_take_it_is_no_traceback(files: tuple[Path, Path]) ->
     assert (closed.returncode, closed.stderr) == (0, '')
     full = subprocess.run(f'{command} >/dev/full', shell=True, text=True, capture_output=True,
                           timeout=30, check=False)
-    assert (full.returncode, full.stderr) == (
-        2, 'check: cannot print: No space left on device\n')
+    assert (full.returncode, full.stderr) == (2, 'check: cannot print: No space left on device\n')
 
 
 def test_process_needs_no_ros_and_tells_its_statuses(files: tuple[Path, Path]) -> None:
@@ -297,8 +294,7 @@ def test_folder_has_a_line_of_text_for_each_pair(
     write_csv(tmp_path / 'notes.csv', 'a', ['b'])
     assert main([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(':')[0] for line in lines] == [
-        'glue', 'hall/paint', 'press', '3 lines']
+    assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press', '3 lines']
     assert lines[-1] == '3 lines: 3 good (0 of them with warnings), 0 with errors'
     assert lines[0].startswith('glue: 1 rows, port /dev/ttyS0, poll cycle ')
 

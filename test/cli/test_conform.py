@@ -14,8 +14,6 @@
 
 """The command ``conform``, against a simulated PLC on a pseudo-terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import json
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """The demo beside others on the network, and what it says at its end."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from abdf1_ros.cli import demo

@@ -14,8 +14,6 @@
 
 """Signals that come while an executable still imports: a real process that is held there."""
 
-from __future__ import annotations
-
 from importlib import import_module
 import os
 from pathlib import Path

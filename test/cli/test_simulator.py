@@ -14,8 +14,6 @@
 
 """The simulator as a process on a pseudo-terminal and on TCP, and its options."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import errno
 import os
@@ -161,8 +159,7 @@ def test_on_a_pty_until_a_signal(
         number: signal.Signals) -> None:
     name = tmp_path / 'plc'
     simulator = start('--pty', str(name), '--check', check.value)
-    assert simulator.line() == \
-        f'simulator: stations 1 (PLC5), 2 (SLC) on {name}, {check.value}'
+    assert simulator.line() == f'simulator: stations 1 (PLC5), 2 (SLC) on {name}, {check.value}'
     line = descriptor(name)
     assert not termios.tcgetattr(line)[3] & termios.ECHO
     _converse(line, check)
@@ -326,8 +323,7 @@ def test_two_simulators_do_not_share_a_name(
     assert not os.path.lexists(name)
 
 
-def test_folder_of_a_pty_that_is_missing(
-        capsys: pytest.CaptureFixture[str], data: Path) -> None:
+def test_folder_of_a_pty_that_is_missing(capsys: pytest.CaptureFixture[str], data: Path) -> None:
     assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc', status=1) == \
         'simulator: /nowhere/plc cannot be made: No such file or directory\n'
 

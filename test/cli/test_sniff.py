@@ -91,8 +91,7 @@ def test_capture_is_shown_line_by_line_with_a_summary(capsys: Output, capture: s
     assert lines[7] == '  faults: none'
 
 
-def test_hex_and_binary_files_say_the_same_without_times(
-        capsys: Output, tmp_path: Path) -> None:
+def test_hex_and_binary_files_say_the_same_without_times(capsys: Output, tmp_path: Path) -> None:
     expected = [re.sub(r'^ +[0-9.]+| \| [0-9.]+ ms', '', line) for line in LINES]
     (tmp_path / 'bin').write_bytes(b''.join(SAID))
     (tmp_path / 'hex').write_text(b''.join(SAID).hex(' '), encoding='ascii')
@@ -157,8 +156,7 @@ def test_progress_has_a_percentage_where_the_size_is_known(
     monkeypatch.setattr(sniff, '_PROGRESS_PERIOD', 0.0)
     monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
     assert main(['--summary', capture]) == 0
-    assert capsys.readouterr().err.splitlines()[-1] == \
-        f'sniff: {capture}: 100 %, 45 bytes so far'
+    assert capsys.readouterr().err.splitlines()[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'
     assert main(['--summary', '--binary', '--seconds', '0.1', '/dev/zero']) == 0
     assert re.match('sniff: /dev/zero, [0-9]+ bytes so far\n', capsys.readouterr().err)
 

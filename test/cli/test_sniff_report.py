@@ -14,8 +14,6 @@
 
 """The bundle for a report, and what an anonymous one leaves out."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from zipfile import ZipFile

@@ -14,8 +14,6 @@
 
 """Tables, colours and progress."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 import errno
@@ -119,8 +117,7 @@ def test_output_that_is_closed_takes_all(monkeypatch: pytest.MonkeyPatch) -> Non
         stream.close()
 
 
-def test_output_that_knows_few_characters_shows_escapes(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_output_that_knows_few_characters_shows_escapes(monkeypatch: pytest.MonkeyPatch) -> None:
     raw = io.BytesIO()
     monkeypatch.setattr('sys.stdout', io.TextIOWrapper(raw, encoding='ascii'))
     prepare_output()

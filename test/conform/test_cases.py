@@ -14,8 +14,6 @@
 
 """Every case passes against our own link, and fails against one that breaks its rule."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from abdf1_ros.conform import codec

@@ -14,8 +14,6 @@
 
 """The second codec against bytes that manuals print."""
 
-from __future__ import annotations
-
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 import pytest

@@ -14,8 +14,6 @@
 
 """Each fault of an end is found by the case that names its rule; what is allowed passes."""
 
-from __future__ import annotations
-
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, CASES, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck

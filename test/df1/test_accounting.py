@@ -14,8 +14,6 @@
 
 """What each fault of a frame is counted as and reported with."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 from abdf1_ros.counters import Counters
@@ -42,8 +40,7 @@ def test_fault_has_its_counter_and_its_event(
         fault: FrameFault, checksum: Checksum, counter: str, event: tuple[int, ...], station: int |
         None) -> None:
     counters = Counters()
-    said = count_fault(
-        Frame(b'', None, fault, 0x1234, 0xABCD), checksum, counters, station)
+    said = count_fault(Frame(b'', None, fault, 0x1234, 0xABCD), checksum, counters, station)
     assert counted(counters) == {counter: 1}
     assert (said.message.number, *said.args) == event
     assert said.station == station
@@ -67,5 +64,4 @@ def test_texts_of_the_vectors(name: str, text: str) -> None:
     assert isinstance(frame, Frame)
     said = str(count_fault(frame, entry.checksum, Counters(), 3))
     actual = int.from_bytes(entry.frame[-entry.checksum.size:], 'little')
-    assert said == (
-        f'{text} (actual=0x{actual:04x}, expected=0x{entry.expected:04x}) [station 3]')
+    assert said == (f'{text} (actual=0x{actual:04x}, expected=0x{entry.expected:04x}) [station 3]')

@@ -14,8 +14,6 @@
 
 """BCC and CRC-16: published values, and what each of them covers."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.checksum import bcc, Checksum, crc16
 from hypothesis import given
 from hypothesis import strategies as st

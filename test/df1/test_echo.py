@@ -14,8 +14,6 @@
 
 """What comes back of what we have sent is nobody's word, in every mode and at every delay."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from random import Random
 

@@ -14,8 +14,6 @@
 
 """Frames: every vector both ways, and a decoder that any bytes can be fed to."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
     ACK,
@@ -104,8 +102,7 @@ def test_frame_of_a_vector_is_decoded_in_any_portions(entry: Vector, chunk: int 
     assert decode(entry.frame, entry.checksum, entry.duplex, chunk) == expected_symbols(entry)
 
 
-@for_all('entry', [
-    entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response])
+@for_all('entry', [entry for entry in MESSAGES if entry.valid and not entry.has_embedded_response])
 def test_message_of_a_vector_is_encoded_to_its_frame(entry: Vector) -> None:
     if entry.station is not None:
         assert entry.station is not None

@@ -14,8 +14,6 @@
 
 """Master against slaves on a virtual line, clean and noisy, with invariants."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 from random import Random

@@ -14,8 +14,6 @@
 
 """What a line shows of its speed: from exchanges, and from long messages."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.line_rate import EXCHANGES, LineRate, LONG_MESSAGE, MESSAGES
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet

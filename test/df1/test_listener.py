@@ -14,8 +14,6 @@
 
 """The decoder that finds out what is spoken on a line."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Poll, Symbol

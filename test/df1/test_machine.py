@@ -14,8 +14,6 @@
 
 """The engine: deadlines, delays, deafness and rests, on a clock that the test moves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 

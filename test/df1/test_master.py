@@ -14,8 +14,6 @@
 
 """The half-duplex master: one script for each rule of the manual (M 3-12..3-17) and of S0."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -116,8 +114,7 @@ def test_slow_slave_is_polled_until_it_replies() -> None:
 
 def test_command_lost_is_sent_again() -> None:
     script = MasterScript(SETTINGS)
-    assert script.run(
-        COMMAND, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED) == REPLY
+    assert script.run(COMMAND, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED) == REPLY
     assert script.numbers() == [(2515, 0), (2521, 1, 2515), (2523, SLAVE)]
     assert script.counts() == DELIVERED | {
         'messages_sent': 2, 'nak_retries': 1, 'messages_received': 1, 'replies_received': 1,
@@ -163,8 +160,7 @@ def test_reply_damaged_on_a_bcc_line_is_a_bcc_error() -> None:
     assert script.run(
         COMMAND, Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.BCC)), SAYS_ACK, POLLED,
         Answer(good[:-1] + b'\x01'), POLLED, Answer(good), ACKED) == REPLY
-    assert script.numbers() == [
-        (2507, 0, 1, 0, good[-1]), (2522, 1, 2507), (2523, SLAVE)]
+    assert script.numbers() == [(2507, 0, 1, 0, good[-1]), (2522, 1, 2507), (2523, SLAVE)]
     assert script.counts()['bcc_errors'] == 1
     assert 'crc_errors' not in script.counts()
 
@@ -310,8 +306,7 @@ def test_noise_instead_of_an_answer_to_a_probe_is_told() -> None:
 
 def test_ack_is_no_answer_to_a_probe() -> None:
     script = inactive_script()
-    assert isinstance(
-        script.run(COMMAND, POLLED, SAYS_ACK, Silence(0.4)), StationInactive)
+    assert isinstance(script.run(COMMAND, POLLED, SAYS_ACK, Silence(0.4)), StationInactive)
     assert script.counts() == {'polls_sent': 1, 'acks_received': 1}
 
 
@@ -404,8 +399,7 @@ def test_command_timeout_by_stale_messages() -> None:
     steps = [step for packet in stale for step in (POLLED_AGAIN, says(packet), ACKED)][1:-1]
     error = script.run(COMMAND, SENT, Answer(ACK), POLLED, *steps, Expect(ACK + NAK))
     assert isinstance(error, CommandTimeout)
-    assert script.numbers() == [
-        *((2510, SLAVE, MASTER, packet.tns) for packet in stale), (2508,)]
+    assert script.numbers() == [*((2510, SLAVE, MASTER, packet.tns) for packet in stale), (2508,)]
 
 
 def test_reply_behind_stale_messages_is_taken_even_after_the_command_timeout() -> None:
@@ -443,8 +437,7 @@ def test_late_reply_after_a_command_timeout_is_stale() -> None:
 
 def test_nak_received_the_command_is_sent_again() -> None:
     script = MasterScript(SETTINGS)
-    assert script.run(COMMAND, SENT, SAYS_NAK, SENT, SAYS_ACK, POLLED, SAYS_REPLY,
-                      ACKED) == REPLY
+    assert script.run(COMMAND, SENT, SAYS_NAK, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED) == REPLY
     assert script.numbers() == [(2517,), (2511,), (2521, 1, 2511), (2523, SLAVE)]
     assert script.counts() == DELIVERED | {
         'messages_sent': 2, 'naks_received': 1, 'nak_retries': 1, 'messages_received': 1,
@@ -589,8 +582,7 @@ def test_message_too_short() -> None:
 def test_message_too_long() -> None:
     script = MasterScript(SETTINGS)
     long = Answer(message_frame(bytes(262), Checksum.CRC))
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY,
-                      ACKED) == REPLY
+    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY, ACKED) == REPLY
     assert script.numbers() == [(2512, 261), (2522, 1, 2512), (2523, SLAVE)]
     assert script.counts()['invalid_messages'] == 1
 
@@ -701,8 +693,7 @@ def test_answer_in_place_of_the_echo_is_heard(size: int) -> None:
     script = MasterScript(SETTINGS)
     reply = SAYS_REPLY.data
     parts = [Answer(reply[at:at + size]) for at in range(0, len(reply), size)]
-    assert script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, *parts,
-                      ACKED) == REPLY
+    assert script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, *parts, ACKED) == REPLY
     assert script.numbers() == [(2523, SLAVE)]
 
 

@@ -14,19 +14,12 @@
 
 """What both kinds of master share: messages of slaves served, passed on, dropped; broadcasts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import master_frame, Poll, STX, Symbol
-from abdf1_ros.df1.master_line import (
-    BROADCAST_PAUSE,
-    MasterSettings,
-    MAX_FORWARDS,
-    MAX_KEPT,
-)
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS, MAX_KEPT
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
@@ -444,8 +437,7 @@ def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
 
 
 @BOTH
-def test_line_that_is_faster_than_set_waits_no_longer_for_a_silent_station(
-        standard: bool) -> None:
+def test_line_that_is_faster_than_set_waits_no_longer_for_a_silent_station(standard: bool) -> None:
     rig = bench(standard, 7, 8)
     rig.line.char_time = 0.0  # as a network: what is written is there
     rig.start()

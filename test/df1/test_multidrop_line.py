@@ -14,8 +14,6 @@
 
 """A master and three slaves on one noisy line where everybody hears everything and asks."""
 
-from __future__ import annotations
-
 from collections import Counter
 from random import Random
 
@@ -118,8 +116,7 @@ class Rig:
 
     def is_done(self) -> bool:
         """Tell whether every command has its end."""
-        return all(task.result is not None for node in self.nodes.values()
-                   for task in node.all)
+        return all(task.result is not None for node in self.nodes.values() for task in node.all)
 
     def results(self, src: int) -> list[CommandTask]:
         """Return the tasks of a node that have a good reply."""
@@ -195,8 +192,7 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
     assert 0 <= total['eots_sent'] - ours.eots_received <= 1
     assert 0 <= ours.polls_sent - total['polls_received'] <= 1
     asked = sum(len(node.all) for node in rig.nodes.values())
-    passed_on = sum(task.command.dst != MASTER for src in ASKING
-                    for task in rig.nodes[src].all)
+    passed_on = sum(task.command.dst != MASTER for src in ASKING for task in rig.nodes[src].all)
     assert ours.commands_sent == len(rig.master.all) + passed_on
     assert sum(rig.executed.values()) == asked
     for counters in (ours, *theirs):

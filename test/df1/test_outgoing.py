@@ -14,8 +14,6 @@
 
 """Messages in portions: what may stand beside an embedded response (M 4-3)."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Control, Duplex, Frame, FrameDecoder, message_frame, NAK
 from abdf1_ros.df1.outgoing import Outgoing

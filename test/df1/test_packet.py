@@ -14,8 +14,6 @@
 
 """The header of every message."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE, Packet
@@ -29,8 +27,7 @@ from support.vectors import MESSAGES, Vector
 COMMAND = Packet(dst=17, src=5, cmd=0x0F, sts=0, tns=0x0102, data=b'\xA2')
 
 
-@for_all(
-    'vector', [entry for entry in MESSAGES if entry.header is not None])
+@for_all('vector', [entry for entry in MESSAGES if entry.header is not None])
 def test_header_of_every_vector(vector: Vector) -> None:
     packet = vector.packet
     assert (packet.dst, packet.src, packet.cmd, packet.sts, packet.tns) == vector.header

@@ -14,8 +14,6 @@
 
 """The full-duplex peer, rule by rule: transmitter (M 4-5), receiver (M 4-7), transactions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import itertools
 

@@ -169,8 +169,7 @@ def assert_recovers(rig: Rig) -> None:
         rig.line.wake(asking.machine)
         rig.line.run(lambda task=task: task.result is not None, rig.bound())
         assert isinstance(task.result, Packet)
-        data = dialect_of(serving.table.plc_type).read_data(
-            serving.place(0), 20, task.result.data)
+        data = dialect_of(serving.table.plc_type).read_data(serving.place(0), 20, task.result.data)
         assert data == serving.table.read(serving.place(0), 20)
         assert asking.stations[serving.number].active
 
@@ -294,6 +293,5 @@ def test_both_ends_embed_responses_once_one_does(rate: float, checksum: Checksum
         assert_exact(rig)
     if rate == 0.0:
         assert all(end.counts().get('enq_retries') is None for end in rig.ends)
-        assert sum(isinstance(task.result, Packet)
-                   for end in rig.ends for task in end.all) == 400
+        assert sum(isinstance(task.result, Packet) for end in rig.ends for task in end.all) == 400
     assert_recovers(rig)

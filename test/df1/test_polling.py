@@ -14,8 +14,6 @@
 
 """Standard polling, rule by rule (1766-RM001 and the manuals of the PLC-5 and Logix masters)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
@@ -36,8 +34,7 @@ import pytest
 from support.multidrop import MasterBench
 from support.peers import CommandTask
 
-SETTINGS = MasterSettings(
-    station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
+SETTINGS = MasterSettings(station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
 
 
 # Of a line with three stations: delivery and Cmd_Timeout, then a scan until the next answer, one
@@ -161,10 +158,8 @@ def test_inactive_stations_get_an_eighth_at_most_whatever_the_settings(
         group_size: int) -> None:
     """The ranges of the specification, and 1 to 254 stations of which one is there."""
     numbers = [number for number in range(255) if number != SETTINGS.station][:dead + 1]
-    polling = PollingSettings(
-        tuple(numbers[priority:]), tuple(numbers[:priority]), group_size)
-    settings = replace(SETTINGS, timeout=timeout / 1000, nak_retries=retries,
-                       enq_retries=retries)
+    polling = PollingSettings(tuple(numbers[priority:]), tuple(numbers[:priority]), group_size)
+    settings = replace(SETTINGS, timeout=timeout / 1000, nak_retries=retries, enq_retries=retries)
     # So slow a line that a run has few polls; an answer takes a tenth of Timeout.
     rig = bench(polling, dead=tuple(numbers[:-1]), settings=settings,
                 baud=200 / max(settings.timeout, 0.02), tx_delay=tx_delay / 1000)
@@ -227,8 +222,7 @@ def test_commands_leave_between_polls_and_complete_in_the_order_of_the_list() ->
     rig.run(0.2)
     assert rig.master.said.startswith('C3 C2 C1 P1 P2 P3 P1')
     assert order == [1, 2, 3]
-    assert [task.result for task in tasks] == [
-        task.command.reply() for task in tasks]
+    assert [task.result for task in tasks] == [task.command.reply() for task in tasks]
     assert rig.master.numbers() == [(2523, 1), (2523, 2), (2523, 3)]
 
 
@@ -247,8 +241,7 @@ def test_at_most_four_commands_between_two_polls() -> None:
     rig.start()
     rig.line.run(lambda: all(map(ended, tasks)), 5.0)
     assert COMMANDS_BETWEEN_POLLS == 4
-    assert rig.master.said.startswith(
-        'C10 C11 C12 C13 P10 C14 C15 C16 C17 P11 C18 C19 P12 P13')
+    assert rig.master.said.startswith('C10 C11 C12 C13 P10 C14 C15 C16 C17 P11 C18 C19 P12 P13')
 
 
 def test_never_two_commands_at_one_station() -> None:
@@ -444,8 +437,7 @@ def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
     assert isinstance(tasks[0].result, CommandTimeout)
     rig[1].delay = 0.0
     rig.run(1.0)
-    assert [task.result for task in tasks[1:]] == [
-        task.command.reply() for task in tasks[1:]]
+    assert [task.result for task in tasks[1:]] == [task.command.reply() for task in tasks[1:]]
     assert rig.master.counts()['stale_messages'] == 1
 
 
@@ -586,8 +578,7 @@ def replies_of(polling: PollingSettings | None, delay: float) -> int:
     while rig.clock() < 15.0:
         rig.line.run(lambda waiting=waiting: any(map(ended, waiting)), 5.0)
         done += filter(ended, waiting)
-        waiting = [rig.ask(task.command.dst) if ended(task) else task
-                   for task in waiting]
+        waiting = [rig.ask(task.command.dst) if ended(task) else task for task in waiting]
     assert all(task.result == task.command.reply() for task in done)
     assert rig.master.changes == []
     assert not {'stale_messages', 'invalid_messages'} & rig.master.counts().keys()
@@ -629,8 +620,7 @@ def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None
     tasks = [rig.ask(1), rig.ask(2)]
     rig.start()
     rig.run(3.0)
-    assert [task.result for task in tasks] == [
-        task.command.reply() for task in tasks]
+    assert [task.result for task in tasks] == [task.command.reply() for task in tasks]
     assert rig[1].slave.counters.acks_received + rig[2].slave.counters.acks_received == 2
     assert [len(rig[number].served) for number in (1, 2)] == [1, 1]
 

@@ -14,8 +14,6 @@
 
 """The turns of those who ask silent stations, on a clock that the test moves."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.probes import Probes
 from abdf1_ros.df1.stations import ActiveStationList
 import pytest

@@ -14,8 +14,6 @@
 
 """The half-duplex slave, rule by rule (M 3-4, 3-5; KF2 4-31)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict
 
@@ -268,8 +266,7 @@ def test_command_is_still_known_as_duplicate_after_a_nak() -> None:
 def test_broadcast_is_executed_but_neither_acknowledged_nor_answered() -> None:
     bench = Bench()
     command = COMMAND._replace(dst=BROADCAST)
-    assert bench.hear(sent(command, BROADCAST), sent(command, BROADCAST), POLL) == [
-        b'', b'', EOT]
+    assert bench.hear(sent(command, BROADCAST), sent(command, BROADCAST), POLL) == [b'', b'', EOT]
     assert bench.served == [command]
     assert bench.slave.counters.acks_sent == 0
 
@@ -323,8 +320,7 @@ def test_multidrop_only_the_addressed_station_answers() -> None:
                   for number in (1, 7, 8)))
     assert line.say(master_frame(7, COMMAND.encode(), Checksum.CRC)) == ACK
     assert line.say(poll_frame(8)) == EOT
-    assert line.say(poll_frame(7)) == message_frame(
-        COMMAND.reply(b'\x07').encode(), Checksum.CRC)
+    assert line.say(poll_frame(7)) == message_frame(COMMAND.reply(b'\x07').encode(), Checksum.CRC)
     assert line.say(poll_frame(9)) == b''
     assert line.machine.deadline is None
 

@@ -14,8 +14,6 @@
 
 """The slave that is a driver of its own: its commands, its polls, its time limits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from abdf1_ros.df1.checksum import Checksum

@@ -14,8 +14,6 @@
 
 """The Active Station List."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 import pytest

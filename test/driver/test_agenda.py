@@ -69,8 +69,7 @@ class Bench:
 
     def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
         self.results: list[WriteResult] = []
-        self.stations = ActiveStationList(
-            [job.station for job in jobs], probe_time=PROBE_TIME)
+        self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks, line = JobTasks(5, 0), StillClock()
         planner, backs = Planner(LINE, 0.1), ReadBacks(write_timeout, self.results.append)
         readings = Readings(Network(), (), DriverSettings(), planner, self.stations, line,
@@ -183,8 +182,7 @@ def test_saturated_line_is_shared_by_all_in_turn() -> None:
 
 def test_nothing_is_ever_due_without_reads() -> None:
     bench = Bench()
-    assert (bench.agenda.next_due(), bench.next(1e9), bench.reads.poll_cycle) == (
-        None, None, None)
+    assert (bench.agenda.next_due(), bench.next(1e9), bench.reads.poll_cycle) == (None, None, None)
 
 
 def test_write_goes_before_a_read_that_is_due() -> None:

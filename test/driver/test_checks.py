@@ -14,8 +14,6 @@
 
 """Slow jobs on a virtual line: status, echo and counters beside reads and writes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -99,8 +97,7 @@ def word(station: int = 1, command: str = 'Read', period: int | None = None,
 @pytest.mark.parametrize(('plc', 'processor'), [
     ('SLC', 'SLC 5/03 series A revision 1, REM RUN'),
     ('PLC5', 'PLC-5/40 series A revision A, REM RUN')])
-def test_status_at_the_start_and_every_period(network: Network, plc: str,
-                                              processor: str) -> None:
+def test_status_at_the_start_and_every_period(network: Network, plc: str, processor: str) -> None:
     bench, _, (ears,) = make_bench(word(plc=plc), network=network, plc=plc)
     assert bench.driver.checks.known(1).processor == 'unknown (not asked yet)'
     bench.open()

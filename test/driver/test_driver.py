@@ -14,8 +14,6 @@
 
 """The driver against simulated PLCs on a virtual line."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
@@ -342,8 +340,7 @@ def test_not_sent_because_it_is_too_old() -> None:
     bench.run(0.1)
     bench.write(mapping, [1])
     bench.run(3.0)
-    assert write_results(bench) == [
-        'not written: not sent: waited longer than 0.3 s for the line']
+    assert write_results(bench) == ['not written: not sent: waited longer than 0.3 s for the line']
 
 
 def test_not_sent_because_the_port_was_lost_while_it_waited() -> None:
@@ -511,8 +508,7 @@ def test_every_write_ends_once_on_a_line_that_fails_in_every_way() -> None:
     bench.far.hear = bench.far.say = bytes
     bench.run(10.0)
     assert len(bench.listener.results) == asked
-    assert set(bench.listener.outcomes()) == set(Outcome) - {
-        Outcome.BROADCAST, Outcome.FALLBACK}
+    assert set(bench.listener.outcomes()) == set(Outcome) - {Outcome.BROADCAST, Outcome.FALLBACK}
 
 
 def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
@@ -881,8 +877,7 @@ def test_stale_time_follows_the_period_or_the_line() -> None:
     fast, slow = make_mapping('N7:0', period=10), make_mapping('F8:0', period=1000)
     bench, _ = make_bench(fast, slow, stale_after=5.0, network=Network(baud=1200))
     scan = bench.driver.expected_poll_cycle
-    assert scan == pytest.approx(
-        sum(block.line_time + 0.02 for block in bench.driver.blocks))
+    assert scan == pytest.approx(sum(block.line_time + 0.02 for block in bench.driver.blocks))
     assert 0.4 < scan < 1.0
     times = {block.period: block_time(block) for block in bench.driver.blocks}
     needed = times[0.01] / 0.01 + times[1.0] / 1.0

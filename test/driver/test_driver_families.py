@@ -14,8 +14,6 @@
 
 """The driver against stations of the families that are not spoken to with typed commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

@@ -14,8 +14,6 @@
 
 """File types, processors and I/O of PLC-5, SLC and MicroLogix, from the line to the listener."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import Packet

@@ -18,8 +18,6 @@ A process that stands still for a while: no value is older than it looks, no com
 Every word of the station is its clock (ms, modulo 65536), so each value tells its own age.
 """
 
-from __future__ import annotations
-
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
@@ -137,8 +135,7 @@ def test_repetition_of_a_lost_command_is_too_old_after_a_pause() -> None:
 @pytest.mark.parametrize('polling', POLLING_MODES)
 def test_write_that_waits_too_long_has_its_result_while_a_transaction_runs(polling: str) -> None:
     slow, other = make_mapping('N7:0', 'Write', station=2), make_mapping('N9:0', 'Write')
-    bench = DriverBench([slow, other], network=Network(
-        baud=19200, timeout=3000, polling=polling))
+    bench = DriverBench([slow, other], network=Network(baud=19200, timeout=3000, polling=polling))
     ClockPlc(bench)
     bench.run(0.05)  # station 2 is being asked for its reply, in vain, for 12 s
     bench.write(slow, [1])

@@ -14,8 +14,6 @@
 
 """The driver in Mode Peer: reads, writes and served words, in both directions at once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from abdf1_ros.df1.frames import ACK, Code, Control, Duplex, Frame, FrameDecoder, message_frame

@@ -14,8 +14,6 @@
 
 """The driver as a master with standard polling, and broadcast rows with either polling."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
 from abdf1_ros.driver.links import DriverSettings

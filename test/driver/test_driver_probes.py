@@ -14,8 +14,6 @@
 
 """All that asks stations that are gone takes an eighth of the line's time at most."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 from abdf1_ros.df1.checksum import Checksum
@@ -51,8 +49,7 @@ class Bench(DriverBench):
     def __init__(self, network: Network, gone: int, *, is_deaf: bool) -> None:
         kinds = 'Read', 'Write', 'ReadWrite'
         self.unit = longest_probe(network)
-        self.living = make_mapping(
-            'N7:0', station=LIVING, period=max(100, int(500 * self.unit)))
+        self.living = make_mapping('N7:0', station=LIVING, period=max(100, int(500 * self.unit)))
         self.gone = [make_mapping('N7:0', kinds[station % 3], station=station, period=100)
                      for station in range(1, gone + 1) if station != network.station]
         super().__init__([self.living, *self.gone], network=network, start=False, chunk=1,

@@ -14,8 +14,6 @@
 
 """The driver in Mode Slave: served words, and reads and writes by way of the master."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from abdf1_ros.df1.machine import LineTiming, Machine
@@ -54,15 +52,13 @@ class Bench:
         self.network = Network(mode='Slave', plc_type='SLC', station=US, baud=BAUD,
                                error_code=check, cmd_timeout=500)
         self.listener = Recorder(self.clock)
-        self.driver = Driver(
-            self.network, mappings, settings or DriverSettings(), self.listener)
+        self.driver = Driver(self.network, mappings, settings or DriverSettings(), self.listener)
         self.plc = simulated_plc(PLC, 'SLC', self.clock, ('N7:0', 100), checksum=check)
         self.master = MasterNode(
             MasterSettings(MASTER, self.network.checksum, timeout=0.1), self.clock,
             PollingSettings(polled), numbers=polled, timing=LineTiming(char_time(BAUD)))
         self.far = Machine(multidrop([self.plc]), checksum=self.network.checksum)
-        self.line = VirtualLine(
-            self.driver.machine, self.master.machine, self.far, baud=BAUD)
+        self.line = VirtualLine(self.driver.machine, self.master.machine, self.far, baud=BAUD)
         self.line.start()
         self._tns = 0
 
@@ -230,8 +226,7 @@ def test_processor_of_a_station_behind_the_master() -> None:
 def test_master_reads_and_resets_the_counters_that_we_show() -> None:
     bench = Bench([serve_row('N7:50')])
     assert bench.master_reads('N7:50', 1) == b'\0\0'
-    tasks = [bench.ask((0x06, data))
-             for data in (b'\x01\0\0\x1A', b'\x07', b'\x01\0\0\x1A')]
+    tasks = [bench.ask((0x06, data)) for data in (b'\x01\0\0\x1A', b'\x07', b'\x01\0\0\x1A')]
     bench.run(1.0)
     replies = [task.result for task in tasks]
     assert [reply.sts for reply in replies if isinstance(reply, Packet)] == [0, 0, 0]
@@ -300,8 +295,7 @@ class Interlocked(Bench):
 def test_rules_2_and_8_as_a_slave() -> None:
     bench = Interlocked()
     store(bench.plc, 'N7:20', [99])
-    assert bench.told(1.0) == [
-        ('beat', 0), ('speed', 7), ('beat', 1), ('beat', 2)]
+    assert bench.told(1.0) == [('beat', 0), ('speed', 7), ('beat', 1), ('beat', 2)]
     bench.write(bench.speed, [5])
     told = bench.told(1.2)
     at = told.index(('beat', 0))

@@ -14,8 +14,6 @@
 
 """What holds for every write: one result that is true, and no command executed late or twice."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 import itertools
@@ -245,8 +243,7 @@ def test_writes_of_several_packets_leave_reads_their_turns(
         polling: str, text: str, length: int) -> None:
     read = make_mapping('N7:0', plc='SLC', period=200)
     write = make_mapping(text, 'Write', plc='SLC', length=length)
-    bench = DriverBench([read, write], network=Network(
-        baud=19200, timeout=300, polling=polling))
+    bench = DriverBench([read, write], network=Network(baud=19200, timeout=300, polling=polling))
     bench.plc(1, 'SLC', ('N7:0', 10), ('N10:0', 200), ('B3:0', 10))
     for number in range(600):
         bench.at(number / 20, lambda number=number: bench.write(  # type: ignore[misc]

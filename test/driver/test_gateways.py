@@ -14,8 +14,6 @@
 
 """Two PLCs behind a gateway: one station of the line is polled for both (M 3-7)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from random import Random
@@ -45,9 +43,7 @@ class Bench(DriverBench):
         self.first = make_mapping('N7:0', station=FIRST, via=GATEWAY, length=2)
         self.second = make_mapping('N7:0', 'ReadWrite', station=SECOND, via=GATEWAY, plc='SLC')
         self.third = make_mapping('N7:0', station=DIRECT)
-        network = Network(
-            baud=POLLING[polling], timeout=100, cmd_timeout=500,
-            polling=polling)
+        network = Network(baud=POLLING[polling], timeout=100, cmd_timeout=500, polling=polling)
         super().__init__([self.first, self.second, self.third], network=network,
                          settings=DriverSettings(**settings), start=False)  # type: ignore
         self.plcs = [simulated_plc(FIRST, 'PLC5', self.clock, ('N7:0', 10)),

@@ -14,8 +14,6 @@
 
 """What other threads hand to the link comes once, whatever they do at the same moment."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import sys
 import threading

@@ -18,8 +18,6 @@ Heartbeats, fallback values and guarded reads on a virtual line.
 The numbers in the names are those of the rules in docs/heartbeats.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

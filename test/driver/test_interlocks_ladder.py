@@ -19,8 +19,6 @@ A PLC sees a word once in a scan, so the times of a scan matter. The numbers in 
 of the rules in docs/heartbeats.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from random import Random
 

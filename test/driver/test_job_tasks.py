@@ -14,8 +14,6 @@
 
 """Jobs as tasks of the link: requests out, replies in, and the numbers of their commands."""
 
-from __future__ import annotations
-
 import math
 
 from abdf1_ros.df1.packet import Packet

@@ -14,8 +14,6 @@
 
 """Points and writes: what is published, how fresh it is, and the bytes of a write."""
 
-from __future__ import annotations
-
 from array import array
 
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, show, Write
@@ -299,8 +297,7 @@ def test_limit_in_the_message_is_the_limit_of_the_file() -> None:
     ('SLC', 'int32', 'aa 04 07 89 00 00 01 00 02 00'),
     ('SLC', 'float32', 'aa 04 07 89 00 00 80 47 00 01'),
     ('PLC5', 'uint32', '67 00 00 02 00 06 07 00 95 09 42 01 00 02 00')])
-def test_bytes_of_a_write_with_the_high_word_first(
-        plc: str, kind: str, expected: str) -> None:
+def test_bytes_of_a_write_with_the_high_word_first(plc: str, kind: str, expected: str) -> None:
     mapping = make_mapping(command='Write', plc=plc, kind=kind, word_order='High')
     (_, command), = Write(mapping, [0x10002], 0.0).commands
     assert command.hex(' ') == expected
@@ -318,10 +315,8 @@ def test_bytes_of_a_string_over_words(plc: str, expected: str) -> None:
 @pytest.mark.parametrize('values, raw, command', [
     ([-10.0, 12.75], [0, 46], 'aa 04 07 89 00 00 00 00 2e 00'),  # 45.5 becomes the even 46
     ([-10.5, 12.7], [-1, 45], 'aa 04 07 89 00 00 ff ff 2d 00')])
-def test_nearest_raw_values_are_written(
-        values: list[float], raw: list[int], command: str) -> None:
-    mapping = make_mapping(
-        command='Write', plc='SLC', length=2, scaling=Scaling(0.5, -10.0))
+def test_nearest_raw_values_are_written(values: list[float], raw: list[int], command: str) -> None:
+    mapping = make_mapping(command='Write', plc='SLC', length=2, scaling=Scaling(0.5, -10.0))
     write = Write(mapping, array('f', values), 0.0)
     assert (write.raw, write.value) == (raw, show(values))
     assert [data.hex(' ') for _, data in write.commands] == [command]

@@ -14,8 +14,6 @@
 
 """What is said of a write whose reply was lost, after the PLC has been read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 

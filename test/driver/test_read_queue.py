@@ -14,8 +14,6 @@
 
 """Which read goes first, and how reads share a line that is too slow for all of them."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from functools import cache
 from itertools import pairwise
@@ -127,10 +125,7 @@ def test_schedule_by_hand() -> None:
     # 40 ms each: one every 100 ms, one every 200 ms, one every 400 ms, 70 % of the line.
     found = starts({100: 1, 200: 1, 400: 1}, 0.79, took=0.04)
     at = [[round(1000 * time) for time in times] for times in found.values()]
-    assert at == [
-        [0, 120, 200, 300, 400, 520, 600, 700],
-        [40, 240, 440, 640],
-        [80, 480]]
+    assert at == [[0, 120, 200, 300, 400, 520, 600, 700], [40, 240, 440, 640], [80, 480]]
 
 
 def test_schedule_by_hand_of_a_line_that_is_too_slow() -> None:

@@ -14,8 +14,6 @@
 
 """Requests on a virtual line: one after the other, over the links of both duplexes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -14,8 +14,6 @@
 
 """The words of Serve rows: what the other end reads and writes, and who hears of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 import tracemalloc
@@ -394,8 +392,7 @@ def test_bits_that_the_other_end_writes(plc: str) -> None:
     bench = Bench(plc, low, high, next_word)
     assert bench.write_bits('B3:5', 0x0004, 0x0004) == (0, b'')
     # Both rows have bits in that word.
-    assert bench.heard() == [('B3:5/2_5_Serve_3', [1, 0, 0]),
-                             ('B3:5/8_5_Serve_10', [0] * 10)]
+    assert bench.heard() == [('B3:5/2_5_Serve_3', [1, 0, 0]), ('B3:5/8_5_Serve_10', [0] * 10)]
     assert bench.write_bits('B3:6', 0x0003, 0x0003) == (0, b'')
     assert bench.heard() == [('B3:5/8_5_Serve_10', [0] * 8 + [1, 1])]
     assert bench.write_bits('B3:8', 1, 1) == BAD_WORDS[plc]

@@ -14,20 +14,12 @@
 
 """What is said to read, write and identify, one request and reply after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.transactions import carry_out, REWRITTEN
-from abdf1_ros.errors import (
-    CommandTimeout,
-    FormatError,
-    LinkError,
-    RemoteError,
-    StationInactive,
-)
+from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError, StationInactive
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -86,8 +78,7 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
     assert requests == write.commands[:len(requests)]
     assert (result.outcome, result.packets_done) == (outcome, done)
     assert (result.error is None) is (outcome is Outcome.WRITTEN)
-    assert ('(after 1 of 2 packets were written)' in result.detail) is (
-        outcome is Outcome.PARTLY)
+    assert ('(after 1 of 2 packets were written)' in result.detail) is (outcome is Outcome.PARTLY)
 
 
 @pytest.mark.parametrize('answers, outcome, done', [

@@ -13,8 +13,6 @@
 # limitations under the License.
 """What a transaction costs the driver, in instructions: no more for a larger map."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 

@@ -14,8 +14,6 @@
 
 """The command writer, against a bridge with a simulator and against one that only listens."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import runpy
 import sys
@@ -176,8 +174,7 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
     tags = ('--tags', 'north', 'south')
     assert answered(lambda data: [('north', 'written', OURS), ('south', 'written', OURS)],
                     *tags)[0] == 0
-    status, lines = answered(lambda data: [('north', 'written', OURS)], *tags,
-                             '--timeout', '1.5')
+    status, lines = answered(lambda data: [('north', 'written', OURS)], *tags, '--timeout', '1.5')
     assert (status, lines) == (
         3, ['north: written (1.0 ms)', 'unknown whether written: no result within 1.5 s'])
 

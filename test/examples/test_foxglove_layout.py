@@ -14,8 +14,6 @@
 
 """The layout for Foxglove shows what the demo publishes, and nothing that is not there."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

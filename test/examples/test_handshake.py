@@ -14,8 +14,6 @@
 
 """The handshake of a job, against a PLC as this test plays it on the topics of a bridge."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 import runpy
@@ -49,8 +47,7 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
         controls = observer.node.create_publisher(UInt8MultiArray, '/fake/read/control', latched)
         controls.publish(UInt8MultiArray(data=control or [1]))
         states.publish(Int16MultiArray(data=state))
-        observer.node.create_timer(
-            0.1, lambda: states.publish(Int16MultiArray(data=state)))
+        observer.node.create_timer(0.1, lambda: states.publish(Int16MultiArray(data=state)))
 
         def take(message: Int16MultiArray) -> None:
             requests.append(message.data[0])
@@ -75,8 +72,7 @@ def test_job_is_done_when_the_plc_has_its_number() -> None:
             state[1] = request
 
     status, lines, requests = run(work, [4, 4], '--begin-within', '10')
-    assert (status, lines) == (
-        0, ['job 5 requested', 'job 5 has begun', 'job 5: done'])
+    assert (status, lines) == (0, ['job 5 requested', 'job 5 has begun', 'job 5: done'])
     assert requests[0] == 5
 
 

@@ -14,8 +14,6 @@
 
 """The interlock consumer, beside a bridge that loses its PLC and its life."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import importlib.util
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """The recorder, and the rosbag2 commands that are shown beside it, against a real bridge."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import csv
 from datetime import datetime, timedelta, UTC
@@ -53,8 +51,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 
 @pytest.fixture(scope='module')
 def bridge(files: Files) -> Iterator[Process]:
-    with files.start_simulator(), \
-            Process('node', *files.args(), '-r', '__ns:=/recorded') as node:
+    with files.start_simulator(), Process('node', *files.args(), '-r', '__ns:=/recorded') as node:
         yield node
         node.end()
 

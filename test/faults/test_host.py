@@ -14,8 +14,6 @@
 
 """What happens to processes and clocks, done to a real node; see docs/faults.md."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import itertools
 from pathlib import Path

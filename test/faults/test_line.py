@@ -14,8 +14,6 @@
 
 """What happens to a line, done to a real node and a real simulator; see docs/faults.md."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
@@ -36,16 +34,7 @@ from support.fault_rig import (
     SETPOINT,
     UNKNOWN,
 )
-from support.ros import (
-    details,
-    ERROR,
-    Observer,
-    OK,
-    Process,
-    until_status,
-    WARN,
-    write_csv,
-)
+from support.ros import details, ERROR, Observer, OK, Process, until_status, WARN, write_csv
 from support.simulator_process import (
     make_files,
     MAP_HEADER,
@@ -112,8 +101,7 @@ def test_line_that_babbles_loses_writes_but_tells_no_lies(line: Boxed) -> None:
     rig, box = line
     box.babbles = True
     results = [rig.write(3.0 + number) for number in range(5)]
-    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
-               for text in results)
+    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT)) for text in results)
     rig.told('[INFO]', '2514 NTC_INVALID_SYMBOL')
     box.mend()
     rig.recovers(6.0)
@@ -144,8 +132,7 @@ def test_second_master_on_the_line(line: Boxed) -> None:
     box.overhear = talk
     rig.told('[ERROR]', '2510 ERR_WRONG_MESSAGE')
     results = [rig.write(3.0 + number) for number in range(5)]
-    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT))
-               for text in results)
+    assert all(text == 'written' or text.startswith((UNKNOWN, NOT_SENT)) for text in results)
     rig.observer.until(lambda: len(said) > 100, 'more traffic')
     assert 'unusable reply' not in rig.said  # no reply of others was taken for ours
     assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)

@@ -14,8 +14,6 @@
 
 """What happens to ports, done to a real node and a real simulator; see docs/faults.md."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """What happens to rfc2217:// device servers, done to a real node; see docs/faults.md."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,8 +48,7 @@ def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iter
     """Return a node, and the device server between it and its PLCs."""
     files = short_files(tmp_path_factory.mktemp('server'))
     simulator = files.start_simulator()
-    with LineServer(files.port) as server, rigged(
-            observer, files, server.url, simulator) as rig:
+    with LineServer(files.port) as server, rigged(observer, files, server.url, simulator) as rig:
         yield rig, server
 
 
@@ -153,6 +150,5 @@ def test_server_takes_its_time(served: Served) -> None:
 def test_all_mappings_are_read_in_time(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path)
     simulator = files.start_simulator()
-    with LineServer(files.port) as server, rigged(
-            observer, files, server.url, simulator) as rig:
+    with LineServer(files.port) as server, rigged(observer, files, server.url, simulator) as rig:
         rig.until_well()

@@ -14,8 +14,6 @@
 
 """What happens to a line of two nodes, a master and a slave; see docs/faults.md."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import signal
 import time
@@ -41,8 +39,7 @@ def observer() -> Iterator[Observer]:
 
 
 @pytest.fixture(scope='module')
-def shared_line(
-        observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
+def shared_line(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
     with two_nodes(observer, tmp_path_factory.mktemp('line'), WRITE_TIMEOUT) as line:
         yield line
 

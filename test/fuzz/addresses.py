@@ -14,8 +14,6 @@
 
 """Fuzz target: the grammar of addresses, of every family."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import AddressRangeError, AddressSyntaxError, BITS
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 

@@ -18,8 +18,6 @@ Inputs to begin with: those made of vectors and real files, and the stored finds
 A stored corpus is a text file, one input a line in hexadecimal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
@@ -66,8 +64,7 @@ _DUMPS = (
 
 _CAPTURE = b'# abdf1_ros capture 1'
 # A command and its reply, full duplex.
-_EXCHANGE = (
-    b'10 02 01 02 06 00 07 00 00 10 03 a3 1f', b'10 02 02 01 46 00 07 00 10 03 5a 1e')
+_EXCHANGE = (b'10 02 01 02 06 00 07 00 00 10 03 a3 1f', b'10 02 02 01 46 00 07 00 10 03 5a 1e')
 
 # What was found once, and is no more.
 _FOUND = {

@@ -14,8 +14,6 @@
 
 """A file for the targets whose input is one."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 import tempfile

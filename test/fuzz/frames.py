@@ -14,8 +14,6 @@
 
 """Fuzz target: the frame decoders, half and full duplex, with BCC and with CRC."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
     Duplex,

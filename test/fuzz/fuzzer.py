@@ -18,8 +18,6 @@ Run one fuzz target under atheris: ``fuzzer.py --target=NAME [options of libFuzz
 libFuzzer passes over options with two dashes, and gives them to the processes it starts.
 """
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 import shlex

@@ -19,8 +19,6 @@ An input is a script. Its first byte chooses the mode; each action after it is t
 and how much, and the bytes that the action takes.
 """
 
-from __future__ import annotations
-
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, FrameDecoder, MAX_WAITING
 from abdf1_ros.df1.packet import Packet
@@ -109,8 +107,7 @@ class _Line:
         command = Packet(much % 4, 9, data[0] & 0x3F if data else 0x0F, 0, len(self.asked),
                          data[1:])
         self.asked.append(command)
-        self.driver.guests.put(GuestCommand(
-            self._guest, command, self.now, self.answered.append))
+        self.driver.guests.put(GuestCommand(self._guest, command, self.now, self.answered.append))
         self.driver.machine.wake(self.now)
         self._settle()
 

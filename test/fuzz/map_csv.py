@@ -14,8 +14,6 @@
 
 """Fuzz target: the loader of the map CSV, and all that is made of its rows."""
 
-from __future__ import annotations
-
 import re
 
 from abdf1_ros.plan.usable_rows import line_problems

@@ -14,8 +14,6 @@
 
 """Fuzz target: the loader of the net CSV."""
 
-from __future__ import annotations
-
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import FIELDS, load_network
 from fuzz.files import path_of

@@ -19,8 +19,6 @@ Fuzz all targets, one after the other, from the stored corpus; status 1 when som
 ``--store`` puts into the corpus what of that brings coverage, short inputs first.
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 import hashlib

@@ -14,8 +14,6 @@
 
 """Fuzz target: the commands that are served, of every family, from two kinds of table."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.driver.served import Served

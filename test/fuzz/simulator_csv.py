@@ -14,8 +14,6 @@
 
 """Fuzz target: the simulator's CSV, and the PLCs that are made of it."""
 
-from __future__ import annotations
-
 import re
 
 from abdf1_ros.df1.checksum import Checksum

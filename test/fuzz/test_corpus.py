@@ -14,8 +14,6 @@
 
 """The stored inputs of the fuzz targets, without a fuzzer (docs/measured/robustness.md)."""
 
-from __future__ import annotations
-
 import importlib
 
 from fuzz import corpus

@@ -14,8 +14,6 @@
 
 """Fuzz target: type descriptors and system addresses of the PLC-5 commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc5.commands import SystemAddress

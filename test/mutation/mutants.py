@@ -15,8 +15,6 @@
 
 """Single small mistakes in a module: which there can be, and its source with one of them."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -93,8 +91,7 @@ def _edits(node: ast.stmt | ast.expr) -> Iterator[Edit]:
                 if type(operator) in _SWAPS:
             yield _swap(operator, partial(setattr, node, 'op'))
         case ast.If(test=test) | ast.While(test=test) | ast.IfExp(test=test):
-            yield 'condition negated', lambda: setattr(
-                node, 'test', ast.UnaryOp(ast.Not(), test))
+            yield 'condition negated', lambda: setattr(node, 'test', ast.UnaryOp(ast.Not(), test))
         case ast.UnaryOp(op=ast.Not() | ast.USub() as operator, operand=operand):
             yield f'{type(operator).__name__} left out', lambda: setattr(  # twice is not at all
                 node, 'operand', ast.UnaryOp(type(operator)(), operand))

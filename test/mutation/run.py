@@ -23,8 +23,6 @@ anybody could see; the others are missing tests. With --everywhere all other tes
 the room has not found.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor

@@ -15,8 +15,6 @@
 
 """Mistakes are single ones, and each makes another program."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

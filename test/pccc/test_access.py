@@ -14,8 +14,6 @@
 
 """The ways to a PLC's words."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import accesses_of, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType

@@ -14,8 +14,6 @@
 
 """Addresses: the grammar, both families' ranges, and where words lie."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area

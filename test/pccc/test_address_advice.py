@@ -14,8 +14,6 @@
 
 """What is said to those who write an address in another way than these commands need it."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import AddressSyntaxError
 from abdf1_ros.pccc.address_advice import advice
 from abdf1_ros.pccc.families import parse_address

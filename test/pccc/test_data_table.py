@@ -14,8 +14,6 @@
 
 """The data table of an emulated PLC."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from abdf1_ros.pccc.address import Address

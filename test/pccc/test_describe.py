@@ -14,8 +14,6 @@
 
 """Commands and replies in words."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.describe import command_name, describe
 from hypothesis import given, strategies
@@ -161,9 +159,7 @@ def test_name_of_a_command_has_cmd_and_fnc() -> None:
     assert command_name(command('')) == '0F'
 
 
-@for_all('vector', [
-    vector for vector in MESSAGES
-    if vector.valid and len(vector.link_data) >= 6])
+@for_all('vector', [vector for vector in MESSAGES if vector.valid and len(vector.link_data) >= 6])
 def test_every_vector_has_a_text_of_one_line(vector: Vector) -> None:
     assert describe(vector.packet).isprintable()
     assert ('malformed' in describe(vector.packet)) is vector.name.endswith('_short')

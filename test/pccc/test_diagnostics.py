@@ -14,8 +14,6 @@
 
 """The bytes of the diagnostic commands (M 7-6..7-27)."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.diagnostics import Echo, ReadCounters

@@ -14,8 +14,6 @@
 
 """Every dialect against the emulated PLC it is for."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -117,8 +115,7 @@ def test_largest_packets_are_served(place: tuple[PlcType, Access, str]) -> None:
 
 
 @pytest.mark.parametrize('place', FLOATS, ids=str)
-def test_every_value_of_every_file_type_goes_there_and_back(
-        place: tuple[PlcType, Access]) -> None:
+def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType, Access]) -> None:
     family, dialect = place[0], dialect_of(*place)
     for kind in file_types_of(family):
         file = kind.default_file if kind.default_file is not None else 9

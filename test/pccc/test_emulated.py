@@ -14,8 +14,6 @@
 
 """The processor that an emulated PLC claims to be."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType

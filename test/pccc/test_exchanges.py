@@ -18,8 +18,6 @@ Every command of every family, at both ends: the bytes of vectors/exchanges.json
 They begin at DST; frames around such bytes are those of vectors/frames.json.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,8 +115,7 @@ def plc(family: PlcType, files: dict[str, str]) -> tuple[DataTable, Server]:
         address, data = parse_address(place, family), bytes.fromhex(text)
         words.create(address, len(data) // 2)
         words.write(address, data)
-    return words, Server(
-        words, counters=served_counters(Counters(), family, is_full_duplex=False))
+    return words, Server(words, counters=served_counters(Counters(), family, is_full_duplex=False))
 
 
 @for_all('entry', CALLS)

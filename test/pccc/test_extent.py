@@ -13,8 +13,6 @@
 # limitations under the License.
 """What has words in common with what."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.mapping import Mapping
 import pytest

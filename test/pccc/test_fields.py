@@ -14,8 +14,6 @@
 
 """Numbers of PCCC and the reader of fields."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from abdf1_ros.errors import FormatError

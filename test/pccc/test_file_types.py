@@ -14,8 +14,6 @@
 
 """File types: letters, codes and layouts of the manual."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.families import FAMILIES, file_types_of, layout_of
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.slc.address import BY_CODE

@@ -14,8 +14,6 @@
 
 """Who is there: diagnostic status replies of all the layouts that are known."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.diagnostics import ReadCounters
 from abdf1_ros.pccc.families import decode_identity
@@ -100,8 +98,7 @@ def test_slc_that_has_halted() -> None:
 def test_other_bits_of_byte_20_do_not_halt_an_slc() -> None:
     identity = changed(SLC, byte17=0x34, byte20=0xDF)
     assert identity.faults == ()
-    assert identity.remarks == (
-        'last major error 0x0034 (negative timer preset or accumulator)',)
+    assert identity.remarks == ('last major error 0x0034 (negative timer preset or accumulator)',)
 
 
 def test_slc_remarks_are_no_faults() -> None:
@@ -147,8 +144,7 @@ def test_name_of_an_slc_counts_more_than_its_code(
         code: int, name: bytes, model: str, processor: Processor | None,
         remarks: tuple[str, ...]) -> None:
     identity = decode_identity(SLC[:3] + bytes((code,)) + SLC[4:5] + name + SLC[16:])
-    assert (identity.plc_type, identity.model, identity.remarks) == (
-        PlcType.SLC, model, remarks)
+    assert (identity.plc_type, identity.model, identity.remarks) == (PlcType.SLC, model, remarks)
     assert identity.processor is processor
 
 
@@ -281,8 +277,7 @@ def test_1785_ka5_that_is_asked_over_dh485_has_its_name() -> None:
 
 
 def test_unknown_layout_is_shown_in_hexadecimal() -> None:
-    assert str(decode_identity(bytes.fromhex('00 99 12 34'))) == \
-        'unknown processor (00 99 12 34)'
+    assert str(decode_identity(bytes.fromhex('00 99 12 34'))) == 'unknown processor (00 99 12 34)'
 
 
 @pytest.mark.parametrize('data', [b'', b'\0', PLC5[:17], PLC5[:2]])

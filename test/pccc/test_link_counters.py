@@ -14,17 +14,11 @@
 
 """Diagnostic counters of a port, as bytes and by name (M 9-6, 9-7, 9-31)."""
 
-from __future__ import annotations
-
 from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.link_counters import (
-    CounterLayout,
-    decode_counters,
-    ServedCounters,
-)
+from abdf1_ros.pccc.link_counters import CounterLayout, decode_counters, ServedCounters
 from abdf1_ros.pccc.plc5.identity import COUNTERS
 from abdf1_ros.pccc.slc.identity import (
     FULL_DUPLEX_COUNTERS,
@@ -132,8 +126,7 @@ def test_own_counters_under_the_names_of_the_layout() -> None:
         assert (counts['messages sent'], counts['messages received']) == ('1', '2')
         assert (counts['messages undelivered'], counts['bad messages received']) == ('7', '30')
         assert counts['duplicate messages received'] == '13'
-    for layout in (FULL_DUPLEX_COUNTERS, COUNTERS,
-                   ML1000_COUNTERS):
+    for layout in (FULL_DUPLEX_COUNTERS, COUNTERS, ML1000_COUNTERS):
         assert shown[layout]['NAK received'] == '7'
 
 

@@ -20,8 +20,6 @@ test runs this file as a program: the line comes before the rest of the package 
 ``families``.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 import re

@@ -14,8 +14,6 @@
 
 """The names in structures and where they are."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc import members
 from abdf1_ros.pccc.members import Members
 import pytest
@@ -76,8 +74,7 @@ def test_named_words_have_their_places(table: Members, expected: dict[str, int])
 
 
 def test_floats_of_a_plc5_pid_follow_each_other() -> None:
-    floats = {name: member.word for name, member in members.PLC5_PID.items()
-              if member.words == 2}
+    floats = {name: member.word for name, member in members.PLC5_PID.items() if member.words == 2}
     assert floats == {name: 2 + 2 * n for n, name in enumerate(PLC5_PID_FLOATS)}
     # The anchors that the manuals give numbers for (P5A).
     anchors = {'SP': 2, 'KP': 4, 'KI': 6, 'KD': 8, 'BIAS': 10, 'PV': 26, 'TIE': 48}

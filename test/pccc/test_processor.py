@@ -14,8 +14,6 @@
 
 """What the SLC and MicroLogix processors take and have."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.families import dialect_of, file_types_of
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL

@@ -14,8 +14,6 @@
 
 """What real processors have answered, and what we make of it: vectors/processors.json."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder
 from abdf1_ros.df1.packet import Packet

@@ -14,8 +14,6 @@
 
 """Diagnostic commands as an emulated PLC of each family answers them."""
 
-from __future__ import annotations
-
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable

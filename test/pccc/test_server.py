@@ -14,8 +14,6 @@
 
 """The emulated PLC: the replies of the vectors, and one reply to whatever it is asked."""
 
-from __future__ import annotations
-
 import traceback
 
 from abdf1_ros.df1.packet import Packet

@@ -14,8 +14,6 @@
 
 """STS and EXT STS in words."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.pccc import plc2, plc3, slc

@@ -14,8 +14,6 @@
 
 """Steps with a station: what is asked, and what becomes of the answers."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.access import Access

@@ -14,8 +14,6 @@
 
 """Strings become words and words become strings."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.strings import (
     COUNTED_WORDS,

@@ -14,8 +14,6 @@
 
 """Which parts of structures are which type, and which of them are not for others to write."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType

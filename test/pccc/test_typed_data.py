@@ -14,8 +14,6 @@
 
 """The type/data parameter of the PLC-5 typed commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given

@@ -14,8 +14,6 @@
 
 """Values become words and words become values."""
 
-from __future__ import annotations
-
 from array import array
 import math
 import struct
@@ -240,5 +238,4 @@ def test_bits_are_bool_only(text: str) -> None:
 
 def test_words_and_floats_of_structures_are_nothing_else() -> None:
     assert types_of(parse_address('PD9:0.SP', PlcType.PLC5)) == (ValueType.FLOAT32,)
-    assert types_of(parse_address('T4:0.ACC', PlcType.SLC)) == (
-        ValueType.INT16, ValueType.UINT16)
+    assert types_of(parse_address('T4:0.ACC', PlcType.SLC)) == (ValueType.INT16, ValueType.UINT16)

@@ -14,8 +14,6 @@
 
 """Forecasts of poll cycle and load, before anything is connected."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from abdf1_ros.plan.forecast import (

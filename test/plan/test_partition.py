@@ -14,8 +14,6 @@
 
 """The cheapest way to put stretches of words into blocks."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 import math
@@ -85,8 +83,7 @@ def test_plan_of_several_periods_serves_all_and_is_never_worse_than_apart(
 
 def test_plan_of_two_periods_is_the_best_there_is() -> None:
     """A slow one beside a fast block, one within it, and one far from it."""
-    needed = {0.1: [Span(0, 10), Span(14, 16)],
-              1.0: [Span(12, 13), Span(16, 17), Span(60, 61)]}
+    needed = {0.1: [Span(0, 10), Span(14, 16)], 1.0: [Span(12, 13), Span(16, 17), Span(60, 61)]}
     candidates = partition(needed, MODEL, 0.0)
     assert candidates == [Candidate(Span(0, 17), 0.1), Candidate(Span(60, 61), 1.0)]
     wanted = [Candidate(span, period) for period, spans in needed.items() for span in spans]

@@ -14,8 +14,6 @@
 
 """What heartbeats and fallbacks promise; the numbers in the names are those of the rules."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 import math
 

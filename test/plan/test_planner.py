@@ -14,8 +14,6 @@
 
 """The read planner: everything mapped, in packets, for the fewest characters."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -48,8 +46,7 @@ def plan(*mappings: Mapping) -> list[Block]:
 
 def spans(blocks: Iterable[Block]) -> list[tuple[str, int]]:
     """Return what the blocks' requests read, as address and words."""
-    return [(str(request.start), request.words)
-            for block in blocks for request in block.requests]
+    return [(str(request.start), request.words) for block in blocks for request in block.requests]
 
 
 def cost(blocks: Iterable[Block]) -> float:

@@ -14,8 +14,6 @@
 
 """Blocks that a station refuses: divided, learned, and joined again around what is bad."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from abdf1_ros.df1.checksum import Checksum

@@ -14,8 +14,6 @@
 
 """The report on both files: its figures are worked out by hand from the frames on the line."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
@@ -51,8 +49,7 @@ def test_settings_that_are_odd_come_first_with_their_stations() -> None:
 
 def test_write_over_what_another_row_reads_is_odd() -> None:
     bits = make_mapping('B3:2/0', tag='il', length=3)
-    odd = report_of(
-        bits, make_mapping('B3:2/2', 'Write', tag='rip', item=4)).remarks()
+    odd = report_of(bits, make_mapping('B3:2/2', 'Write', tag='rip', item=4)).remarks()
     assert odd == [Remark(RemarkKind.SETTING, (
         'map.csv:5: rip writes B3:2/2, which il reads, so a message sets what the PLC is '
         'to tell; ReadWrite in one row if that is meant, otherwise another address'), 1)]

@@ -14,8 +14,6 @@
 
 """Rows that do not fit the line or each other."""
 
-from __future__ import annotations
-
 from abdf1_ros.plan.usable_rows import line_problems, usable_rows
 from abdf1_ros.settings.heartbeats import Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping

@@ -14,8 +14,6 @@
 
 """The clock of lines counts while the host sleeps (rule 6 of docs/heartbeats.md)."""
 
-from __future__ import annotations
-
 import inspect
 import time
 

@@ -14,8 +14,6 @@
 
 """Reading from and writing to descriptors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 import socket

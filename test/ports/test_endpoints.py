@@ -14,8 +14,6 @@
 
 """Lines that are made or opened here: their names, who gets them, and what they leave behind."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing
 import os

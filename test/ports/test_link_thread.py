@@ -14,8 +14,6 @@
 
 """The link thread, on pseudo-terminals and sockets."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import itertools
 import math
@@ -637,8 +635,7 @@ def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) 
     assert pty.read(5) == READY
 
 
-def test_full_pty_is_a_lost_port(
-        pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_pty_is_a_lost_port(pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.descriptor._WRITE_TIMEOUT', 0.05)
     script = Script(Step(bytes(1_000_000), None))
     link.start(script.machine, pty.name)
@@ -674,8 +671,7 @@ def test_machine_runs_on_a_socket_url(link: Link) -> None:
             assert data == READY
             client.sendall(ACK)
             assert script.next() == Control(Code.ACK)
-        assert link.state().text == \
-            'the port was lost: the other end has closed the connection'
+        assert link.state().text == 'the port was lost: the other end has closed the connection'
         again, _ = server.accept()
         again.close()
 
@@ -809,8 +805,7 @@ class _Stuck(_NoLine):
         assert self.free.wait(PATIENCE)
 
 
-def test_machine_that_came_to_nothing_does_not_come_later(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.link_thread._EXCHANGE_LIMIT', 0.0)
     port, before, after = _Stuck(), Script(Step(None, None)), Script(Step(None, None))
     thread = LinkThread(before.machine, lambda: port)

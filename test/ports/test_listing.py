@@ -14,8 +14,6 @@
 
 """Serial ports as the operating system has them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -14,8 +14,6 @@
 
 """The one way to open a port: devices, and a module for each scheme of URLs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import sys
 from types import ModuleType

@@ -14,8 +14,6 @@
 
 """One line, one owner, however its port is written."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 from pathlib import Path

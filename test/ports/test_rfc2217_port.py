@@ -14,8 +14,6 @@
 
 """Ports of device servers: connections, and the client of RFC 2217."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 import socket
@@ -111,8 +109,7 @@ def test_option_that_is_short_or_another_answers_nothing(
     port.negotiate(EVEN)
 
 
-def test_setting_that_the_server_does_not_take(
-        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_setting_that_the_server_does_not_take(ends: tuple[Rfc2217Port, socket.socket]) -> None:
     port, server = ends
     server.sendall(DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST)
     with pytest.raises(OSError, match='does not take Baudrate 115200, its port has 9600'):
@@ -194,8 +191,7 @@ def test_offer_that_is_not_ours_is_refused_once(
     assert server.recv(100) == bytes([255, 254, 1])  # DONT ECHO; SGA was asked for
 
 
-def test_data_that_look_like_commands_are_doubled(
-        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_data_that_look_like_commands_are_doubled(ends: tuple[Rfc2217Port, socket.socket]) -> None:
     port, server = ends
     port.write(b'\x10\xff\x02')
     assert server.recv(100) == b'\x10\xff\xff\x02'

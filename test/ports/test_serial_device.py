@@ -14,8 +14,6 @@
 
 """Serial devices: how they are opened, damaged characters, counts, and the end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import errno
 import fcntl
@@ -224,8 +222,7 @@ def close_with(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[
     return close
 
 
-def test_close_does_not_wait_for_what_cannot_leave(
-        close_with: Callable[..., list[str]]) -> None:
+def test_close_does_not_wait_for_what_cannot_leave(close_with: Callable[..., list[str]]) -> None:
     assert close_with(12) == ['dropped', 'no handshake', 'closed']
 
 

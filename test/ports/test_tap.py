@@ -14,8 +14,6 @@
 
 """Listening on a port, and between two."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import math
 import os

@@ -14,8 +14,6 @@
 
 """What passes a port is recorded, and nothing else changes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.ports.settings import PortSettings

@@ -15,8 +15,6 @@
 
 """The node in this process, where it does not get to run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import signal
 

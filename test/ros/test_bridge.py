@@ -14,8 +14,6 @@
 
 """A running bridge seen over DDS: node and simulator are processes of their own."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -117,8 +115,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
 
 
 @pytest.mark.parametrize('tag', READS)
-def test_late_subscriber_gets_the_value_with_its_type_and_layout(
-        bridge: Bridge, tag: str) -> None:
+def test_late_subscriber_gets_the_value_with_its_type_and_layout(bridge: Bridge, tag: str) -> None:
     kind, label, values = READS[tag]
     inbox = bridge.listen(tag)
     message = inbox.first()
@@ -258,8 +255,7 @@ def test_active_stations_are_latched_and_published_on_change_only(bridge: Bridge
     bridge.observer.forget(heartbeat)
 
 
-def test_first_good_read_after_an_outage_is_published_even_on_change_only(
-        bridge: Bridge) -> None:
+def test_first_good_read_after_an_outage_is_published_even_on_change_only(bridge: Bridge) -> None:
     recipe = bridge.listen('recipe')
     recipe.first()
     with bridge.fault('silent 2'):

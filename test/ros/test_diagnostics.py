@@ -14,8 +14,6 @@
 
 """What the diagnostics say, status by status, from the state of a real driver."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -148,8 +146,7 @@ def test_link_before_there_is_one(bench: Bench) -> None:
 
 def test_link_without_a_port(bench: Bench) -> None:
     bench.set_port(False, 'cannot open the port: No such file or directory')
-    assert bench.says('link') == (
-        ERROR, 'ERROR: cannot open the port: No such file or directory')
+    assert bench.says('link') == (ERROR, 'ERROR: cannot open the port: No such file or directory')
     assert details(bench.status('link'))['port'] == 'closed'
 
 
@@ -286,8 +283,7 @@ def test_station_that_answers(bench: Bench) -> None:
     assert bench.says('station 1') == (OK, 'OK: station 1 active')
     values = details(bench.status('station 1'))
     assert values['last answer'] == '0.3 s ago'
-    assert (values['last TNS'], values['replies'], values['error replies']) == (
-        '0x00AB', '4', '1')
+    assert (values['last TNS'], values['replies'], values['error replies']) == ('0x00AB', '4', '1')
 
 
 def test_station_that_is_silent(bench: Bench) -> None:
@@ -373,8 +369,7 @@ def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Callable[..., B
 
 
 def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
-    assert bench.says('mappings') == (
-        WARN, 'WARN: of 2 mappings 2 waiting for the first read')
+    assert bench.says('mappings') == (WARN, 'WARN: of 2 mappings 2 waiting for the first read')
     assert details(bench.status('mappings'))['speed'] == \
         'waiting for the first read: N7:0 at station 1, never read'
     bench.point('speed').update(b'\x01\x00', NOW)
@@ -394,8 +389,7 @@ def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
     bench.point('speed').update(b'\x01\x00', NOW)
     bench.point('level').update(bytes(4), NOW)
     bench.point('level').fail('STS 10: illegal command or format')
-    assert bench.says('mappings', NOW + 0.5) == (
-        ERROR, 'ERROR: of 2 mappings 1 failed, 1 fresh')
+    assert bench.says('mappings', NOW + 0.5) == (ERROR, 'ERROR: of 2 mappings 1 failed, 1 fresh')
     values = details(bench.status('mappings', NOW + 0.5))
     assert values['level'] == \
         'failed: F8:4 at station 2, last read 0.5 s ago; STS 10: illegal command or format'
@@ -525,8 +519,7 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         status = bench.status('interlocks', now)
         return status.level, details(status)['station 1']
 
-    assert station(1, NOW - 1) == (
-        WARN, 'not in control: the PLC has not confirmed it yet')
+    assert station(1, NOW - 1) == (WARN, 'not in control: the PLC has not confirmed it yet')
     beat.confirmed, beat.state = NOW, BeatState.COUNTS
     assert station(None, NOW) == (
         WARN, 'unknown: ruled has not been read since the heartbeat counts')

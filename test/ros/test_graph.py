@@ -14,8 +14,6 @@
 
 """Nodes of our name, and topics that somebody uses with another message type."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from abdf1_ros.ros import graph as graph_module

@@ -14,8 +14,6 @@
 
 """Heartbeats, fallback values and guarded reads of a real node; named by the rules they show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path

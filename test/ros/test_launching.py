@@ -14,8 +14,6 @@
 
 """Which arguments of a launch file are refused; the files themselves: test_launch_files.py."""
 
-from __future__ import annotations
-
 from abdf1_ros.ros.launching import descriptions, parameter_types, unknown_arguments
 import pytest
 

@@ -14,8 +14,6 @@
 
 """Many lines in one process: their names, their faults, and their end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack, nullcontext
 from itertools import pairwise
@@ -151,8 +149,7 @@ class Plant:
 
     def write_net(self, name: str, port: str) -> None:
         """Write the net file of a line."""
-        write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout',
-                  [f'{port},115200,100'])
+        write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout', [f'{port},115200,100'])
 
     def write_map(self, name: str, row: str) -> None:
         """Write the map of a line."""
@@ -219,8 +216,7 @@ def line_status(plant: Plant, level: bytes) -> dict[str, str]:
     return details(until_status(plant.observer.diagnostics(''), 'lines', level))
 
 
-def test_each_line_is_a_node_of_its_own(
-        plant: Plant) -> None:
+def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
     plant.start()
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
     assert get_parameters(plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
@@ -266,8 +262,7 @@ def test_line_whose_name_ros_refuses_is_told_and_the_others_run(plant: Plant) ->
     assert 'must not contain characters other than alphanumerics' in values['/hall/b-1']
 
 
-def test_faulty_line_ends_all_where_that_is_asked_for(
-        plant: Plant) -> None:
+def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
     plant.start('-p', 'strict_lines:=true')
     plant._thread.join(PATIENCE)
@@ -360,8 +355,7 @@ def test_internal_error_restarts_its_line_only(
     assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
     before = {**plant.nodes}
     plant.fail(broken)
-    plant.observer.until(
-        lambda: plant.nodes[broken] is not before[broken], 'another node')
+    plant.observer.until(lambda: plant.nodes[broken] is not before[broken], 'another node')
     assert plant.speeds(broken) == [7, 8]
     assert {name for name in 'abc' if not before[name].link.is_alive()} == {broken}
     assert line_status(plant, OK)['restarts'] == '1'
@@ -411,8 +405,7 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
     never.set()
 
 
-def test_argument_that_is_not_of_ros_is_refused(
-        capsys: pytest.CaptureFixture[str]) -> None:
+def test_argument_that_is_not_of_ros_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['lines', 'map.csv'])
     assert ending.value.code == 2
@@ -421,8 +414,7 @@ def test_argument_that_is_not_of_ros_is_refused(
     assert 'map.csv: not known here; parameters follow --ros-args' in told
 
 
-def test_one_name_for_all_lines_is_refused(
-        capfd: pytest.CaptureFixture[str]) -> None:
+def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
     assert 'the sections of the parameter file name the nodes' in capfd.readouterr().err
 

@@ -14,8 +14,6 @@
 
 """Numbered events in the log: real rclpy loggers, read where they write."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import re
 
@@ -69,8 +67,7 @@ def test_every_message_has_the_level_of_its_table(
     assert text.endswith(' [station 2]')
 
 
-def test_one_logger_takes_events_of_all_levels(
-        log: EventLog, logged: Callable[[], Lines]) -> None:
+def test_one_logger_takes_events_of_all_levels(log: EventLog, logged: Callable[[], Lines]) -> None:
     for message in Message:
         log.add(event(message))
     assert {level for level, _ in logged()} == {'FATAL', 'ERROR', 'INFO'}

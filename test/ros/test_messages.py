@@ -14,8 +14,6 @@
 
 """Messages, QoS and values of mappings, with the real std_msgs."""
 
-from __future__ import annotations
-
 from array import array
 import math
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """The bridge node in this process, against simulated PLCs on a pseudo-terminal."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 import os
@@ -316,8 +314,7 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
     bench.node.session._may_have_left_over = {1}
     for _ in range(2):
         bench.node.session.happened(left_over)
-    lines = [line.partition('[abdf1]: ')[2]
-             for line in ''.join(capfd.readouterr()).splitlines()]
+    lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
     told = str(left_over)
     assert f'{told}; it may answer a command from before the port was opened' in lines
     assert told.startswith('2510') and lines.count(told) == 1
@@ -330,8 +327,7 @@ def test_station_with_another_error_code_is_told_once(
     stations = bench.node.driver.stations
     # It goes on to come and go.
     bench.observer.until(lambda: stations[1].returns >= 5, 'more returns')
-    lines = [line.partition('[abdf1]: ')[2]
-             for line in ''.join(capfd.readouterr()).splitlines()]
+    lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
     told = Counter(re.split(r'[:,]', line)[0] for line in lines
                    if line.startswith(('25', 'station')))
     assert told == {
@@ -397,8 +393,7 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
 def test_read_only_node_refuses_every_write(make_bench: Benches) -> None:
     bench = make_bench(*LAMPS, parameters=('read_only:=true',))
     bench.publisher(UInt8MultiArray, 'lamps')(1, 1)
-    assert messages(bench.until_results(2)) == {
-        'not written: refused: this node is read_only': 2}
+    assert messages(bench.until_results(2)) == {'not written: refused: this node is read_only': 2}
     assert bench.words('B3:0') == [0]
 
 
@@ -521,8 +516,7 @@ def test_third_internal_error_ends_the_node_with_status_1(
     map_file = write_csv(tmp_path / 'map.csv', MAP_HEADER, [SPEED])
     told = refusal(*ros_args(f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}'),
                    status=1)  # systemd starts it again
-    assert sum("internal error: KeyError('a bug'); please report it" in line
-               for line in told) == 3
+    assert sum("internal error: KeyError('a bug'); please report it" in line for line in told) == 3
 
 
 def test_duplicate_name_is_told_and_forgotten(
@@ -623,8 +617,7 @@ def test_odd_settings_are_told_in_the_log_but_not_without_end(
     assert warnings[-1].endswith('and 3 more remarks; "check" has them all')
 
 
-def test_map_without_a_row_is_told(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+def test_map_without_a_row_is_told(make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     make_bench()
     assert 'the map has no usable row' in ''.join(capfd.readouterr())
 

@@ -14,8 +14,6 @@
 
 """Where rclpy keeps parameters: what reaches into it has the effect of its public ways."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 

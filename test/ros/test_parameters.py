@@ -14,8 +14,6 @@
 
 """Parameters on a real node: what is declared, and what they come to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import math
 from pathlib import Path
@@ -81,14 +79,12 @@ def problems_of(node: Node) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
-def test_without_files_the_node_says_how_to_start(
-        make_node: Nodes, files: dict[str, str]) -> None:
+def test_without_files_the_node_says_how_to_start(make_node: Nodes, files: dict[str, str]) -> None:
     examples = config_file('net.csv').parent
     how = ('which file? Start with --ros-args -p net_file:=net.csv -p map_file:=map.csv; '
            f'examples are in {examples}, and "ros2 launch abdf1_ros demo.launch.py" runs them '
            'with a simulated line')
-    assert problems_of(make_node()) == [
-        f'parameter net_file: {how}', f'parameter map_file: {how}']
+    assert problems_of(make_node()) == [f'parameter net_file: {how}', f'parameter map_file: {how}']
     del files['map_file']
     assert problems_of(make_node(files)) == [f'parameter map_file: {how}']
 
@@ -259,8 +255,7 @@ def test_bad_row_is_left_out_unless_the_map_is_strict(
     assert problems_of(make_node(files | {'strict_map': True})) == [str(problem)]
 
 
-def test_mappings_are_shown_with_their_defaults(
-        make_node: Nodes, files: dict[str, str]) -> None:
+def test_mappings_are_shown_with_their_defaults(make_node: Nodes, files: dict[str, str]) -> None:
     node = make_node(files)
     configure(node)
     shown = {name: parameter.value

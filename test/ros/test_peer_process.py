@@ -14,8 +14,6 @@
 
 """The simulator as a process on a full-duplex line, and a client made from the manual alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """Ports that the lines of a process leave to each other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.problems import ConfigurationError

@@ -14,8 +14,6 @@
 
 """The node as a process: how it starts, ends, finds its port, and takes other names."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -214,8 +212,7 @@ def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
     observer.forget(diagnostics)
 
 
-def test_leaves_nothing_behind_when_the_line_goes_away(
-        observer: Observer, files: Files) -> None:
+def test_leaves_nothing_behind_when_the_line_goes_away(observer: Observer, files: Files) -> None:
     diagnostics, results = observer.diagnostics(files.port), observer.results()
     with files.start_simulator() as simulator, Process('node', *files.args()) as node:
         until_status(diagnostics, 'mappings', OK)
@@ -306,8 +303,7 @@ def refused_start(*arguments: str, status: int = 2) -> list[str]:
 
 
 @pytest.mark.parametrize('directory', ['/proc/none', '/proc'])
-def test_unusable_log_directory_is_named(
-        directory: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unusable_log_directory_is_named(directory: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('ROS_LOG_DIR', directory)
     (line,) = refused_start(status=1)  # a disk may not be there yet
     assert directory in line
@@ -341,8 +337,7 @@ def test_connects_when_the_port_appears(observer: Observer, files: Files) -> Non
     observer.forget(diagnostics)
 
 
-def test_second_node_waits_for_the_port_and_takes_over(
-        observer: Observer, files: Files) -> None:
+def test_second_node_waits_for_the_port_and_takes_over(observer: Observer, files: Files) -> None:
     speeds = observer.listen(Int16MultiArray, '/second/read/speeds')
     with files.start_simulator() as simulator, \
             Process('node', *files.args(), '-r', '__node:=first') as first:
@@ -362,8 +357,7 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
     door = observer.listen(UInt8MultiArray, '/cell/door_closed')
     bits = observer.listen(UInt8MultiArray, '/cell/line_a/read/bits')
     active = observer.listen(UInt16MultiArray, '/cell/line_a/active_stations')
-    remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r',
-              '~/read/door:=/cell/door_closed')
+    remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed')
     with files.start_simulator() as simulator, \
             Process('node', *files.args('use_sim_time:=true'), *remaps) as node:
         assert values_in(door.first()) == [1]
@@ -375,8 +369,7 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
             f'cell/line_a: {name}' for name in STATUSES]
         assert not observer.node.count_publishers('/cell/line_a/read/door')
         assert observer.node.count_subscribers('/cell/line_a/write/flags')
-        assert get_parameters(
-            observer, 'net.baud', node='/cell/line_a') == [115200]
+        assert get_parameters(observer, 'net.baud', node='/cell/line_a') == [115200]
         node.end()
         simulator.end()
     for inbox in (diagnostics, door, bits, active):

@@ -14,8 +14,6 @@
 
 """How ``node``, ``lines`` and ``simulator`` end: by signals, by bugs, and by the clock."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 import signal
@@ -54,8 +52,7 @@ def program(folder: Path, name: str, patch: str = '') -> Process:
     return Process(file, '--ros-args', '--params-file', str(folder / 'lines.yaml'))
 
 
-RUNS = {'node': 'cannot open the port', 'lines': 'cannot open the port',
-        'simulator': 'stations 1'}
+RUNS = {'node': 'cannot open the port', 'lines': 'cannot open the port', 'simulator': 'stations 1'}
 
 
 @pytest.mark.parametrize('delay', [0.0, 0.1, 0.3, 1.0, None])

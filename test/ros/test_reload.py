@@ -14,8 +14,6 @@
 
 """A running bridge whose files are read again, and whose port is given away."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
@@ -209,16 +207,14 @@ def test_link_that_does_not_take_the_files_is_the_end(
 CROWD = '~/write/recipe has more than one publisher'
 
 
-def test_second_publisher_is_found_again(
-        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+def test_second_publisher_is_found_again(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
     write_csv(bench.map, f'{HEADER},Fallback,Fallback_After', [f'{RECIPE},0 0,60000'])
     publishers = []
     for _ in range(2):
         assert bench.reload()[0]
         bench.diagnostics.clear()
         while len(publishers) < 2:
-            publishers.append(
-                bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe'))
+            publishers.append(bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe'))
         until_status(bench.diagnostics, 'interlocks', WARN,
                      lambda status: 'recipe: more than one publisher' in status.message)
     assert capfd.readouterr().err.count(CROWD) == 2
@@ -258,8 +254,7 @@ def test_second_wrong_baud_is_told_as_the_first(
     assert capfd.readouterr().err.count('the line shows about') == 2
 
 
-def test_other_node_of_our_name_stays_known(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_node_of_our_name_stays_known(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.graph._LOOKS_FOR_DUPLICATES', 1)
     monkeypatch.setattr(Graph, 'nodes', lambda *arguments: 2)
     text = 'another node is called abdf1 too'
@@ -280,8 +275,7 @@ def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
     assert bench.node.driver.network.timeout == 250
 
 
-def test_other_speed_opens_the_port_anew(
-        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+def test_other_speed_opens_the_port_anew(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
     bench.write_net(100, 19200)
     assert bench.reload()[0]
     speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)

@@ -14,8 +14,6 @@
 
 """A running node shares its line: an HMI reads and writes through it, and ROS is told."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.client import Client

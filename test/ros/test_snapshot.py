@@ -14,8 +14,6 @@
 
 """All values of a map in one message, and who gets it when."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Iterator
 from datetime import datetime

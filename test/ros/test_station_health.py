@@ -14,8 +14,6 @@
 
 """What the node says of its PLCs' processors and counters, first by itself, then in reality."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -63,8 +61,7 @@ def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
     (with_mode(Mode.PROGRAM, 'PROG', 'major error 0x0020, processor halted'),
      'major error 0x0020, processor halted (PROG)'),
     (with_mode(Mode.RUN, 'RUN', 'bad RAM'), 'bad RAM (RUN)')])
-def test_what_keeps_a_processor_from_its_work(identity: Identity | None,
-                                              text: str | None) -> None:
+def test_what_keeps_a_processor_from_its_work(identity: Identity | None, text: str | None) -> None:
     assert processor_fault(identity) == text
 
 
@@ -119,8 +116,7 @@ class Desk:
     def __init__(self, observer: Observer) -> None:
         self.observer = observer
         mappings = [make_mapping('N7:0', 'Write', station=station) for station in (1, 2)]
-        self.driver = Driver(
-            Network(), mappings, DriverSettings(), Recorder(time.monotonic))
+        self.driver = Driver(Network(), mappings, DriverSettings(), Recorder(time.monotonic))
         self.driver.is_online = True
         self.driver.checks.begin(0.0)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))

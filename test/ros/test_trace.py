@@ -14,8 +14,6 @@
 
 """The node records its line when it is asked to, and runs on when it cannot."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 import subprocess

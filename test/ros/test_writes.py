@@ -14,8 +14,6 @@
 
 """What of the messages to write topics has been dropped on its way."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from abdf1_ros.ros.writes import LossCounter

@@ -14,8 +14,6 @@
 
 """The descriptions of the map CSV's columns agree with what the columns take."""
 
-from __future__ import annotations
-
 from enum import Enum
 import re
 

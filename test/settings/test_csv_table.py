@@ -14,8 +14,6 @@
 
 """CSV files as spreadsheets, editors and accidents write them."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -14,8 +14,6 @@
 
 """Heartbeat, Fallback and Publish_While in a map CSV; tests are named by the rule they show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -75,8 +73,7 @@ def test_rule_3_requires_topics_with_a_time() -> None:
     mappings, problems = load_rows(*rows)
     assert problems == []
     assert mappings[1].heartbeat == Heartbeat(('speed',), 500)
-    assert (mappings[1].cell('Requires'), mappings[1].cell('Requires_Timeout')) == (
-        'speed', '500')
+    assert (mappings[1].cell('Requires'), mappings[1].cell('Requires_Timeout')) == ('speed', '500')
 
 
 @pytest.mark.parametrize(('cells', 'text'), [

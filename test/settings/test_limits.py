@@ -15,8 +15,6 @@
 
 """Min and Max of values that are written."""
 
-from __future__ import annotations
-
 from array import array
 
 from abdf1_ros.errors import FormatError

@@ -14,8 +14,6 @@
 
 """The map CSV as a whole: rows that clash, and rows that are left out."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.pccc.values import ValueType
@@ -77,8 +75,7 @@ def test_topic_that_is_the_tag_of_another_row() -> None:
 
 
 def test_row_that_clashes_counts_for_nothing() -> None:
-    mappings, problems = load_rows(
-        row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'))
+    mappings, problems = load_rows(row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'))
     assert [(mapping.tag, mapping.topic) for mapping in mappings] == [('a', 'a'), ('b', 'c')]
     assert len(problems) == 1
 

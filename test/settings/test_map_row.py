@@ -14,8 +14,6 @@
 
 """One row of the map CSV: columns, defaults, and the numbered texts of its errors."""
 
-from __future__ import annotations
-
 import math
 
 from abdf1_ros.messages import Severity

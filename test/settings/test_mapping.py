@@ -14,8 +14,6 @@
 
 """A mapping as the rest of the program sees it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from abdf1_ros.settings.columns import COLUMNS

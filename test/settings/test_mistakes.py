@@ -14,8 +14,6 @@
 
 """Mistakes of people and spreadsheets in both files, and what is told of each with its place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.plan.report import make_report, setting_remarks

@@ -14,8 +14,6 @@
 
 """Tags and topics become names that ROS takes."""
 
-from __future__ import annotations
-
 import re
 
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise

@@ -14,8 +14,6 @@
 
 """The net CSV: ranges, defaults and the numbered texts of its errors."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum

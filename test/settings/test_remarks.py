@@ -14,8 +14,6 @@
 
 """What is odd about valid settings, and where it stands."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.settings.map_file import load_mappings

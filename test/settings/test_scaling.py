@@ -14,8 +14,6 @@
 
 """Engineering values: there and back, the rounding, and what cannot be scaled."""
 
-from __future__ import annotations
-
 from array import array
 import math
 

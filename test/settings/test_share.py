@@ -14,8 +14,6 @@
 
 """The column Share: places, and what is wrong with one."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import make_network, Network

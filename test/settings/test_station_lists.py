@@ -14,8 +14,6 @@
 
 """Lists of stations."""
 
-from __future__ import annotations
-
 from abdf1_ros.settings.station_lists import parse_stations
 import pytest
 

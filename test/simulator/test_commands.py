@@ -14,8 +14,6 @@
 
 """The commands that the simulator takes while it runs."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
 from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
@@ -88,8 +86,7 @@ def test_command_that_is_wrong_changes_nothing(
 
 
 @pytest.mark.parametrize('line', ['hush 1', 'silent 3'])
-def test_bad_command_is_told_the_commands_and_no_more(
-        plcs: list[SimulatedPlc], line: str) -> None:
+def test_bad_command_is_told_the_commands_and_no_more(plcs: list[SimulatedPlc], line: str) -> None:
     with pytest.raises(CommandError) as caught:
         execute(line, plcs)
     lines = str(caught.value).split('\n')
@@ -138,8 +135,7 @@ def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> Non
     ('msg 12 N7:0 x', 'msg N7:0: "x" should be a number'),
     ('slow 12 3', '"slow 12 3" is not a command'),
     ('delay 12 3', '"delay 12 3" is not a command')])
-def test_bad_command_on_a_full_duplex_line(
-        plcs: list[SimulatedPlc], line: str, text: str) -> None:
+def test_bad_command_on_a_full_duplex_line(plcs: list[SimulatedPlc], line: str, text: str) -> None:
     with pytest.raises(CommandError) as caught:
         execute(line, plcs, True)
     assert str(caught.value).startswith(text)

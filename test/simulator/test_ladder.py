@@ -14,8 +14,6 @@
 
 """The ladder of the heartbeats in virtual time: the simulator's, and that of the tutorial."""
 
-from __future__ import annotations
-
 from random import Random
 
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile

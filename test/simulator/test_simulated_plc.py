@@ -14,8 +14,6 @@
 
 """The simulated PLC: its data file, its motions and its faults, on a clock of the test."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.df1 import frames

@@ -14,8 +14,6 @@
 
 """Captures: written, read again, limited, refused."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 import stat

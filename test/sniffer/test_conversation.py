@@ -14,8 +14,6 @@
 
 """Which reply belongs to which command, and what is said twice."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.conversation import Conversation, MessageFacts

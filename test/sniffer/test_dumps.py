@@ -14,8 +14,6 @@
 
 """Files of recorded bytes, as several programs write them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.problems import Problem
@@ -33,8 +31,7 @@ def joined(lines: list[str]) -> bytes:
 
 def xxd(data: bytes) -> list[str]:
     """Return what xxd prints."""
-    return [f'{at:08x}: {part.hex(" ", -2):<39}  {_characters(part)}'
-            for at, part in _parts(data)]
+    return [f'{at:08x}: {part.hex(" ", -2):<39}  {_characters(part)}' for at, part in _parts(data)]
 
 
 def hexdump(data: bytes) -> list[str]:
@@ -132,8 +129,7 @@ def test_zeros_are_no_text(tmp_path: Path, content: bytes) -> None:
 
 def test_line_of_1_mb_is_read_and_a_longer_one_refused(tmp_path: Path) -> None:
     longest = b'10' * 500_000
-    assert [len(chunk.data) for chunk in chunks(tmp_path / 'x', b'10\n' + longest)] == [
-        1, 500_000]
+    assert [len(chunk.data) for chunk in chunks(tmp_path / 'x', b'10\n' + longest)] == [1, 500_000]
     with pytest.raises(Problem, match='x:2: the line is longer than 1 MB; divide it, or for a '
                                       'file of raw bytes give --binary'):
         chunks(tmp_path / 'x', b'10\n' + longest + b'1')

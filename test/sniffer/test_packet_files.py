@@ -14,8 +14,6 @@
 
 """pcap and pcapng: our own, PCCC in EtherNet/IP, and files that are damaged."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 import struct

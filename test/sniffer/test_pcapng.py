@@ -14,8 +14,6 @@
 
 """Packets for Wireshark: the blocks of draft-ietf-opsawg-pcapng, written out by hand."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -14,8 +14,6 @@
 
 """The sniffer on what was recorded between our programs and those of others."""
 
-from __future__ import annotations
-
 from abdf1_ros.sniffer.entries import Kind
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from support.captures import Capture, CAPTURES, FOLDER

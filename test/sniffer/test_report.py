@@ -14,8 +14,6 @@
 
 """Entries and summaries as text and as JSON."""
 
-from __future__ import annotations
-
 import json
 
 from abdf1_ros.df1.checksum import Checksum

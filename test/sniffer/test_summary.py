@@ -14,8 +14,6 @@
 
 """What all the traffic comes to."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction

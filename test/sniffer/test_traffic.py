@@ -14,8 +14,6 @@
 
 """From bytes to entries: on vectors, whole conversations, and anything else."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from abdf1_ros.df1 import frames
@@ -210,8 +208,7 @@ def test_master_resets_the_line() -> None:
     assert (entries[-1].text, entries[-1].direction) == ('resets all slaves', OUT)
 
 
-@for_all('vector', [
-    vector for vector in VECTORS if vector.frame])
+@for_all('vector', [vector for vector in VECTORS if vector.frame])
 def test_every_vector_is_told_as_what_it_is(vector: Vector) -> None:
     entries = [entry for entry in decode([(UNKNOWN, vector.frame)],
                                          TrafficDecoder(vector.checksum, vector.duplex))

@@ -18,8 +18,6 @@ The dissector against sniff: tshark and --json say the same of every recorded by
 What stands on the line goes to tshark as it was heard, so both take it apart by themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import json
 from pathlib import Path

@@ -14,8 +14,6 @@
 
 """Many cases of plain data in one test."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 import functools
 import inspect
@@ -31,8 +29,7 @@ def for_all(names: str | Sequence[str], items: Iterable[Any],
     pytest many times what the test itself does.
     """
     names = (names,) if isinstance(names, str) else names
-    cases = [dict(zip(names, (item,) if len(names) == 1 else item, strict=True))
-             for item in items]
+    cases = [dict(zip(names, (item,) if len(names) == 1 else item, strict=True)) for item in items]
     assert cases
 
     def decorate(test: Callable[..., None]) -> Callable[..., None]:

@@ -14,8 +14,6 @@
 
 """A clock that tests set themselves, and one that does not count what a busy host takes."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 import os
 from pathlib import Path

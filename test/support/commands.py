@@ -14,8 +14,6 @@
 
 """Commands of the package in this process, and the simulators that they talk to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

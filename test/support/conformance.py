@@ -14,8 +14,6 @@
 
 """Runs of the conformance cases on a line in virtual time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol
 

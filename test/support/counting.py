@@ -13,8 +13,6 @@
 # limitations under the License.
 """How much work something is: instructions of the interpreter, which no load changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 import sys

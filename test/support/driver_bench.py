@@ -14,8 +14,6 @@
 
 """A driver and simulated PLCs on a virtual line."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 import heapq
 import itertools
@@ -179,8 +177,7 @@ class DriverBench:
             self.network, mappings, settings or DriverSettings(), listener or self.listener)
         self._stations: list[Responder] = []
         self.far = _FarEnd(self._stations, self.network)
-        self.line = VirtualLine(
-            self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
+        self.line = VirtualLine(self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], None]]] = []
         self._count = itertools.count()
         self._mappings, self._settings = mappings, settings or DriverSettings()
@@ -195,8 +192,7 @@ class DriverBench:
 
     def plc(self, station: int, plc: str, *areas: tuple[str, int]) -> SimulatedPlc:
         """Put a PLC on the line."""
-        made = simulated_plc(
-            station, plc, self.clock, *areas, checksum=self.network.error_code)
+        made = simulated_plc(station, plc, self.clock, *areas, checksum=self.network.error_code)
         if self.network.duplex is Duplex.FULL:
             made.be_full_duplex()
         self.connect(made)

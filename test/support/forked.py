@@ -19,8 +19,6 @@ The imports of a node take 0.5 s of processor time, and the tests start hundreds
 A fork has arguments, environment, folder, standard streams and an exit status of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from multiprocessing import get_context

@@ -14,8 +14,6 @@
 
 """Every way to put a few things into groups, for searches that leave nothing out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 import itertools
 from typing import TypeVar

@@ -14,8 +14,6 @@
 
 """Mappings without a file, and files without a folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import tempfile
 from typing import Any
@@ -67,8 +65,7 @@ def load_rows(*rows: str) -> tuple[list[Mapping], list[Problem]]:
     return load_text('\n'.join([HEADER, *rows]))
 
 
-GOOD = {'Tag': 'a', 'Command': 'ReadWrite', 'Address': 'N7:0', 'Station': '1',
-        'PLC_Type': 'PLC5'}
+GOOD = {'Tag': 'a', 'Command': 'ReadWrite', 'Address': 'N7:0', 'Station': '1', 'PLC_Type': 'PLC5'}
 
 
 def row(**cells: str) -> str:

@@ -14,8 +14,6 @@
 
 """Half-duplex lines with several nodes: masters of both kinds, slaves that ask by themselves."""
 
-from __future__ import annotations
-
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterable
 from dataclasses import asdict
@@ -78,8 +76,7 @@ class Told(Machine):
 
     def __init__(self, procedure: Callable[[Machine], Procedure], settings: MasterSettings,
                  timing: LineTiming | None) -> None:
-        super().__init__(procedure, checksum=settings.checksum, timing=timing,
-                         forget_on_send=True)
+        super().__init__(procedure, checksum=settings.checksum, timing=timing, forget_on_send=True)
         self.log: list[tuple[float, str]] = []
         self.sent: list[bytes] = []
         self._reader = FrameDecoder(settings.checksum, Duplex.HALF)

@@ -20,8 +20,6 @@ manual allows. Bytes are made and read by a codec that is neither that of the pa
 ``conform``: a receiver takes them one at a time. Time is virtual.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Generator
 from enum import auto, Enum
@@ -652,8 +650,7 @@ class MutatedMaster(Wire):
 
     def _poll(self, station: int = 1) -> None:
         check = 'CRC' if self.has(Habit.POLL_WITH_CRC) else 'BCC'
-        self.say(bytes((_DLE, _ENQ)) + self.number(station)
-                 + _checked(bytes((station,)), check))
+        self.say(bytes((_DLE, _ENQ)) + self.number(station) + _checked(bytes((station,)), check))
 
     def _transactions(self) -> Generator[float, Symbol | None, None]:
         while True:

@@ -14,8 +14,6 @@
 
 """A pseudo-terminal with simulated PLCs at its other end, in this process."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

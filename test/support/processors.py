@@ -14,8 +14,6 @@
 
 """What real processors have answered: vectors/processors.json with types."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import json
 from typing import Any

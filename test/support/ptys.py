@@ -14,8 +14,6 @@
 
 """Pseudo-terminals whose other end the test holds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import os
 from pathlib import Path

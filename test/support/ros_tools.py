@@ -20,8 +20,6 @@ it is missing, unless ABDF1_ROS_TOOLS is set, which ``make test-ros`` does: nobo
 that something has passed which has not been run.
 """
 
-from __future__ import annotations
-
 import importlib
 from importlib.util import find_spec
 import os

@@ -14,8 +14,6 @@
 
 """The files of a bridge, and the simulator that goes with them as a process."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

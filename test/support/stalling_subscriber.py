@@ -14,8 +14,6 @@
 
 """A subscriber that keeps the last value reliably, and says when it gets one."""
 
-from __future__ import annotations
-
 import rclpy
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int16MultiArray

@@ -14,8 +14,6 @@
 
 """The node in a process whose wall clock steps: SIGUSR1 an hour ahead, SIGUSR2 an hour back."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import time

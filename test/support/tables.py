@@ -14,8 +14,6 @@
 
 """Data tables of emulated PLCs, written and asked in hexadecimal."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address

@@ -14,8 +14,6 @@
 
 """What fails among many cases is named, and nothing is left out."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

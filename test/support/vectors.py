@@ -14,8 +14,6 @@
 
 """The frames of vectors/, with types, and the tables of the driver's specification."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 import json

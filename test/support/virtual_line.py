@@ -21,8 +21,6 @@ full-duplex peers. Nothing waits: the clock jumps to the next arrival or deadlin
 has time to spare hears nothing until it is over, and then all that has come.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

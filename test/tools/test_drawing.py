@@ -14,8 +14,6 @@
 
 """The drawing shows the arrows of the code, and none of them leads back."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

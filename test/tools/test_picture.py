@@ -14,8 +14,6 @@
 
 """Pictures of terminals show what the command has printed, and only when it went well."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import sys
 from xml.etree import ElementTree

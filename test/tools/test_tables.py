@@ -14,8 +14,6 @@
 
 """The generated tables leave nothing out."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.families import FAMILIES, file_types_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import types_of
@@ -39,8 +37,7 @@ def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
 
 
 @for_all(('label', 'examples'), tables.PLACES)
-def test_places_of_one_row_have_the_same_types(label: str,
-                                               examples: dict[PlcType, str]) -> None:
+def test_places_of_one_row_have_the_same_types(label: str, examples: dict[PlcType, str]) -> None:
     kinds = {types_of(parse_address(text, plc_type)) for plc_type, text in examples.items()}
     assert len(kinds) == 1, label
 

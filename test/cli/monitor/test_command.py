@@ -14,8 +14,6 @@
 
 """The monitor as a process, beside a bridge and its simulator."""
 
-from __future__ import annotations
-
 import codecs
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -50,8 +48,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 
 @pytest.fixture(scope='module')
 def simulator(files: Files) -> Iterator[Process]:
-    with files.start_simulator() as simulator, \
-            Process('node', *files.args(), *ARGUMENTS) as node:
+    with files.start_simulator() as simulator, Process('node', *files.args(), *ARGUMENTS) as node:
         with Observer() as observer:
             until_status(observer.diagnostics(files.port), 'mappings', OK)
         yield simulator

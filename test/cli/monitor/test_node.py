@@ -14,8 +14,6 @@
 
 """What the monitor hears, of a node that publishes as a bridge does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import time
 
@@ -136,8 +134,7 @@ def test_complete_are_diagnostics_all_topics_and_every_promised_value(
     until(watch, lambda picture: picture.statuses[0].message == 'OK: 2')
     assert watch.is_complete
     promised = make_mapping('N7:2', tag='promised')
-    bridge.node.create_publisher(
-        Int16MultiArray, '~/read/promised', read_qos(promised, PROMISE))
+    bridge.node.create_publisher(Int16MultiArray, '~/read/promised', read_qos(promised, PROMISE))
     until(watch, lambda picture: len(picture.readings) == 3)
     assert not watch.is_complete
 
@@ -155,8 +152,7 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -
     assert (found.section, found.message, found.style, found.values) == (
         'link', 'WARN: slow', Style.WARNING, {'settings': '9600 baud'})
     bridge.status('cell/line_a: station 1', 'ERROR: silent', DiagnosticStatus.ERROR)
-    (station,) = until(
-        watch, lambda picture: picture.statuses[0].section != 'link').statuses
+    (station,) = until(watch, lambda picture: picture.statuses[0].section != 'link').statuses
     assert (station.section, station.style) == ('station 1', Style.BAD)
 
 

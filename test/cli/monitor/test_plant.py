@@ -14,8 +14,6 @@
 
 """A line of text for each bridge."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from abdf1_ros.cli.monitor.command import main

@@ -14,8 +14,6 @@
 
 """The lines that show a running bridge."""
 
-from __future__ import annotations
-
 from abdf1_ros.cli.monitor.view import (
     Reading,
     render,
@@ -177,8 +175,7 @@ def test_values_are_cut_to_what_fits(values: list[float], width: int, text: str)
 
 @given(st.lists(st.integers() | st.floats(), max_size=50) | st.text(),
        st.integers(min_value=3, max_value=60))
-def test_values_never_take_more_than_their_width(
-        values: list[float] | str, width: int) -> None:
+def test_values_never_take_more_than_their_width(values: list[float] | str, width: int) -> None:
     text = show(values, width)
     assert len(text) <= width
     assert text.isprintable()

@@ -14,8 +14,6 @@
 
 """The clock of simulated PLCs: shown, set, and what stands in the way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -84,8 +82,7 @@ def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:
 
 def test_family_without_a_known_clock(port: str, capsys: Output) -> None:
     said = call(main, capsys, 'clock', '3', '--port', port)
-    assert (said.status, said.err) == (
-        1, 'plc: station 3: is a PLC-2, whose clock is not known\n')
+    assert (said.status, said.err) == (1, 'plc: station 3: is a PLC-2, whose clock is not known\n')
 
 
 def test_refused_write_is_told(port: str, capsys: Output) -> None:

@@ -14,8 +14,6 @@
 
 """The command ``plc`` on simulated lines: every subcommand, its output and exit status."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
@@ -148,8 +146,7 @@ def test_read_in_another_radix(plc: Plc) -> None:
     assert said.lines == ['N7:10 0065 0066 0067']
 
 
-def test_read_over_a_net_file(line: str, files: Files,
-                              capsys: pytest.CaptureFixture[str]) -> None:
+def test_read_over_a_net_file(line: str, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     net = write_csv(files.folder / 'plc.csv', 'Com_Port,Baud,Timeout', [f'{line},115200,100'])
     assert call(main, capsys, 'read', 'N7:0', '--net', str(net)).lines == ['N7:0 1200']
 
@@ -563,8 +560,7 @@ def test_port_that_is_lost_ends_with_status_1(tmp_path: Path) -> None:
 @pytest.mark.parametrize('number, status', [(signal.SIGINT, 130), (signal.SIGTERM, 130)])
 def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> None:
     line = Pty(tmp_path / 'line')
-    with Process('plc', 'status', '1', '--port', str(line.name), '--timeout',
-                 '9000') as process:
+    with Process('plc', 'status', '1', '--port', str(line.name), '--timeout', '9000') as process:
         line.read(5)
         process.send(number)
         assert process.result() == status

@@ -14,8 +14,6 @@
 
 """Addresses and values of the command line."""
 
-from __future__ import annotations
-
 from array import array
 from concurrent.futures import Future
 from typing import cast

@@ -14,8 +14,6 @@
 
 """The search for settings: what is tried, in which order, and when it ends."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,8 +62,7 @@ def plc_on(path: Path, check: str, duplex: Duplex,
 
 def _full_duplex(plc: SimulatedPlc, settings: PeerSettings,
                  kind: type[FullDuplexPeer]) -> Callable[[Machine], Procedure]:
-    return lambda machine: kind(
-        machine, settings, ActiveStationList(), plc.serve).run(plc)
+    return lambda machine: kind(machine, settings, ActiveStationList(), plc.serve).run(plc)
 
 
 def test_usual_baud_rates_come_first_and_none_is_left_out() -> None:

@@ -24,8 +24,6 @@ read them: FactoryTalk Optix (RSLogix500_TagImporter) and a parser of exports of
 (SLCTagParser).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
@@ -161,8 +159,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     assert main([*options[:3], str(other.parent)]) == 1
     said = capsys.readouterr()
     assert f'{source}:5: ' in said.err
-    assert said.out.splitlines()[1:] == [
-        f'how to go on: {called("check")} net.csv {other}']
+    assert said.out.splitlines()[1:] == [f'how to go on: {called("check")} net.csv {other}']
 
 
 @pytest.mark.parametrize('text', ['a,b\n1,2\n', '', 'Tag,Command,Address\n'])

@@ -14,8 +14,6 @@
 
 """First files of a line, the data files of a PLC, and the ports of this machine."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 import time
@@ -49,8 +47,7 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield name
 
 
-def test_init_writes_files_that_the_node_takes(
-        port: str, tmp_path: Path, capsys: Output) -> None:
+def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys: Output) -> None:
     assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
                  '--stations', '1-3']) == 0
     said = capsys.readouterr().out
@@ -100,8 +97,7 @@ def test_plc_that_falls_silent_after_it_was_found(
     assert [mapping.station for mapping in mappings] == [1]  # not a map for nobody
 
 
-def test_init_leaves_files_alone_that_are_there(
-        port: str, tmp_path: Path, capsys: Output) -> None:
+def test_init_leaves_files_alone_that_are_there(port: str, tmp_path: Path, capsys: Output) -> None:
     (tmp_path / 'map.csv').write_text('mine', encoding='utf-8')
     assert main(['init', '--port', port, '--into', str(tmp_path)]) == 2
     assert 'map.csv: is there already' in capsys.readouterr().err
@@ -219,8 +215,7 @@ def test_ports_are_listed_with_what_keeps_one_from_opening_them(
     assert 'usermod -aG dialout' in said.err
 
 
-def test_machine_without_ports_says_so(
-        monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+def test_machine_without_ports_says_so(monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
     _with_ports(monkeypatch)
     assert main(['ports']) == 1
     assert 'no serial port' in capsys.readouterr().err

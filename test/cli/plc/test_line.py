@@ -14,8 +14,6 @@
 
 """The line that options and a net CSV describe together."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from abdf1_ros.cli.plc.line import DEFAULTS, network_of

@@ -14,8 +14,6 @@
 
 """The command line of ``plc``."""
 
-from __future__ import annotations
-
 import argparse
 
 from abdf1_ros.cli.plc.options import make_parser

@@ -14,8 +14,6 @@
 
 """Who is there: what is shown of a station, and what to look at when there is none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import threading
 import time
@@ -67,8 +65,7 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
         line.write(b'\x55\xaa\x00')
         presence = look_at(session, 1)
         assert presence.error is not None
-        assert hint(session, presence.error).startswith(
-            f'{asked}3 characters came, but no answer')
+        assert hint(session, presence.error).startswith(f'{asked}3 characters came, but no answer')
         assert hint(session, FormatError('x')) == ''
     line.close()
 

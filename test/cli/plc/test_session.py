@@ -14,8 +14,6 @@
 
 """A session on a pseudo-terminal: what becomes of requests when the port is lost."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 import threading

@@ -14,8 +14,6 @@
 
 """Values live, against PLCs on a pseudo-terminal."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Iterator
 import io

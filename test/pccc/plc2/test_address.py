@@ -14,8 +14,6 @@
 
 """Addresses of a PLC-2."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType

@@ -14,8 +14,6 @@
 
 """The commands of a PLC-2 against printed and computed frames."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, ByteChange

@@ -14,8 +14,6 @@
 
 """Requests with the commands of a PLC-2."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address

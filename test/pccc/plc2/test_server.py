@@ -14,8 +14,6 @@
 
 """What emulated PLCs answer to the commands of a PLC-2."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server

@@ -14,8 +14,6 @@
 
 """Addresses of a PLC-3."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
@@ -39,8 +37,7 @@ PLC3 = PlcType.PLC3
     ('T:4/15', 'E3.1.3.0.4.0/15', 'T:4.CTL/15', 12),
     ('T:4.CTL/17', 'E3.1.3.0.4.0/17', 'T:4.CTL/17', 12),
     ('C:9999.PRE', 'E3.1.4.0.9999.1', 'C:9999.PRE', 29998)])
-def test_both_forms_name_the_same_place(text: str, levels: str, shown: str,
-                                        offset: int) -> None:
+def test_both_forms_name_the_same_place(text: str, levels: str, shown: str, offset: int) -> None:
     address = parse_address(text, PLC3)
     assert address == parse_address(levels, PLC3)
     assert (str(address), address.offset) == (shown, offset)

@@ -14,8 +14,6 @@
 
 """The extended address of a PLC-3 on the line."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress

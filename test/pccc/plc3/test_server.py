@@ -14,8 +14,6 @@
 
 """What an emulated PLC-3 answers to its own commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
@@ -47,8 +45,7 @@ def test_file_read_of_the_vectors() -> None:
 
 
 def test_file_read_begins_at_the_first_word() -> None:
-    assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (
-        0xF0, '06')
+    assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (0xF0, '06')
 
 
 def test_files_are_numbered_in_each_section() -> None:

@@ -14,8 +14,6 @@
 
 """The PLC-5 commands, byte for byte."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.fields import Reader

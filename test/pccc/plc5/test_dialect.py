@@ -14,8 +14,6 @@
 
 """Requests to a PLC-5 with typed commands, and its replies."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
@@ -121,8 +119,7 @@ def test_largest_write_to_a_plc5_fits_its_packets(text: str) -> None:
 
 def test_internal_words_of_a_timer_are_left_out() -> None:
     timers = TypedData(5, 10, bytes(range(20))).encode()
-    assert DIALECT.read_data(at('T4:0'), 6, timers) == (
-        bytes(range(6)) + bytes(range(10, 16)))
+    assert DIALECT.read_data(at('T4:0'), 6, timers) == (bytes(range(6)) + bytes(range(10, 16)))
 
 
 def test_timer_of_six_bytes_is_taken_too() -> None:

@@ -14,8 +14,6 @@
 
 """What an emulated PLC-5 answers to its own commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 from support.cases import for_all
@@ -34,8 +32,7 @@ def test_plc5_timer_is_written_with_its_two_internal_words() -> None:
     words = table(PLC5, T4_0='00 00' * 9)
     assert ask(words, '67 00 00 02 00 07 00 04 01 99 09 16 59 0A 00 C2 0A 00 09 00 01 01 01 01 '
                       '00 C3 0B 00 08 00 01 01 01 01') == (0, '')
-    assert words_at(words, 'T4:0', 9) == (
-        '00 00 00 00 00 00 00 C2 0A 00 09 00 00 C3 0B 00 08 00')
+    assert words_at(words, 'T4:0', 9) == ('00 00 00 00 00 00 00 C2 0A 00 09 00 00 C3 0B 00 08 00')
 
 
 def test_plc5_member_is_an_integer() -> None:

@@ -14,8 +14,6 @@
 
 """The SLC commands, byte for byte."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

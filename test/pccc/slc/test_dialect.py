@@ -14,8 +14,6 @@
 
 """Requests to an SLC or MicroLogix, and its replies."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
@@ -96,8 +94,7 @@ def test_largest_transfers_of_an_slc(text: str) -> None:
     ('5/01', 82, 82), ('5/02', 82, 82), ('ML1000', 82, 82), ('5/03', 236, 234),
     ('5/04', 236, 234), ('5/05', 236, 234), ('ML1100', 206, 206), ('ML1200', 206, 206),
     ('ML1400', 206, 206), ('ML1500', 206, 206)])
-def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int,
-                                                         write: int) -> None:
+def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int, write: int) -> None:
     dialect = SlcDialect(Processor(name))
     assert 2 * dialect.max_read(FileType.INTEGER) == read
     assert 2 * dialect.max_write(FileType.INTEGER) == write

@@ -14,8 +14,6 @@
 
 """The file directory of an SLC or MicroLogix: recorded, emulated, and of strange bytes."""
 
-from __future__ import annotations
-
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.data_table import DataTable

@@ -14,8 +14,6 @@
 
 """What an emulated SLC answers to its own commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 from support.cases import for_all

@@ -14,8 +14,6 @@
 
 """Word range commands and bit write against printed and computed frames."""
 
-from __future__ import annotations
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress

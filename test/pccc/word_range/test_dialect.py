@@ -14,8 +14,6 @@
 
 """Word range requests to a PLC-3 and a PLC-5."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Transfer
 from abdf1_ros.pccc.families import parse_address

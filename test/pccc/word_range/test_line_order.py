@@ -14,8 +14,6 @@
 
 """The order of the words of floats in word range commands."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType

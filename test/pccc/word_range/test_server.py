@@ -14,8 +14,6 @@
 
 """What an emulated PLC-5 answers to word range commands and bit writes."""
 
-from __future__ import annotations
-
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
