@@ -255,12 +255,13 @@ class RadioNode(EqualNode):
         packet = Packet.decode(symbol.data)
         if packet.src in self._settings.numbers:
             return  # ours, sent on by another node
-        is_ours = packet.dst in self._settings.numbers or packet.dst == BROADCAST
+        is_ours = packet.dst in self._settings.numbers
         known = self._known(symbol.data)
         recent = known or self._remember(symbol.data)
-        if known is None and {packet.src, packet.dst} <= {*self._settings.store_forward}:
+        between = {packet.src, packet.dst}
+        if known is None and not is_ours and between <= {*self._settings.store_forward}:
             self._put(symbol.data)
-        if not is_ours:
+        if not is_ours and packet.dst != BROADCAST:
             return
         self._counters.messages_received += 1
         if not packet.is_sound:

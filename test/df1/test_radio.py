@@ -215,6 +215,12 @@ def test_packets_between_nodes_of_the_table_are_sent_on_once() -> None:
     assert bench.wait(1.0) == []
 
 
+def test_packet_for_us_is_not_sent_on() -> None:
+    bench = Bench(store_forward={PLC, US})
+    bench.hear(framed(THEIRS))
+    assert bench.wait(1.0) == [framed(THEIRS.reply(bytes((US,)) + THEIRS.data))]
+
+
 def test_broadcast_is_sent_on_where_the_table_has_255() -> None:
     bench = Bench(store_forward={PLC, BROADCAST})
     bench.hear(framed(THEIRS._replace(dst=BROADCAST)))
