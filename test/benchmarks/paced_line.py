@@ -19,7 +19,7 @@ Between them a thread for each direction hands on every byte at the moment it wo
 the port (10 bits a character). ``measure`` runs the driver at one end against simulated
 stations at the other, and counts what it does in a time.
 
-``answering_line`` is for measuring the driver alone: line and stations are one process, which
+``answering_socket`` is for measuring the driver alone: line and stations are one process, which
 knows what it will answer while the question is still "on the line". So its answers begin at
 the exact time, and all that is lost is lost by the driver and the operating system.
 """
@@ -31,6 +31,7 @@ import math
 import os
 import select
 import signal
+import socket
 import threading
 import time
 import tty
@@ -229,8 +230,7 @@ class _AnsweringLine:
 
     def run(self) -> None:
         """Answer for ever."""
-        with suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+        _go_ahead()
         self._far.start(time.monotonic())
         while True:
             deadline = self._far.deadline
@@ -261,14 +261,31 @@ class _AnsweringLine:
 
 
 @contextmanager
-def answering_line(near: Machine, far: Machine, baud: int,
-                   response_time: float = 0.0) -> Iterator[LinkThread]:
-    """Run ``near`` in a thread, on a line at whose end ``far`` answers, in another process."""
-    with answering_pty(far, BITS / baud, response_time) as ours:
-        link = LinkThread(near, lambda: DescriptorPort(ours, lambda: None))
-        link.start()
-        yield link
-        link.stop()
+def answering_socket(far: Machine, char_time: float) -> Iterator[int]:
+    """
+    Give the near end of a line that has no pseudo-terminal, else as ``answering_pty``.
+
+    What is written to a pseudo-terminal is handed on by a thread of the kernel, which mostly waits
+    until the writer leaves the processor. A port sends at once, and so does a socket. Where there
+    are several processors each end has its own, and is ahead of all others if that is allowed.
+    """
+    processors = os.sched_getaffinity(0)
+    theirs, ours = socket.socketpair()
+    with ours, theirs, _answering(theirs.fileno(), ours.fileno(), far, char_time) as process:
+        os.sched_setaffinity(process, {max(processors)})
+        os.sched_setaffinity(0, processors - {max(processors)} or processors)
+        _go_ahead()
+        try:
+            yield ours.fileno()
+        finally:
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+            os.sched_setaffinity(0, processors)
+
+
+def _go_ahead() -> None:
+    """Run before all other processes, where that is allowed."""
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
 
 
 @contextmanager
@@ -282,6 +299,18 @@ def answering_pty(far: Machine, char_time: float, response_time: float = 0.0,
     theirs, ours = os.openpty()
     tty.setraw(ours)
     tty.setraw(theirs)
+    try:
+        with _answering(theirs, ours, far, char_time, response_time, sent):
+            os.close(theirs)
+            yield ours
+    finally:
+        os.close(ours)
+
+
+@contextmanager
+def _answering(theirs: int, ours: int, far: Machine, char_time: float, response_time: float = 0.0,
+               sent: Callable[[bytes], None] = lambda data: None) -> Iterator[int]:
+    """Answer in another process, for as long as this lasts; give its number."""
     process = os.fork()
     if process == 0:
         try:
@@ -289,13 +318,11 @@ def answering_pty(far: Machine, char_time: float, response_time: float = 0.0,
             _AnsweringLine(theirs, far, char_time, response_time, sent).run()
         finally:
             os._exit(1)
-    os.close(theirs)
     try:
-        yield ours
+        yield process
     finally:
         os.kill(process, signal.SIGKILL)
         os.waitpid(process, 0)
-        os.close(ours)
 
 
 def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedPlc],
