@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
@@ -39,6 +40,7 @@ from abdf1_ros.messages import Event, Message
 
 # How often (s) a slave looks what has become overdue.
 TICK = 0.25
+_MOMENT = 0.0001  # s after the last byte
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +152,21 @@ class HalfDuplexSlave:
         """Do not send a command of our own again; the caller has ended it."""
         if self._held is not None and not self._held.packet.is_reply:
             self._held = None
+
+    @property
+    def gives_command(self) -> bool:
+        """Tell whether the last response is a command of our own."""
+        return self._just_sent and self._held is not None and not self._held.packet.is_reply
+
+    def take_back(self) -> bool:
+        """Forget a command that was given and has not left; return whether it had been before."""
+        held, self._held, self._just_sent = self._held, None, False
+        assert held is not None
+        was_sent = held.sent > 1
+        self.counters.messages_sent -= 1
+        self.counters.nak_retries -= was_sent
+        self.counters.commands_sent -= not was_sent
+        return was_sent
 
     def _release(self, error: LinkError | None = None) -> None:
         """Drop the held message; the sender of a command is told the result (KF2 4-31)."""
@@ -264,9 +281,12 @@ class Responder(Protocol):
 
 
 def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
-           look: Callable[[], None] = lambda: None) -> Generator[Step, Heard, None]:
+           look: Callable[[], None] = lambda: None,
+           expires: Callable[[], float] = lambda: math.inf) -> Generator[Step, Heard, None]:
     """
     Send the answer of ``handle`` to ``symbol`` after TX_Delay; meanwhile call ``look`` repeatedly.
+
+    ``expires`` tells the clock value (s) after which an answer must not leave: CommandExpired.
 
     A master that has sent something else does not wait for the old answer any more, and would take
     it for the answer to the new symbol. So a poll or a message is ignored when another symbol has
@@ -278,7 +298,10 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
         if _wants_answer(symbol):
             heard = yield from _next_within(machine, machine.tx_delay, look)
         if heard is None and (data := handle(symbol)):
-            yield Step(data, 0, AT_ONCE)
+            # At once, but for what has an age: that is looked at by whoever has the port.
+            limit = expires()
+            after = yield Step(data, 0 if limit == math.inf else _MOMENT, AT_ONCE, limit)
+            heard = None if isinstance(after, Silence) else after
 
 
 def _wants_answer(symbol: Symbol) -> bool:

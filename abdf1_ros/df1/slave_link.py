@@ -23,6 +23,7 @@ command is sent when the polls come back.
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.link import LinkStatus
@@ -72,12 +73,28 @@ class SlaveLink:
             # At a fixed time, not so long after each symbol: the line may never be quiet.
             symbol = yield Step(None, max(0.0, next_look - self._machine.now))
             if not isinstance(symbol, Silence):
-                yield from answer(
-                    self._machine, symbol, self._slave.respond, lambda: self._look_after(source))
+                try:
+                    yield from answer(self._machine, symbol, self._slave.respond,
+                                      lambda: self._look_after(source), self._expiry)
+                except CommandExpired as error:
+                    self._take_back(error)
                 self._slave.make_use()
             if self._machine.now >= next_look:
                 self._look_after(source)
                 next_look = self._machine.now + TICK
+
+    def _expiry(self) -> float:
+        """Return when the answer that is given now is too old, infinite unless it is a command."""
+        entry = self._outstanding
+        return math.inf if entry is None or not self._slave.gives_command else entry.task.expires
+
+    def _take_back(self, error: CommandExpired) -> None:
+        """End a command that was too old when the port was to have it."""
+        entry, self._outstanding = self._outstanding, None
+        was_sent = self._slave.take_back()
+        if entry is not None:
+            entry.task.sent = was_sent
+            entry.task.fail(error)
 
     def polled(self) -> None:
         self.last_poll = self._machine.now

@@ -21,7 +21,7 @@ from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, pol
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.slave import SlaveSettings
-from abdf1_ros.errors import CommandTimeout, PortLost, WrongCommandCode
+from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost, WrongCommandCode
 import pytest
 from support.multidrop import SlaveBench
 
@@ -111,6 +111,28 @@ def test_held_command_is_sent_again_until_its_limit_and_then_returned_with_an_er
     assert bench.counts() == {
         'polls_received': 4, 'messages_sent': 4, 'commands_sent': 2, 'nak_retries': 2,
         'nak_limit_exceeded': 1}
+
+
+@pytest.mark.parametrize('sent_before', [0, 1])
+def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
+        sent_before: int) -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    task.expires = bench.now + 2.0
+    assert [bench.poll() for _ in range(sent_before)] == [bench.own(own())] * sent_before
+    bench.machine.receive_data(poll_frame(US), bench.now)
+    assert bench.machine.send_before == task.expires
+    bench.machine.withdraw(bench.now + 3.0)  # this process was stopped just then
+    assert bench.machine.data_to_send() == b''
+    assert isinstance(task.result, CommandExpired)
+    assert task.sent is bool(sent_before)
+    counts = bench.counts()
+    assert [counts.get(name, 0) for name in ('messages_sent', 'commands_sent', 'nak_retries')] == [
+        sent_before, sent_before, 0]
+    bench.now += 3.0
+    assert bench.poll() == EOT
+    bench.hear(bench.frame(FROM_MASTER))
+    assert bench.poll() == bench.own(FROM_MASTER.reply())
 
 
 def test_nak_fails_the_command_that_is_held() -> None:
