@@ -23,12 +23,15 @@ disk.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
+from collections import defaultdict, deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 import traceback
 
 from abdf1_ros.messages import Event, Message, Severity
+from abdf1_ros.pccc.address import Area
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -47,10 +50,27 @@ MOST_CAUSES = 1000
 MOST_ENTRIES = 10
 _MINUTE = 60.0
 
+# Rows of a file that fail one after the other are told together after a pause of so many seconds.
+_PAUSE = 1.0
+_LONGEST = 10.0
+
+_MOST_NAMES = 5
+
 # Events of every transaction, and those that come with another event that is logged.
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
+
+
+def few(names: Sequence[str]) -> str:
+    """Return names as text, the first of them where there are many."""
+    more = f' and {len(names) - _MOST_NAMES} more' if len(names) > _MOST_NAMES else ''
+    return printable(', '.join(names[:_MOST_NAMES])) + more
+
+
+def where(mapping: Mapping) -> str:
+    """Return tag, address and station of a row."""
+    return f'{mapping.tag} ({mapping.address} at station {mapping.station})'
 
 
 def bug_text(error: Exception) -> str:
@@ -176,3 +196,40 @@ class LimitedLog:
         count, subject.left_out = subject.left_out, 0
         return printable(text) + (f' ({count} more about {printable(about)} were not logged)'
                                   if count else '')
+
+
+class UnreadableRows:
+    """
+    Why rows have no value: one entry of ``log`` for those of a file with one reason.
+
+    A PLC that lacks a file refuses its rows one after the other, because what it refuses is
+    divided and asked for again. ``add`` is called in the thread of the link, ``tell`` in any.
+    """
+
+    def __init__(self, log: LimitedLog) -> None:
+        self._log = log
+        self._rows: deque[tuple[float, Mapping, str]] = deque()
+
+    def add(self, now: float, mapping: Mapping, reason: str) -> None:
+        """Take note of a row without a value at the clock value ``now`` (s)."""
+        self._rows.append((now, mapping, reason))
+
+    def look(self, now: float) -> None:
+        """Tell when no row has come for a while, or the first has waited for long."""
+        if self._rows and (now - self._rows[-1][0] >= _PAUSE or
+                           now - self._rows[0][0] >= _LONGEST):
+            self.tell()
+
+    def tell(self) -> None:
+        """Write the entries."""
+        groups: defaultdict[tuple[int, Area, str], list[Mapping]] = defaultdict(list)
+        with suppress(IndexError):  # until it is empty; another thread may do the same
+            while True:
+                _, mapping, reason = self._rows.popleft()
+                groups[mapping.station, mapping.address.area, reason].append(mapping)
+        for (station, _, reason), rows in groups.items():
+            rows.sort(key=lambda row: row.address.offset)
+            about, first = rows[0].tag, rows[0].address
+            self._log.error(about, f'{where(rows[0])}: {reason}' if len(rows) == 1 else (
+                f'{len(rows)} rows from {first} to {rows[-1].address} at station {station} '
+                f'({few([row.tag for row in rows])}): {reason}'))

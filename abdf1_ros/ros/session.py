@@ -44,7 +44,7 @@ from abdf1_ros.ros.diagnostics import changed_text, deaf_text, Diagnostics
 from abdf1_ros.ros.graph import DuplicateNameWatch, Graph, TypeWatch
 from abdf1_ros.ros.interlocks import InterlockWatch, wait_for_end
 from abdf1_ros.ros.line_figures import speed_seen
-from abdf1_ros.ros.log import EventLog, LimitedLog
+from abdf1_ros.ros.log import EventLog, few, LimitedLog, UnreadableRows, where
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.parameters import Configuration
 from abdf1_ros.ros.reads import ReadTopic, ReadTopics
@@ -64,7 +64,6 @@ from std_msgs.msg import UInt16MultiArray
 # How often (s) it is looked whether the files have changed.
 _FILE_PERIOD = 2.0
 
-_MOST_NAMES = 5  # in a line of the log
 _MOST_REMARKS = 20  # about both files, in the log
 
 _RESULT_LEVELS = {
@@ -115,6 +114,7 @@ class Session:
         self._logger = node.get_logger()
         self._log = EventLog(self._logger, line_time)
         self.notes = LimitedLog(self._logger, line_time)
+        self._unreadable = UnreadableRows(self.notes)
         self.reads = ReadTopics(node, surroundings.published)
         self.read = self.reads.read
         self.driver = Driver(configuration.network, configuration.mappings,
@@ -170,12 +170,14 @@ class Session:
 
     def end(self) -> None:
         """End what waits and watches; another session has taken over the topics."""
+        self._unreadable.tell()
         self.stop_guests()
         self.link_counters.end()
         self._interlocks.end()
 
     def begin_end(self) -> None:
         """Have heartbeats set to 0 and fallbacks written; ``finish_end`` waits for it (rule 5)."""
+        self._unreadable.tell()
         self.driver.wind_down()
         self._wake_link()
 
@@ -187,7 +189,7 @@ class Session:
         """
         tags = wait_for_end(self.driver, self._surroundings.link, give_up)
         if tags:
-            self._logger.error(f'{what} before the PLC has confirmed: {_few(tags)}')
+            self._logger.error(f'{what} before the PLC has confirmed: {few(tags)}')
 
     def _wake_link(self) -> None:
         self._surroundings.link.wake()
@@ -213,7 +215,7 @@ class Session:
             guest.collisions += 1
             self.notes.warning(
                 f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
-                f'{describe(command)}, words of {_few([row.tag for row in rows])}')
+                f'{describe(command)}, words of {few([row.tag for row in rows])}')
 
     def _guest_refused(self, guest: Guest, command: Packet) -> None:
         if guest.refused == 1:
@@ -242,13 +244,13 @@ class Session:
                   if mapping.heartbeat or mapping.fallback]
         if silent and configuration.parameters.read_only:
             self._logger.warning(
-                f'read_only: no heartbeat and no fallback value is written: {_few(silent)}')
+                f'read_only: no heartbeat and no fallback value is written: {few(silent)}')
         if not configuration.mappings:
             self._logger.warning('the map has no usable row: nothing is read or written')
         if configuration.ignored:
             self._logger.warning(
                 'parameters without effect, as the map comes from its file alone: '
-                + _few(configuration.ignored))
+                + few(configuration.ignored))
 
     # Writes
 
@@ -281,20 +283,21 @@ class Session:
     # Events of the line
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Log why a read of a station that answers has no value."""
-        self.notes.error(mapping.tag, f'{_where(mapping)}: {reason}')
+        """Have it logged why a read of a station that answers has no value."""
+        self._unreadable.add(line_time(), mapping, reason)
 
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Log that a row is not withheld any more, nor are those that depend on the same."""
+        self._unreadable.tell()
         self.notes.info(
-            mapping.tag, f'{_where(mapping)}: published again after {seconds:.1f} s')
+            mapping.tag, f'{where(mapping)}: published again after {seconds:.1f} s')
 
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
         """Log that a heartbeat is not the one that we have written (rule 19)."""
         log = self.notes.error if is_conflict else self.notes.warning
         if is_conflict:
             self.diagnostics.interlocks.conflicts[mapping.tag] = f'{mapping.address}: {text}'
-        log(mapping.tag, f'{_where(mapping)}: {text}')
+        log(mapping.tag, f'{where(mapping)}: {text}')
 
     def happened(self, event: Event) -> None:
         """Log a numbered event and remember it for the diagnostics."""
@@ -371,6 +374,7 @@ class Session:
         self.link_counters.check(now)
         self._look_at_files(now)
         self._look_at_names(now)
+        self._unreadable.look(now)
         self._tell_speed(self.driver.machine.rate.seen)
         for text in self._types.look(now):
             self.notes.warning('types of topics', text)
@@ -471,13 +475,3 @@ class Session:
         stamped = now if now.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
         publisher.publish(message)
-
-
-def _where(mapping: Mapping) -> str:
-    return f'{mapping.tag} ({mapping.address} at station {mapping.station})'
-
-
-def _few(names: Sequence[str]) -> str:
-    """Return names as text, the first of them where there are many."""
-    more = f' and {len(names) - _MOST_NAMES} more' if len(names) > _MOST_NAMES else ''
-    return printable(', '.join(names[:_MOST_NAMES])) + more

@@ -18,10 +18,11 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.ros.log import EventLog, LimitedLog, MOST_CAUSES, MOST_ENTRIES
+from abdf1_ros.ros.log import EventLog, LimitedLog, MOST_CAUSES, MOST_ENTRIES, UnreadableRows
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
 from support.clock import Clock
+from support.mappings import make_mapping
 
 LINE = re.compile(r'\[(\w+)\] \[[0-9.]+\] \[log_test\]: (.*)')
 
@@ -230,3 +231,24 @@ def test_only_a_few_lines_a_minute_are_about_one_thing(
     assert [text for _, text in logged()] == [
         r'first again (5 more about one\n were not logged)',
         r'last (1 more about one\n were not logged)']
+
+
+def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
+        lines: LimitedLog, logged: Callable[[], Lines]) -> None:
+    rows = UnreadableRows(lines)
+    for now, address, station, reason in (
+            (0.0, 'N7:5', 1, 'no'), (0.9, 'N7:2', 1, 'no'), (1.0, 'N7:1', 2, 'no'),
+            (1.1, 'N7:3', 1, 'never'), (1.2, 'N9:3', 1, 'no')):
+        rows.look(now)
+        rows.add(now, make_mapping(address, station=station, tag=address), reason)
+    rows.look(2.1)
+    assert logged() == []
+    rows.look(2.2)
+    assert [text for _, text in logged()] == [
+        '2 rows from N7:2 to N7:5 at station 1 (N7:2, N7:5): no',
+        'N7:1 (N7:1 at station 2): no', 'N7:3 (N7:3 at station 1): never',
+        'N9:3 (N9:3 at station 1): no']
+    for tick in range(101):  # they never pause
+        rows.add(10 + tick / 10, make_mapping('N7:0', tag='a'), f'{tick}')
+        rows.look(10 + tick / 10)
+    assert len(logged()) == MOST_ENTRIES

@@ -430,6 +430,22 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
     assert read_topics == {'/abdf1/read/missing', '/abdf1/read/speed'}
 
 
+def test_file_that_a_plc_lacks_is_told_in_one_line(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(*(f'm{n},Read,N99:{30 * n},1,PLC5,1,' for n in range(8)), SPEED)
+    told: list[str] = []
+
+    def is_told() -> bool:
+        told.extend(line.partition(': ')[2] for line in ''.join(capfd.readouterr()).splitlines()
+                    if 'N99' in line)
+        return bool(told)
+
+    bench.observer.until(is_told, lambda: 'an entry in the log')
+    assert told == [
+        '8 rows from N99:0 to N99:210 at station 1 (m0, m1, m2, m3, m4 and 3 more): '
+        'STS F0 EXT STS 06: address does not point to something usable']
+
+
 def test_tag_cannot_forge_lines_or_statuses(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     tag, shown = 'lamp\x0b[FATAL] all is lost\x1b[2J', r'lamp\x0b[FATAL] all is lost\x1b[2J'
@@ -439,8 +455,9 @@ def test_tag_cannot_forge_lines_or_statuses(
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
     (result,) = bench.until_results(1)
     assert result.name == shown
+    bench.node.session.end()  # rows without a value are told together, a little later
     lines = [line for line in ''.join(capfd.readouterr()).splitlines() if 'all is lost' in line]
-    assert [line.split(' ')[0] for line in lines] == ['[ERROR]', '[WARN]']
+    assert [line.split(' ')[0] for line in lines] == ['[WARN]', '[ERROR]']
     assert all(shown in line for line in lines)
 
 
