@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 import itertools
+from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, ENQ, EOT, ETX, MAX_LINK_DATA, message_frame, NAK, STX
@@ -27,7 +28,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.peers import PeerBench, single_bytes
+from support.peers import CommandTask, PeerBench, single_bytes
 from support.vectors import CAPTURED, MESSAGES, Vector, vector
 
 TIMEOUT, CMD_TIMEOUT = 1.0, 2.5
@@ -47,6 +48,27 @@ def bench(checksum: Checksum = Checksum.CRC, *, nak_retries: int = 3, enq_retrie
         checksum, nak_retries, enq_retries, timeout, CMD_TIMEOUT, max_outstanding,
         duplicate_detection)
     return PeerBench(settings, timing, serve)
+
+
+def asked(*args: Checksum, **settings: Any) -> tuple[PeerBench, CommandTask]:
+    """Return a peer that has said COMMAND, and the task."""
+    peer = bench(*args, **settings)
+    task = peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+    return peer, task
+
+
+def acknowledged(*args: Checksum, **settings: Any) -> tuple[PeerBench, CommandTask]:
+    """Return a peer whose COMMAND has got its ACK, and the task."""
+    peer, task = asked(*args, **settings)
+    assert peer.hear(ACK) == b''
+    return peer, task
+
+
+def answer(peer: PeerBench, task: CommandTask) -> None:
+    """Let the reply to COMMAND come, and see that it is taken."""
+    assert peer.hear_packet(REPLY) == ACK
+    assert task.result == REPLY
 
 
 def later(packet: Packet, number: int) -> Packet:
@@ -82,14 +104,10 @@ def test_peer_that_acknowledges_and_never_replies_has_no_replies() -> None:
 
 @pytest.mark.parametrize('checksum', Checksum)
 def test_command_is_acknowledged_and_answered_by_its_reply(checksum: Checksum) -> None:
-    peer = bench(checksum)
-    task = peer.begin(COMMAND)
-    assert peer.said() == peer.frame(COMMAND)
-    assert peer.hear(ACK) == b''
+    peer, task = acknowledged(checksum)
     assert peer.wait(0.3) == []
     assert task.result is None
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
     assert peer.wait(60) == []
     assert peer.numbers() == [(2523, 1)]
     assert peer.counts() == {
@@ -110,9 +128,8 @@ def test_next_command_follows_at_once() -> None:
 
 @pytest.mark.parametrize('retries', [0, 1, 3])
 def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
-    peer = bench(nak_retries=retries)
-    task = peer.begin(COMMAND)
-    message = peer.said()
+    peer, task = asked(nak_retries=retries)
+    message = peer.frame(COMMAND)
     for count in range(retries):
         pause = 0.25 * count
         answer = peer.hear(NAK)
@@ -135,9 +152,7 @@ def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
 
 @pytest.mark.parametrize('retries', [0, 1, 3])
 def test_silence_is_answered_by_enq_until_the_limit(retries: int) -> None:
-    peer = bench(enq_retries=retries)
-    task = peer.begin(COMMAND)
-    assert peer.said() == peer.frame(COMMAND)
+    peer, task = asked(enq_retries=retries)
     assert peer.wait(TIMEOUT * (retries + 1)) == [
         (TIMEOUT * count, ENQ) for count in range(1, retries + 1)]
     assert peer.wait(TIMEOUT) == []
@@ -153,26 +168,21 @@ def test_silence_is_answered_by_enq_until_the_limit(retries: int) -> None:
 
 
 def test_ack_for_the_last_enq_is_in_time() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     assert peer.wait(3 * TIMEOUT + 0.999) == [(1.0, ENQ), (2.0, ENQ), (3.0, ENQ)]
     assert peer.hear(ACK) == b''
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
     assert peer.changes == []
 
 
 def test_nak_for_an_enq_brings_the_message_again() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    message = peer.said()
+    peer, task = asked()
+    message = peer.frame(COMMAND)
     assert peer.wait(TIMEOUT) == [(1.0, ENQ)]
     assert peer.hear(NAK) == message
     assert peer.wait(0.999) == []
     assert peer.hear(ACK) == b''
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
     assert peer.only(2521, 2522) == [(2522, 1, 2515), (2521, 1, 2511)]
 
 
@@ -194,9 +204,8 @@ def test_limits_count_apart_and_for_each_message() -> None:
 
 
 def test_naks_are_paced_from_the_second_on() -> None:
-    peer = bench(nak_retries=5)
-    peer.begin(COMMAND)
-    message = peer.said()
+    peer, _ = asked(nak_retries=5)
+    message = peer.frame(COMMAND)
     assert peer.hear(NAK) == message
     for pause in (0.25, 0.5, 0.75, 1.0):
         assert peer.hear(NAK) == b''
@@ -207,9 +216,7 @@ def test_naks_are_paced_from_the_second_on() -> None:
     b'\0', b'\xFFabc', EOT, UNKNOWN, b'\x10\x10', b'\x10\x01', ETX,
     b'\x10\x02\x00\x10\x03\x55\x55'])
 def test_anything_else_is_passed_over_while_the_timer_runs(noise: bytes) -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     for _ in range(9):
         assert peer.wait(0.1) == []
         assert peer.hear(noise) in (b'', NAK)
@@ -230,9 +237,7 @@ def test_what_was_heard_before_a_message_is_not_told_as_its_answer() -> None:
 
 
 def test_timer_runs_on_while_messages_and_enqs_come_in() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    peer.said()
+    peer, _ = asked()
     for number in range(4):
         assert peer.wait(0.2) == []
         assert peer.hear_packet(later(THEIRS, number)) == ACK
@@ -242,12 +247,9 @@ def test_timer_runs_on_while_messages_and_enqs_come_in() -> None:
 
 
 def test_reply_that_overtakes_its_ack_is_taken_as_one() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     assert peer.wait(0.5) == []
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
     assert peer.hear(ACK) == b''
     assert peer.wait(60) == []
     assert peer.counts()['acks_received'] == 1
@@ -281,9 +283,7 @@ def test_late_ack_of_an_overtaking_reply_does_not_acknowledge_the_next_message()
 
 
 def test_late_responses_after_an_enquiry_do_not_acknowledge_the_next_message() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    peer.said()
+    peer, _ = asked()
     assert peer.wait(1.0) == [(1.0, ENQ)]
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
@@ -297,9 +297,8 @@ def test_late_responses_after_an_enquiry_do_not_acknowledge_the_next_message() -
 
 
 def test_next_message_does_not_wait_long_after_a_nak() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    message = peer.said()
+    peer, _ = asked()
+    message = peer.frame(COMMAND)
     assert peer.hear(NAK) == message
     assert peer.hear(ACK) == b''
     assert peer.hear_packet(REPLY) == ACK
@@ -322,12 +321,9 @@ def test_late_responses_after_a_failure_do_not_acknowledge_the_next_message() ->
 
 
 def test_reply_that_comes_after_the_failure_of_its_transfer_still_counts() -> None:
-    peer = bench(enq_retries=0)
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked(enq_retries=0)
     assert peer.wait(1.05) == []
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
     assert peer.wait(60) == []
     assert peer.changes == []
 
@@ -370,8 +366,7 @@ def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -
     unsent = 0
     assert peer.wait(1.1) == [(1.0, ENQ)]  # of the time after the last byte nothing is lost
     assert peer.hear(ACK) == b''
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
 
 
 def test_response_counts_while_only_our_answer_is_leaving() -> None:
@@ -385,8 +380,7 @@ def test_response_counts_while_only_our_answer_is_leaving() -> None:
     assert peer.hear(ACK) == peer.frame(OUR_REPLY)
     unsent = 0
     assert peer.hear(ACK) == b''
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
 
 
 def test_early_ack_counts_on_a_link_faster_than_baud() -> None:
@@ -411,9 +405,7 @@ def test_ack_before_a_byte_of_our_message_is_handed_over_does_not_count() -> Non
 @pytest.mark.parametrize('checksum', Checksum)
 @pytest.mark.parametrize('at', [0, 1, 2, 3, 4, 6, 7])
 def test_embedded_ack_ends_the_transfer(checksum: Checksum, at: int) -> None:
-    peer = bench(checksum)
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked(checksum)
     plain = message_frame(THEIRS.encode(), checksum)
     assert peer.hear(plain[:2 + at] + ACK) == b''
     assert peer.counts()['acks_received'] == 1
@@ -421,14 +413,12 @@ def test_embedded_ack_ends_the_transfer(checksum: Checksum, at: int) -> None:
     assert peer.served == [THEIRS]
     assert peer.hear(ACK) == b''
     assert peer.wait(2.0) == []
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
 
 
 def test_embedded_nak_brings_the_message_again() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    message = peer.said()
+    peer, _ = asked()
+    message = peer.frame(COMMAND)
     plain = peer.frame(THEIRS)
     assert peer.hear(plain[:5] + NAK) == message
     assert peer.hear(plain[5:]) == ACK
@@ -501,9 +491,8 @@ def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
 @pytest.mark.parametrize('name', ['embedded_ack', 'embedded_nak'])
 def test_embedded_response_of_the_vectors(name: str) -> None:
     entry = vector(name)
-    peer = bench(entry.checksum)
-    peer.begin(COMMAND)
-    message = peer.said()
+    peer, _ = asked(entry.checksum)
+    message = peer.frame(COMMAND)
     again = message if name == 'embedded_nak' else b''
     assert peer.hear(entry.frame).startswith(again + ACK)
     assert [packet.encode() for packet in peer.served] + [
@@ -511,21 +500,16 @@ def test_embedded_response_of_the_vectors(name: str) -> None:
 
 
 def test_both_directions_at_once() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    assert peer.said() == peer.frame(COMMAND)
+    peer, task = asked()
     assert peer.hear_packet(THEIRS) == ACK
     assert peer.hear(ACK) == peer.frame(OUR_REPLY)
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
     assert peer.hear(ACK) == b''
     assert peer.wait(60) == []
 
 
 def test_ack_of_ours_and_reply_of_theirs_in_one_burst() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     burst = ACK + peer.frame(REPLY) + peer.frame(THEIRS)
     assert peer.hear(burst) == ACK + ACK + peer.frame(OUR_REPLY)
     assert task.result == REPLY
@@ -633,16 +617,12 @@ def test_enq_waits_for_tx_delay_too() -> None:
 
 
 def test_least_time_for_a_response() -> None:
-    peer = bench(timeout=0.0)
-    peer.begin(COMMAND)
-    peer.said()
+    peer, _ = asked(timeout=0.0)
     assert peer.wait(0.021) == [(0.02, ENQ)]
 
 
 def test_message_that_has_begun_when_the_time_is_up_is_heard_out() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     reply = peer.frame(REPLY)
     peer.wait(0.95)
     peer.hear(reply[:4])
@@ -654,9 +634,7 @@ def test_message_that_has_begun_when_the_time_is_up_is_heard_out() -> None:
 @pytest.mark.parametrize('begin', [STX, STX + bytes(261)])
 def test_other_end_that_dribbles_does_not_keep_us_waiting(begin: bytes) -> None:
     """A message that has begun, and then a byte every 60 ms without end."""
-    peer = bench(enq_retries=1, timing=LineTiming(char_time=0.001))
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked(enq_retries=1, timing=LineTiming(char_time=0.001))
     said = [peer.hear(begin)]
     while task.result is None and peer.now < 200.0:
         said += [data for _, data in peer.wait(0.06)]
@@ -738,9 +716,7 @@ def test_noise_before_a_message_does_not_spoil_its_ack() -> None:
 
 
 def test_response_between_message_and_enq_changes_nothing() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    peer.said()
+    peer, _ = asked()
     assert peer.hear_packet(THEIRS) == ACK
     assert peer.hear(ACK) == peer.frame(OUR_REPLY)
     assert peer.hear(ENQ) == ACK
@@ -929,9 +905,7 @@ def test_duplicates_are_forgotten_with_the_port() -> None:
 
 
 def test_command_that_finds_no_room_gets_nak() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    peer.said()
+    peer, _ = asked()
     packets = [later(THEIRS, number) for number in range(MAX_WAITING_REPLIES + 1)]
     for packet in packets[:-1]:
         assert peer.hear_packet(packet) == ACK
@@ -951,13 +925,10 @@ def test_command_that_finds_no_room_gets_nak() -> None:
 
 
 def test_reply_is_taken_with_the_sink_full() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     for number in range(MAX_WAITING_REPLIES):
         peer.hear_packet(later(THEIRS, number))
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
 
 
 def test_stx_inside_a_message_begins_it_anew() -> None:
@@ -1036,10 +1007,7 @@ def test_command_with_a_status_gets_nak() -> None:
 
 
 def test_error_replies_are_counted() -> None:
-    peer = bench(serve=lambda command: command.reply(b'\x06', 0xF0))
-    peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, _ = acknowledged(serve=lambda command: command.reply(b'\x06', 0xF0))
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(THEIRS.reply(b'\x06', 0xF0))
     peer.hear(ACK)
     assert peer.hear_packet(COMMAND.reply(sts=0x10)) == ACK
@@ -1118,9 +1086,7 @@ def test_captured_replies_answer_commands_of_the_same_numbers() -> None:
 
 
 def test_everything_byte_by_byte() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    assert peer.said() == peer.frame(COMMAND)
+    peer, task = asked()
     line = ACK + peer.frame(THEIRS) + peer.frame(REPLY) + ACK + ENQ
     assert peer.hear(*single_bytes(line)) == ACK + peer.frame(OUR_REPLY) + ACK + ACK
     assert task.result == REPLY
@@ -1129,9 +1095,7 @@ def test_everything_byte_by_byte() -> None:
 # Transactions
 
 def test_ack_is_no_reply() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     peer.wait(0.4)
     peer.hear(ACK)
     assert peer.wait(CMD_TIMEOUT - 1e-6) == []
@@ -1145,9 +1109,7 @@ def test_ack_is_no_reply() -> None:
 
 
 def test_reply_is_awaited_from_the_ack_also_after_a_retry() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
+    peer, task = asked()
     assert peer.wait(1.2) == [(1.0, ENQ)]
     peer.hear(ACK)
     acknowledged = peer.now
@@ -1157,10 +1119,7 @@ def test_reply_is_awaited_from_the_ack_also_after_a_retry() -> None:
 
 
 def test_late_reply_is_stale() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     peer.wait(CMD_TIMEOUT)
     assert isinstance(task.result, CommandTimeout)
     assert peer.hear_packet(REPLY) == ACK
@@ -1172,44 +1131,30 @@ def test_late_reply_is_stale() -> None:
 
 
 def test_reply_of_the_last_moment() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     peer.wait(CMD_TIMEOUT - 0.001)
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
 
 
 @pytest.mark.parametrize('other', [
     REPLY._replace(tns=REPLY.tns ^ 0x0100), REPLY._replace(src=2),
     REPLY._replace(tns=REPLY.tns ^ 1, cmd=0x46)])
 def test_reply_of_another_transaction_or_station_is_stale(other: Packet) -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     assert peer.hear_packet(other) == ACK
     assert task.result is None
     assert peer.counts()['stale_messages'] == 1
-    assert peer.hear_packet(REPLY) == ACK
-    assert task.result == REPLY
+    answer(peer, task)
 
 
 def test_reply_to_any_dst_counts() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     assert peer.hear_packet(REPLY._replace(dst=0)) == ACK
     assert task.result == REPLY._replace(dst=0)
 
 
 def test_reply_with_another_command_code() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     assert peer.hear_packet(REPLY._replace(cmd=0x46)) == ACK
     assert isinstance(task.result, WrongCommandCode)
     assert task.result.args == (1, 0x46, 0x4F)
@@ -1221,10 +1166,7 @@ def test_reply_with_another_command_code() -> None:
 
 
 def test_command_with_our_tns_is_no_reply() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     theirs = Packet(5, 1, 0x0F, 0, COMMAND.tns, b'\x68')
     assert peer.hear_packet(theirs) == ACK + peer.frame(theirs.reply())
     assert task.result is None
@@ -1316,10 +1258,7 @@ def test_overdue_command_ends_while_another_one_waits_for_its_ack() -> None:
 
 
 def test_reply_is_not_taken_after_its_time_although_nobody_has_looked() -> None:
-    peer = bench()
-    task = peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, task = acknowledged()
     peer.now += CMD_TIMEOUT + 3.0  # the process stood still
     assert peer.hear_packet(REPLY) == ACK
     assert isinstance(task.result, CommandTimeout)
@@ -1403,10 +1342,7 @@ def test_station_comes_back_with_its_reply() -> None:
 
 
 def test_command_without_a_reply_leaves_its_station_active() -> None:
-    peer = bench()
-    peer.begin(COMMAND)
-    peer.said()
-    peer.hear(ACK)
+    peer, _ = acknowledged()
     peer.wait(60)
     assert peer.stations[1].active
 
