@@ -73,8 +73,8 @@ class Ears:
 
 def make_bench(*mappings: Mapping, network: Network | None = None, period: float = PERIOD,
                plc: str = 'SLC') -> tuple[DriverBench, list[SimulatedPlc], list[Ears]]:
-    """Return the driver and its stations, before the port is open."""
-    bench = DriverBench(mappings, network=network, start=False,
+    """Return the driver and its stations."""
+    bench = DriverBench(mappings, network=network,
                         settings=DriverSettings(processor_period=period, write_timeout=10.0))
     plcs, ears = [], []
     for station in sorted({mapping.station for mapping in mappings}):
@@ -100,7 +100,6 @@ def word(station: int = 1, command: str = 'Read', period: int | None = None,
 def test_status_at_the_start_and_every_period(network: Network, plc: str, processor: str) -> None:
     bench, _, (ears,) = make_bench(word(plc=plc), network=network, plc=plc)
     assert bench.driver.checks.known(1).processor == 'unknown (not asked yet)'
-    bench.open()
     bench.run(3.2 * PERIOD)
     assert [round(when / PERIOD, 1) for when in ears.times(STATUS)] == [0, 1, 2, 3]
     known = bench.driver.checks.known(1)
@@ -111,7 +110,6 @@ def test_status_at_the_start_and_every_period(network: Network, plc: str, proces
 
 def test_period_0_is_never() -> None:
     bench, _, (ears,) = make_bench(word(), period=0)
-    bench.open()
     bench.run(20.0)
     assert {cmd for _, cmd, _ in ears.heard} == {0x0F}
 
@@ -119,7 +117,6 @@ def test_period_0_is_never() -> None:
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_program_mode_and_fault_are_seen(network: Network) -> None:
     bench, (plc,), _ = make_bench(word(), network=network)
-    bench.open()
     bench.run(1.0)
     plc.processor.setting = Setting.PROGRAM
     bench.run(PERIOD)
@@ -138,7 +135,6 @@ def test_program_mode_and_fault_are_seen(network: Network) -> None:
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench, (plc, _), (ears, _) = make_bench(word(1), word(2), network=network, period=1000.0)
-    bench.open()
     bench.run(1.0)
     plc.faults = InjectedFaults(silent=True)
     bench.run_until(lambda: (1, False) in bench.listener.changes)
@@ -155,7 +151,6 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
 
 def test_all_are_asked_anew_when_the_port_comes_back() -> None:
     bench, _, (ears,) = make_bench(word(), period=1000.0)
-    bench.open()
     bench.run(1.0)
     bench.lose_port()
     assert bench.driver.checks.known(1).identity is None
@@ -169,7 +164,6 @@ def test_all_are_asked_anew_when_the_port_comes_back() -> None:
 def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
     bench, (plc,), (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
-    bench.open()
     bench.run(2.2 * PERIOD)
     assert len(ears.times(STATUS)) == 3
     assert bench.driver.checks.known(1).processor == \
@@ -186,7 +180,6 @@ def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
 def test_reply_that_is_no_status_is_said_to_be_none() -> None:
     bench, _, (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(b'\x06'))
-    bench.open()
     bench.run(1.0)
     assert bench.driver.checks.known(1).processor == 'unknown (a diagnostic status of 1 bytes)'
 
@@ -195,7 +188,6 @@ def test_station_that_never_answers_this_is_asked_rarely() -> None:
     bench, (plc,), (ears,) = make_bench(word(), network=Network(baud=115200, timeout=100,
                                                                 cmd_timeout=500), period=2.0)
     ears.answer_diagnostics(lambda command: command._replace(tns=0).reply())
-    bench.open()
     bench.run(50.0)
     assert len(ears.times(STATUS)) == 1
     assert bench.driver.checks.known(1).processor == \
@@ -221,7 +213,6 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
     for period in (0.0, 0.05):  # all are asked all the time
         bench, _, ears = make_bench(
             *mappings, network=replace(network, baud=115200), period=period)
-        bench.open()
         bench.run(2.5)
         waits.append(max(longest_wait(bench, mapping) for mapping in mappings))
         assert all(bool(heard.times(STATUS)) == bool(period) for heard in ears)
@@ -233,7 +224,6 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
 def test_after_a_check_come_all_reads_that_were_due() -> None:
     mappings = [word(text=f'N{file}:0', period=0) for file in (7, 9)] + [word(2, period=0)]
     bench, _, all_ears = make_bench(*mappings, period=0.01)
-    bench.open()
     bench.run(2.0)
     order = [(cmd, number) for _, cmd, number in sorted(
         (when, cmd, number) for number, ears in enumerate(all_ears)
@@ -247,7 +237,6 @@ def test_after_a_check_come_all_reads_that_were_due() -> None:
 def test_writes_leave_a_read_its_turn_also_when_a_check_is_due() -> None:
     pulses = make_mapping('N9:0/0', 'Write', plc='SLC')
     bench, _, (ears,) = make_bench(word(period=0), pulses, period=0.01)
-    bench.open()
     for n in range(200):
         bench.write(pulses, [n % 2])
     bench.run(2.0)
@@ -263,7 +252,6 @@ def test_writes_leave_a_read_its_turn_also_when_a_check_is_due() -> None:
 def test_checks_of_a_busy_line_are_not_starved_by_long_reads() -> None:
     long = make_mapping('N7:0', plc='SLC', length=300, period=0)
     bench, _, (ears,) = make_bench(long, period=1.0)
-    bench.open()
     bench.run(10.0)
     assert len(ears.times(STATUS)) in (9, 10)
 
@@ -275,7 +263,6 @@ def test_checks_of_a_busy_line_are_not_starved_by_long_reads() -> None:
 def test_write_only_station_is_watched_by_echoes(network: Network) -> None:
     lamp = word(2, 'Write')
     bench, (_, plc), (read_ears, ears) = make_bench(word(1), lamp, network=network, period=0)
-    bench.open()
     bench.run(10.5)
     assert len(ears.times(ECHO)) == 6
     assert read_ears.times(ECHO) == []
@@ -290,7 +277,6 @@ def test_write_only_station_is_watched_by_echoes(network: Network) -> None:
 def test_station_that_is_heard_needs_no_echo() -> None:
     lamp = word(1, 'Write')
     bench, _, (ears,) = make_bench(lamp, period=0)
-    bench.open()
     for n in range(20):
         bench.at(1.0 + n, lambda: bench.write(lamp, [1]))
     bench.run(20.5)
@@ -301,7 +287,6 @@ def test_station_that_is_heard_needs_no_echo() -> None:
 
 def test_standard_polling_needs_no_echo() -> None:
     bench, _, (ears,) = make_bench(word(1, 'Write'), network=NETWORKS[1], period=0)
-    bench.open()
     bench.run(10.0)
     assert len(ears.times(ECHO)) <= 1
     assert bench.driver.stations[1].last_heard == pytest.approx(bench.clock(), abs=0.1)
@@ -320,13 +305,11 @@ def test_dead_stations_take_turns_and_no_more_than_an_eighth_of_the_line() -> No
     bench, plcs, _ = make_bench(alive, *dead, network=SLOW, period=10.0)
     for plc in plcs[1:]:
         plc.faults = InjectedFaults(silent=True)
-    bench.open()
     bench.run_until(lambda: len(bench.listener.changes) == 3)
     reads = len(bench.listener.times(alive))
     bench.run(20.0)
     cost = 20.0 / (len(bench.listener.times(alive)) - reads)
     other, _, _ = make_bench(alive, network=SLOW, period=0)
-    other.open()
     other.run(20.0)
     assert cost < 1.18 * 20.0 / len(other.listener.times(alive))
     for plc in plcs[1:]:
@@ -341,7 +324,6 @@ def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:
     bench, plcs, _ = make_bench(alive, *dead, period=0)
     for plc in plcs[1:]:
         plc.faults = InjectedFaults(silent=True)
-    bench.open()
     bench.run_until(lambda: len(bench.listener.changes) == len(dead))
     plcs[1].faults = InjectedFaults()
     bench.run(5.0)
@@ -377,12 +359,11 @@ class OldSlc(Ears):
 def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: Network) -> None:
     rows = [make_mapping('N7:0', 'ReadWrite', plc='SLC', length=100),
             *(word(text=f'N7:{number}') for number in range(100, 200))]
-    bench = DriverBench(rows, network=network, start=False,
+    bench = DriverBench(rows, network=network,
                         settings=DriverSettings(processor_period=PERIOD, write_timeout=10.0))
     plc = simulated_plc(1, 'SLC', bench.clock, *FILES)
     old = OldSlc(bench, plc)
     bench.connect(old)
-    bench.open()
     bench.run(1.0)
     planned = bench.driver.blocks
     bench.write(rows[0], list(range(100)))
@@ -398,7 +379,6 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
 def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
     row = make_mapping('N7:0', plc='SLC', length=100, processor='ML1000')
     bench, _, _ = make_bench(row)  # it says that it is a 5/03
-    bench.open()
     bench.run(2 * PERIOD)
     assert [request.words for request in bench.driver.blocks[0].requests] == [41, 41, 18]
 
@@ -409,7 +389,6 @@ def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_counters_on_request(network: Network) -> None:
     bench, (plc,), (ears,) = make_bench(word(), network=network)
-    bench.open()
     bench.run(2.0)
     assert ears.times(COUNTERS) == []
     bench.driver.request_counters(1)
@@ -428,7 +407,6 @@ def test_counters_on_request(network: Network) -> None:
 
 def test_two_requests_at_once_are_one() -> None:
     bench, _, (ears,) = make_bench(word())
-    bench.open()
     bench.run(1.0)
     for _ in range(3):
         bench.driver.request_counters(1)
@@ -439,7 +417,6 @@ def test_two_requests_at_once_are_one() -> None:
 def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
     bench, _, (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
-    bench.open()
     bench.driver.request_counters(1)
     bench.run(1.0)
     known = bench.driver.checks.known(1)
@@ -451,7 +428,6 @@ def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
 def test_absent_station_is_not_asked_for_counters() -> None:
     bench, (plc,), _ = make_bench(word())
     plc.faults = InjectedFaults(silent=True)
-    bench.open()
     bench.run(5.0)
     bench.driver.request_counters(1)
     bench.run(1.0)
@@ -461,7 +437,6 @@ def test_absent_station_is_not_asked_for_counters() -> None:
 
 def test_station_that_falls_silent_ends_the_request() -> None:
     bench, (plc,), _ = make_bench(word())
-    bench.open()
     bench.run(1.0)
     plc.faults = InjectedFaults(silent=True)
     bench.driver.request_counters(1)
@@ -472,7 +447,6 @@ def test_station_that_falls_silent_ends_the_request() -> None:
 
 def test_lost_port_ends_the_request() -> None:
     bench, _, _ = make_bench(word())
-    bench.open()
     bench.run(1.0)
     bench.driver.request_counters(1)
     bench.lose_port()
@@ -484,7 +458,6 @@ def test_lost_port_ends_the_request() -> None:
 
 def test_lost_port_ends_a_request_that_waits_for_its_turn() -> None:
     bench, _, (ears,) = make_bench(word())
-    bench.open()
     bench.run(1.0)
     health = bench.driver.checks
     bench.driver.request_counters(1)

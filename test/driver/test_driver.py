@@ -48,12 +48,12 @@ LAST = -1
 
 
 class RecordingPlc:
-    """A PLC whose commands are kept, with the time they came."""
+    """A PLC, in its place on the line, whose commands are kept, with the time they came."""
 
     def __init__(self, bench: DriverBench, plc: SimulatedPlc) -> None:
         self.commands: list[tuple[float, Packet]] = []
-        self._bench = bench
-        self._plc = plc
+        self._bench, self._plc = bench, plc
+        bench._stations[bench._stations.index(plc)] = self
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer as the PLC does."""
@@ -67,11 +67,11 @@ class RecordingPlc:
         return [packet.data[0] for _, packet in self.commands]
 
 
-def make_bench(*mappings: Mapping, network: Network | None = None,
+def make_bench(*mappings: Mapping, network: Network | None = None, start: bool = True,
                **settings: float) -> tuple[DriverBench, SimulatedPlc]:
     """Return a bench with one PLC-5, station 1, of all files, as ``mappings`` expect it."""
     bench = DriverBench(mappings, network=network,
-                        settings=DriverSettings(**settings), start=False)  # type: ignore
+                        settings=DriverSettings(**settings), start=start)  # type: ignore
     plc = bench.plc(1, 'PLC5', *PLC5_FILES)
     return bench, plc
 
@@ -116,7 +116,6 @@ def test_words_read_as_another_type(kind: str, values: list[float], words: bytes
     mapping = make_mapping('N7:8', kind=kind)
     bench, plc = make_bench(mapping)
     plc.table.write(mapping.address, words)
-    bench.open()
     bench.run_until(lambda: bool(bench.listener.reads))
     assert bench.listener.values(mapping) == [values]
 
@@ -125,9 +124,7 @@ def test_long_mapping_comes_in_several_packets_and_is_published_once_a_period() 
     mapping = make_mapping('N7:0', length=250, period=1000)
     bench, plc = make_bench(mapping)
     recording = RecordingPlc(bench, plc)
-    bench._stations[:] = [recording]
     store(plc, 'N7:0', range(250))
-    bench.open()
     bench.run(1.5)
     assert bench.listener.values(mapping) == [list(range(250))] * 2
     assert recording.functions() == [0x68] * 6
@@ -136,7 +133,6 @@ def test_long_mapping_comes_in_several_packets_and_is_published_once_a_period() 
 def test_values_are_published_again_each_period() -> None:
     fast, slow = make_mapping('N7:0', period=100), make_mapping('F8:0', period=500)
     bench, _ = make_bench(fast, slow)
-    bench.open()
     bench.run(1.95)
     assert len(bench.listener.values(fast)) == 20
     assert len(bench.listener.values(slow)) == 4
@@ -146,8 +142,6 @@ def test_read_soon_after_a_late_one_is_published_too() -> None:
     mapping = make_mapping('N7:0', period=100)
     bench, plc = make_bench(mapping, network=Network(baud=115200, timeout=200))
     recording = RecordingPlc(bench, plc)
-    bench._stations[:] = [recording]
-    bench.open()
     bench.run(0.05)
     plc.faults.delay = 0.08
     bench.run(0.1)
@@ -160,7 +154,6 @@ def test_read_soon_after_a_late_one_is_published_too() -> None:
 def test_value_that_publishes_changes_only() -> None:
     mapping = make_mapping('N7:0', publish='Change')
     bench, plc = make_bench(mapping)
-    bench.open()
     bench.run(1.0)
     store(plc, 'N7:0', [4])
     bench.run(1.0)
@@ -185,7 +178,6 @@ def test_block_that_shows_a_write_is_read_at_once() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite', period=60_000)
     other = make_mapping('F8:0', period=60_000)
     bench, _ = make_bench(mapping, other)
-    bench.open()
     bench.run(1.0)
     bench.write(mapping, [42])
     bench.run(0.2)
@@ -202,7 +194,6 @@ def test_bit_write_leaves_alone_what_the_plc_changes_meanwhile(plc: str, functio
     bench = DriverBench([mapping])
     machine = bench.plc(1, plc, ('B3:0', 4))
     recording = RecordingPlc(bench, machine)
-    bench._stations[:] = [recording]
     bench.run(0.5)
 
     def change_neighbours(data: bytes) -> bytes:
@@ -242,6 +233,13 @@ def write_results(bench: DriverBench) -> list[str]:
     return [str(result) for result in bench.listener.results]
 
 
+def written(bench: DriverBench, row: Mapping, values: list[float], seconds: float) -> list[str]:
+    """Write, let time pass, and return all results."""
+    bench.write(row, values)
+    bench.run(seconds)
+    return write_results(bench)
+
+
 @pytest.mark.parametrize('values, reason', [
     ([1], '1 values, the mapping has 2'),
     ([1, 70000], 'value 70000 at index 1 is not a valid int16'),
@@ -249,26 +247,20 @@ def write_results(bench: DriverBench) -> list[str]:
 def test_refused_for_its_values(values: list[float], reason: str) -> None:
     mapping = make_mapping('N7:0', 'Write', length=2, minimum=0, maximum=50)
     bench, plc = make_bench(mapping)
-    bench.open()
-    bench.write(mapping, values)
-    bench.run(1.0)
-    assert write_results(bench) == [f'not written: refused: {reason}']
+    assert written(bench, mapping, values, 1.0) == [f'not written: refused: {reason}']
     assert stored(plc, 'N7:0', 2) == bytes(4)
 
 
 def test_refused_as_read_only() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping, read_only=True)
-    bench.open()
-    bench.write(mapping, [1])
-    bench.run(1.0)
-    assert write_results(bench) == ['not written: refused: this node is read_only']
+    assert written(bench, mapping, [1], 1.0) == ['not written: refused: this node is read_only']
     assert stored(plc, 'N7:0') == b'\0\0'
 
 
 def test_refused_while_the_port_is_closed() -> None:
     mapping = make_mapping('N7:0', 'Write')
-    bench, plc = make_bench(mapping)
+    bench, plc = make_bench(mapping, start=False)
     bench.write(mapping, [1])
     assert write_results(bench) == ['not written: refused: the port is not open']
     bench.open()
@@ -285,7 +277,6 @@ def test_refused_while_the_port_is_closed() -> None:
 def test_refused_when_too_many_wait() -> None:
     mapping = make_mapping('B3:0/0', 'Write')
     bench, _ = make_bench(mapping)
-    bench.open()
     for _ in range(MAX_WAITING_WRITES + 2):
         bench.driver.write([mapping], [1], bench.clock())
     assert write_results(bench) == ['not written: refused: too many writes are waiting'] * 2
@@ -301,10 +292,7 @@ def test_failed_by_the_status_of_the_reply(status: tuple[int, ...], text: str) -
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
     plc.faults.status = status
-    bench.open()
-    bench.write(mapping, [1])
-    bench.run(1.0)
-    assert write_results(bench) == [text]
+    assert written(bench, mapping, [1], 1.0) == [text]
     assert bench.driver.stations[1].remote_errors == 1
 
 
@@ -323,11 +311,8 @@ def test_not_sent_to_an_inactive_station() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     bench, plc = make_bench(mapping)
     plc.faults.silent = True
-    bench.open()
     bench.run_until(lambda: bench.listener.changes == [(1, False)])
-    bench.write(mapping, [1])
-    bench.run(1.0)
-    assert write_results(bench) == [
+    assert written(bench, mapping, [1], 1.0) == [
         'not written: not sent: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
     assert stored(plc, 'N7:0') == b'\0\0'
 
@@ -336,18 +321,15 @@ def test_not_sent_because_it_is_too_old() -> None:
     read, mapping = make_mapping('N7:9'), make_mapping('N7:0', 'Write')
     bench, plc = make_bench(read, mapping, write_timeout=0.3)
     plc.faults.silent = True
-    bench.open()  # the read keeps the line for 0.8 s
-    bench.run(0.1)
-    bench.write(mapping, [1])
-    bench.run(3.0)
-    assert write_results(bench) == ['not written: not sent: waited longer than 0.3 s for the line']
+    bench.run(0.1)  # the read keeps the line for 0.8 s
+    assert written(bench, mapping, [1], 3.0) == [
+        'not written: not sent: waited longer than 0.3 s for the line']
 
 
 def test_not_sent_because_the_port_was_lost_while_it_waited() -> None:
     mapping, pulse = make_mapping('N7:0', 'Write'), make_mapping('B3:0/0', 'Write')
     bench, plc = make_bench(make_mapping('N7:9'), mapping, pulse)
     plc.faults.silent = True
-    bench.open()
     bench.run(0.1)
     bench.write(mapping, [1])
     bench.write(pulse, [1])
@@ -365,10 +347,7 @@ def test_unknown_when_the_reply_is_lost() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
     bench.far.say = lambda data: b'' if data.startswith(frames.STX) else data
-    bench.open()
-    bench.write(mapping, [1])
-    bench.run(5.0)
-    assert write_results(bench) == [
+    assert written(bench, mapping, [1], 5.0) == [
         'unknown whether written: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive; '
         'not read back: no row reads all of these words']
     assert stored(plc, 'N7:0') == b'\1\0'
@@ -378,10 +357,7 @@ def test_unknown_when_the_reply_does_not_come_in_time() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
     plc.faults.slow = 10_000
-    bench.open()
-    bench.write(mapping, [1])
-    bench.run(5.0)
-    assert write_results(bench) == [
+    assert written(bench, mapping, [1], 5.0) == [
         'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed Out; '
         'not read back: no row reads all of these words']
     assert bench.driver.stations[1].active
@@ -390,7 +366,6 @@ def test_unknown_when_the_reply_does_not_come_in_time() -> None:
 def test_unknown_when_no_acknowledgement_comes() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
-    bench.open()
     bench.run(0.5)
     bench.far.say = lambda data: b''
     bench.write(mapping, [1])
@@ -402,7 +377,6 @@ def test_unknown_when_no_acknowledgement_comes() -> None:
 def test_unknown_when_the_port_is_lost_on_the_way() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping)
-    bench.open()
     bench.run(0.5)
     bench.write(mapping, [1])
     bench.lose_port('unplugged')
@@ -416,7 +390,6 @@ def test_unknown_when_the_port_is_lost_on_the_way() -> None:
 def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
     mapping, waiting = make_mapping('N7:0', 'Write'), make_mapping('N7:1', 'Write')
     bench, _ = make_bench(mapping, waiting)
-    bench.open()
     bench.run(0.5)
     bench.write(mapping, [1])
     bench.write(waiting, [1])
@@ -435,7 +408,6 @@ def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
 def test_read_goes_on_after_the_driver_itself_has_failed() -> None:
     mapping, other = make_mapping('N7:0'), make_mapping('F8:0')
     bench, _ = make_bench(mapping, other)
-    bench.open()
     take = bench.listener.read
 
     def break_down(mapping: Mapping, values: Values) -> None:
@@ -455,7 +427,7 @@ def test_read_goes_on_after_the_driver_itself_has_failed() -> None:
 
 def test_reads_go_on_after_the_port_was_lost_in_the_middle_of_one() -> None:
     mappings = [make_mapping(f'{text}:0') for text in ('N7', 'F8', 'B3')]
-    bench, _ = make_bench(*mappings)
+    bench, _ = make_bench(*mappings, start=False)
     for _ in range(10):
         bench.open()
         bench.run(0.253)
@@ -470,7 +442,6 @@ def test_reads_go_on_after_the_port_was_lost_in_the_middle_of_one() -> None:
 def test_points_have_failed_when_the_port_is_lost_and_the_first_read_is_published() -> None:
     mapping = make_mapping('N7:0', publish='Change')
     bench, _ = make_bench(mapping)
-    bench.open()
     bench.run(1.0)
     bench.lose_port('unplugged')
     point = bench.driver.points[mapping]
@@ -485,7 +456,6 @@ def test_every_write_ends_once_on_a_line_that_fails_in_every_way() -> None:
     mappings = [make_mapping(text, 'ReadWrite', length=length) for text, length in (
         ('N7:0', 1), ('N7:10', 150), ('B3:0/3', 2), ('F8:2', 1))]
     bench, plc = make_bench(*mappings, write_timeout=0.4)
-    bench.open()
     dice = random.Random(7)
     asked = 0
 
@@ -514,7 +484,7 @@ def test_every_write_ends_once_on_a_line_that_fails_in_every_way() -> None:
 def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     good = [make_mapping(f'N9:{n}') for n in (0, 1, 2, 3, 5)]
     bad = make_mapping('N9:12')  # the file has ten words
-    bench, _ = make_bench(*good[:3], bad, *good[3:])
+    bench, _ = make_bench(*good[:3], bad, *good[3:], start=False)
     assert len(bench.driver.blocks) == 1
     bench.open()
     bench.run(2.0)
@@ -544,7 +514,6 @@ def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> No
 def test_slow_mapping_that_is_read_with_fast_ones_is_published_at_its_own_pace() -> None:
     fast, slow = make_mapping('N7:0', period=100), make_mapping('N7:1', 'ReadWrite', period=1000)
     bench, _ = make_bench(fast, slow)
-    bench.open()
     bench.run(5.05)
     assert len(bench.driver.blocks) == 1
     assert len(bench.listener.values(fast)) == 51
@@ -567,7 +536,6 @@ def test_plc_in_trouble_fails_the_points_and_divides_nothing() -> None:
     mappings = [make_mapping('N7:0'), make_mapping('N7:1')]
     bench, plc = make_bench(*mappings)
     plc.faults.status = (0x70,)
-    bench.open()
     bench.run(1.0)
     assert len(bench.driver.blocks) == 1
     assert [bench.driver.points[mapping].error for mapping in mappings] == [
@@ -582,7 +550,6 @@ def test_value_that_is_none_fails_only_its_own_mapping() -> None:
     digits, word = make_mapping('N7:0', kind='bcd16'), make_mapping('N7:1')
     bench, plc = make_bench(digits, word)
     store(plc, 'N7:0', [0x0A])
-    bench.open()
     bench.run(1.0)
     assert bench.listener.values(digits) == []
     assert bench.driver.points[digits].error == 'word 000A is not BCD'
@@ -603,7 +570,6 @@ def test_inactive_station_costs_the_others_little() -> None:
     gone.faults.silent = True
     alone, _ = make_bench(living)
     alone.open()
-    bench.open()
     bench.run(2.0)
     assert bench.listener.changes == [(2, False)]
     rate, best = _rates(bench, living, 15.0), _rates(alone, living, 5.0)
@@ -617,7 +583,6 @@ def test_all_points_of_a_station_fail_as_soon_as_it_is_inactive() -> None:
     dead = [make_mapping(f'N{file}:0', station=2) for file in (7, 9, 10)]
     bench, _ = make_bench(living, *dead)
     plc = bench.plc(2, 'PLC5', ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
-    bench.open()
     bench.run(1.0)
     plc.faults.silent = True
     bench.run_until(lambda: bool(bench.listener.changes))
@@ -631,7 +596,6 @@ def test_station_that_comes_back_is_read_again_whole() -> None:
     mappings = [make_mapping(f'N{file}:0', station=2) for file in (7, 9, 10)]
     bench, _ = make_bench(living, *mappings)
     plc = bench.plc(2, 'PLC5', ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
-    bench.open()
     bench.run(1.0)
     plc.faults.silent = True
     bench.run(5.0)
@@ -649,7 +613,6 @@ def test_write_brings_a_station_back() -> None:
     bench, _ = make_bench(living, mapping)
     plc = bench.plc(2, 'PLC5', ('N7:0', 4))
     plc.faults.silent = True
-    bench.open()
     bench.run_until(lambda: bench.listener.changes == [(2, False)])
     bench.run(0.4)
     plc.faults.silent = False
@@ -665,7 +628,6 @@ def test_writes_to_an_inactive_station_do_not_hold_up_the_others() -> None:
     living, dead = make_mapping('N7:0', period=0), make_mapping('N7:0', 'ReadWrite', station=2)
     bench, _ = make_bench(living, dead)
     bench.plc(2, 'PLC5', ('N7:0', 4)).faults.silent = True
-    bench.open()
     bench.run_until(lambda: bench.listener.changes == [(2, False)])
     best = _rates(bench, living, 5.0)
     before = len(bench.listener.values(living))
@@ -683,7 +645,6 @@ def test_writes_to_a_station_that_replies_late_do_not_hold_up_the_others() -> No
     living, late = make_mapping('N7:0', period=0), make_mapping('N7:0', 'Write', station=2)
     bench, _ = make_bench(living, late, network=Network(baud=19200, cmd_timeout=500))
     bench.plc(2, 'PLC5', ('N7:0', 4)).faults.delay = 1.0
-    bench.open()
     best = _rates(bench, living, 5.0)
     before = len(bench.listener.values(living))
     for number in range(100):
@@ -703,7 +664,6 @@ def test_transaction_number_never_repeats_the_last_of_a_station() -> None:
     mappings = [make_mapping('N7:0', station=1), make_mapping('N7:0', station=2)]
     bench = DriverBench(mappings, settings=DriverSettings(first_tns=0xFFFD), start=False)
     plcs = [RecordingPlc(bench, bench.plc(number, 'PLC5', ('N7:0', 4))) for number in (1, 2)]
-    bench._stations[:] = plcs
     bench.open()
     bench.run(1.0)
     numbers = [packet.tns for _, packet in sorted(
@@ -812,7 +772,6 @@ def test_write_does_not_wait_for_all_packets_of_a_long_read() -> None:
     bench = DriverBench([long, mapping], network=Network(baud=9600), start=False)
     plc = bench.plc(1, 'SLC', *SLC_FILES)
     recording = RecordingPlc(bench, plc)
-    bench._stations[:] = [recording]
     bench.open()
     bench.run(0.05)
     bench.write(mapping, [1])
@@ -824,7 +783,6 @@ def test_write_does_not_wait_for_all_packets_of_a_long_read() -> None:
 def test_writes_do_not_starve_reads() -> None:
     read, pulse = make_mapping('N7:0'), make_mapping('B3:0/0', 'Write')
     bench, _ = make_bench(read, pulse, write_timeout=60.0)
-    bench.open()
     for n in range(500):
         bench.write(pulse, [n % 2])
     bench.run(2.0)
@@ -843,7 +801,6 @@ def test_writes_reach_the_plc_in_their_order() -> None:
         write_bits(address, mask, bits)  # type: ignore[arg-type]
 
     plc.table.write_bits = spy  # type: ignore[method-assign]
-    bench.open()
     for value in (1, 0, 0, 1, 0, 1):
         bench.write(pulse, [value])
     bench.run(1.0)
@@ -864,7 +821,6 @@ def test_no_write_is_executed_twice_when_answers_get_lost() -> None:
     plc.table.write_bits = count  # type: ignore[method-assign]
     dice = random.Random(3)
     bench.far.say = lambda data: data if dice.random() > 0.3 else b''
-    bench.open()
     for n in range(60):
         bench.write(pulse, [n % 2])
         bench.run_until(lambda: len(bench.listener.results) == n + 1)  # noqa: B023
@@ -875,7 +831,7 @@ def test_no_write_is_executed_twice_when_answers_get_lost() -> None:
 
 def test_stale_time_follows_the_period_or_the_line() -> None:
     fast, slow = make_mapping('N7:0', period=10), make_mapping('F8:0', period=1000)
-    bench, _ = make_bench(fast, slow, stale_after=5.0, network=Network(baud=1200))
+    bench, _ = make_bench(fast, slow, stale_after=5.0, network=Network(baud=1200), start=False)
     scan = bench.driver.expected_poll_cycle
     assert scan == pytest.approx(sum(block.line_time + 0.02 for block in bench.driver.blocks))
     assert 0.4 < scan < 1.0
@@ -889,7 +845,7 @@ def test_stale_time_follows_the_period_or_the_line() -> None:
 def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:
     fast = make_mapping('N7:0', period=200)
     slow = [make_mapping(f'N{file}:0', length=20, period=20_000) for file in range(9, 39)]
-    bench, _ = make_bench(fast, *slow, stale_after=3.0, network=Network(baud=9600))
+    bench, _ = make_bench(fast, *slow, stale_after=3.0, network=Network(baud=9600), start=False)
     assert bench.driver.expected_poll_cycle > 2.5
     wait = max(map(block_time, bench.driver.blocks))
     assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + wait)
@@ -899,7 +855,7 @@ def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:
 
 def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> None:
     fast, slow = make_mapping('N7:0', period=200), make_mapping('N7:1', period=400)
-    bench, _ = make_bench(fast, slow, stale_after=3.0)
+    bench, _ = make_bench(fast, slow, stale_after=3.0, start=False)
     block, = bench.driver.blocks
     assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + block_time(block))
     assert bench.driver.points[slow].stale_time == pytest.approx(1.2 + block_time(block))
@@ -908,7 +864,6 @@ def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> Non
 def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
     bench, plc = make_bench(fast, long, network=Network(baud=115200, timeout=200))
-    bench.open()
     job, = (job for job in bench.driver._reads.jobs if job.block.mappings == (long,))
     bench.run_until(lambda: job.is_under_way)  # while the fast one has the line
     bench.lose_port()
@@ -925,7 +880,6 @@ def test_long_block_lets_others_go_between_its_packets() -> None:
     fast, long = make_mapping('N9:0', period=300), make_mapping('N7:0', length=250, period=3000)
     bench, plc = make_bench(fast, long, network=Network(baud=9600, timeout=500))
     store(plc, 'N7:0', list(range(250)))
-    bench.open()
     bench.run(10.0)
     times = bench.listener.times(fast)
     gaps = [later - earlier for earlier, later in pairwise(times)]
@@ -938,7 +892,6 @@ def test_long_block_lets_others_go_between_its_packets() -> None:
 def test_default_period_is_a_setting() -> None:
     mapping = make_mapping('N7:0')
     bench, _ = make_bench(mapping, default_period=0.5)
-    bench.open()
     bench.run(2.4)
     assert len(bench.listener.values(mapping)) == 5
     assert bench.driver.points[mapping].period == 0.5
@@ -949,7 +902,6 @@ def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) 
     mappings = [make_mapping(f'{text}', length=length, period=0) for text, length in (
         ('N7:0', 40), ('F8:0', 10), ('B3:0', 4), ('T4:0', 9))]
     bench, _ = make_bench(*mappings, network=Network(baud=baud))
-    bench.open()
     bench.run(20.0)
     assert bench.driver.poll_cycle is not None
     expected = bench.driver.expected_poll_cycle - 4 * 0.02  # our PLC answers at once
@@ -959,7 +911,6 @@ def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) 
 def test_driver_without_stations_rests_until_a_write_comes() -> None:
     mapping = make_mapping('N7:0', 'Write', station=255)
     bench, plc = make_bench(mapping)
-    bench.open()
     assert bench.driver.machine.deadline is None
     bench.run(100.0)
     assert bench.driver.counters.chars_sent == 0
@@ -970,7 +921,6 @@ def test_driver_without_stations_rests_until_a_write_comes() -> None:
 
 def test_counters_of_the_driver() -> None:
     bench, _ = make_bench(make_mapping('N7:0'))
-    bench.open()
     bench.run(0.95)
     counters = bench.driver.counters
     assert bench.driver.transactions == counters.commands_sent == counters.replies_received == 10
@@ -983,8 +933,6 @@ def test_settings_of_the_net_file_reach_the_line() -> None:
     network = Network(baud=115200, station=77, timeout=50, nak_retries=2, cmd_timeout=500)
     bench, plc = make_bench(mapping, network=network)
     recording = RecordingPlc(bench, plc)
-    bench._stations[:] = [recording]
-    bench.open()
     bench.run(0.05)
     assert recording.commands[0][1].src == 77
     plc.faults.silent = True
@@ -1000,7 +948,6 @@ def test_settings_of_the_net_file_reach_the_line() -> None:
 def test_nak_after_a_command_timeout_is_a_setting(nak: bool) -> None:
     bench, plc = make_bench(make_mapping('N7:0'), nak_on_command_timeout=nak)
     plc.faults.slow = 10_000
-    bench.open()
     bench.run(2.0)
     assert (bench.driver.counters.naks_sent > 0) is nak
     assert 2508 in bench.listener.numbers()
@@ -1040,7 +987,6 @@ def test_station_that_answers_polls_alone_is_told_from_one_that_comes_back(polli
     bench, plc = make_bench(make_mapping('N7:0'), network=Network(baud=115200, polling=polling))
     deaf = DeafPlc(plc)
     bench._stations[:] = [deaf]
-    bench.open()
     station = bench.driver.stations[1]
     bench.run_until(lambda: station.takes_no_commands)
     assert bench.listener.changes == [(1, False), (1, True)] * 2

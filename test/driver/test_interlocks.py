@@ -68,7 +68,7 @@ class Cell:
     """A driver, a PLC whose writes are kept, and a ROS executor that can stand still."""
 
     def __init__(self, *rows: Mapping, polling: str = 'Message', start: bool = True,
-                 **settings: object) -> None:
+                 run: float = 0.0, **settings: object) -> None:
         self.bench = DriverBench(rows, network=Network(
             # Polled without a pause, a slow line shows the same with fewer polls.
             baud=115200 if polling == 'Message' else 19200, timeout=200, cmd_timeout=500,
@@ -86,6 +86,7 @@ class Cell:
         self._tick()
         if start:
             self.bench.open()
+            self.run(run)
 
     @property
     def now(self) -> float:
@@ -161,8 +162,7 @@ def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> No
 
 
 def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
-    cell = Cell(beat_row())
-    cell.run(0.5)
+    cell = Cell(beat_row(), run=0.5)
     beat = cell.bench.driver.interlocks.heartbeats[0]
     beat.value = LARGEST - 1
     store(cell.plc, 'N10:0', [beat.value])
@@ -172,8 +172,7 @@ def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
 
 
 def test_rule_2_station_that_is_back_begins_with_0() -> None:
-    cell = Cell(beat_row())
-    cell.run(2.0)
+    cell = Cell(beat_row(), run=2.0)
     cell.plc.faults.silent = True
     cell.run(5.0)
     cell.plc.faults.silent = False
@@ -183,8 +182,7 @@ def test_rule_2_station_that_is_back_begins_with_0() -> None:
 
 
 def test_rule_2_port_that_is_back_begins_with_0() -> None:
-    cell = Cell(beat_row(), speed_row())
-    cell.run(2.0)
+    cell = Cell(beat_row(), speed_row(), run=2.0)
     cell.bench.lose_port()
     cell.run(1.0)
     since = cell.now
@@ -197,16 +195,14 @@ def test_rule_2_port_that_is_back_begins_with_0() -> None:
 @pytest.mark.parametrize('period', [200, 700])
 def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
         period: int) -> None:
-    cell = Cell(beat_row(period))
-    cell.run(2.0)
+    cell = Cell(beat_row(period), run=2.0)
     zero, one = [when for when, _, value in cell.writes if value in (0, 1)]
     assert max(period / 1000, 0.5) < one - zero < max(period / 1000, 0.5) + 0.05
     assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
 
 
 def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
-    cell = Cell(beat_row())
-    cell.run(1.05)
+    cell = Cell(beat_row(), run=1.05)
     cell.refused = {'N10:0'}
     cell.run(1.0)
     last = cell.written('N10:0')[-1]
@@ -220,8 +216,7 @@ def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
 def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     speed = speed_row()
     elsewhere = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)  # it never answers
-    cell = Cell(beat_row(), speed, elsewhere)
-    cell.run(1.0)
+    cell = Cell(beat_row(), speed, elsewhere, run=1.0)
     cell.publish(speed, 3)
     cell.run(0.2)
     cell.refused = {'N7:0'}
@@ -240,8 +235,7 @@ def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
 
 @pytest.mark.parametrize('polling', POLLING_MODES)
 def test_rule_3c_hung_executor_stops_the_beat_where_it_is(polling: str) -> None:
-    cell = Cell(beat_row(), polling=polling)
-    cell.run(2.0)
+    cell = Cell(beat_row(), polling=polling, run=2.0)
     cell.is_alive = False
     cell.run(1.2)
     last, count = cell.word('N10:0'), len(cell.writes)
@@ -299,8 +293,7 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
 
 def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
     speed = speed_row()
-    cell = Cell(beat_row(requires=['speed'], timeout=5000), speed)
-    cell.run(2.0)
+    cell = Cell(beat_row(requires=['speed'], timeout=5000), speed, run=2.0)
     assert set(cell.written('N10:0')) == {0}
     row = cell.bench.driver.interlocks.fallbacks[0]
     row.sent = cell.now
@@ -312,8 +305,7 @@ def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
 
 
 def test_rule_4_inactive_station_is_not_probed_with_heartbeats() -> None:
-    cell = Cell(beat_row())
-    cell.run(1.0)
+    cell = Cell(beat_row(), run=1.0)
     cell.plc.faults.silent = True
     cell.run(5.0)
     sent = cell.bench.driver.counters.commands_sent
@@ -322,8 +314,7 @@ def test_rule_4_inactive_station_is_not_probed_with_heartbeats() -> None:
 
 
 def test_rule_4_heartbeats_give_no_results() -> None:
-    cell = Cell(beat_row())
-    cell.run(3.0)
+    cell = Cell(beat_row(), run=3.0)
     assert cell.results() == []
 
 
@@ -347,8 +338,7 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
 
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
-    cell = Cell(beat_row(), speed_row())
-    cell.run(1.0)
+    cell = Cell(beat_row(), speed_row(), run=1.0)
     cell.refused = {'N10:0'}
     cell.bench.driver.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
@@ -371,8 +361,7 @@ def test_rule_6_pause_of_the_process_lets_no_beat_out_that_vouches_for_the_past(
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
     speed = speed_row()
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.bench.driver.write([speed], [3], cell.now - 0.3)
     cell.bench.line.wake(cell.bench.driver.machine)
     begun = cell.now
@@ -385,8 +374,7 @@ def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> No
 
 def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, maximum=10.0)
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.publish(speed, 3)
     cell.run(0.1)
     cell.publish(speed, 99, times=20)
@@ -398,8 +386,7 @@ def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
 @pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
 def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
     speed = speed_row()
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.publish(speed, 3)
     cell.run(0.1)
     cell.refused, cell.spared = {'N7:0'}, 7
@@ -413,8 +400,7 @@ def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: f
 
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
     speed = speed_row()
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.bench.driver.write([speed], [3], cell.now - 0.6)
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.0)
@@ -425,8 +411,7 @@ def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
 
 def test_rule_8_living_output_does_not_dip_in_a_short_outage() -> None:
     speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.publish(speed, 3)
     cell.run(1.0)
     cell.bench.lose_port()
@@ -438,8 +423,7 @@ def test_rule_8_living_output_does_not_dip_in_a_short_outage() -> None:
 
 def test_rule_8_change_to_run_is_a_first_contact() -> None:
     speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(beat_row(), speed)
-    cell.run(1.0)
+    cell = Cell(beat_row(), speed, run=1.0)
     cell.publish(speed, 3)
     cell.run(1.0)
     cell.plc.processor.setting = Setting.PROGRAM
@@ -455,8 +439,7 @@ def test_rule_8_change_to_run_is_a_first_contact() -> None:
 
 def test_rule_8_cleared_fault_is_a_change_to_run() -> None:
     speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(beat_row(), speed)
-    cell.run(1.0)
+    cell = Cell(beat_row(), speed, run=1.0)
     cell.publish(speed, 3)
     cell.run(1.0)
     running = Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
@@ -493,8 +476,7 @@ def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None
 
 def test_rule_8_message_that_stands_is_not_written_over() -> None:
     speed = speed_row()
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.publish(speed, 3, times=200)
     cell.run(19.0)
     assert cell.written('N7:0').count(7) == 1
@@ -532,8 +514,7 @@ def test_rule_10_fallback_is_tried_until_it_is_confirmed() -> None:
 
 
 def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
-    cell = Cell(speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200))
-    cell.run(1.0)
+    cell = Cell(speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200), run=1.0)
     cell.bench.lose_port()
     cell.run(1.0)
     cell.bench.open()
@@ -543,8 +524,7 @@ def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
 
 def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
     speed = speed_row()
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     say, cell.bench.far.say = cell.bench.far.say, lambda data: b''
     cell.publish(speed, 3)
     cell.run(0.05)
@@ -648,8 +628,7 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
 
 def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
     bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
-    cell = Cell(beat_row(period=200), bit, read)
-    cell.run(1.0)
+    cell = Cell(beat_row(period=200), bit, read, run=1.0)
     for number in range(400):
         cell.bench.write(bit, [number % 2])
     since = cell.now
@@ -663,15 +642,13 @@ def test_rule_11_every_eighth_turn_is_a_reads() -> None:
     beats = [make_mapping(f'N10:{number}', 'Heartbeat', tag=f'b{number}', period=100,
                           heartbeat=Heartbeat()) for number in range(19)]
     read = make_mapping('N11:0', period=0)
-    cell = Cell(*beats, read)
-    cell.run(5.0)
+    cell = Cell(*beats, read, run=5.0)
     assert len(cell.bench.listener.times(read)) > 10
 
 
 def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs() -> None:
     speed = speed_row(Fallback((7,), 3000))
-    cell = Cell(beat_row(), speed)
-    cell.run(2.0)
+    cell = Cell(beat_row(), speed, run=2.0)
     cell.publish(speed, 3)
     cell.run(0.1)
     cell.is_late, begun = True, cell.now
@@ -683,8 +660,7 @@ def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs
 
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
     served = make_mapping('N9:0', 'Serve', station=5, fallback=FALLBACK)
-    cell = Cell(served)
-    cell.run(0.1)
+    cell = Cell(served, run=0.1)
     words = cell.bench.driver._served.words_of
     assert words(served) == b'\7\0'
     cell.publish(served, 3)
@@ -697,8 +673,7 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
 
 def test_rule_13_run_guards_a_row() -> None:
     read = make_mapping('N11:0', period=100, publish_while=PublishWhile(None, None))
-    cell = Cell(read)
-    cell.run(3.0)
+    cell = Cell(read, run=3.0)
     assert len(cell.bench.listener.reads) > 20
     cell.plc.processor.setting = Setting.PROGRAM
     cell.run(1.0)
@@ -950,8 +925,7 @@ def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
     speed = speed_row()
-    cell = Cell(speed)
-    cell.run(1.0)
+    cell = Cell(speed, run=1.0)
     cell.publish(speed, 3)
     cell.run(0.1)
     cell.refused = {'N7:0'}
@@ -965,7 +939,6 @@ def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
 
 
 def test_rule_18_read_only_writes_nothing() -> None:
-    cell = Cell(beat_row(), speed_row(), read_only=True)
-    cell.run(3.0)
+    cell = Cell(beat_row(), speed_row(), read_only=True, run=3.0)
     assert cell.writes == []
     assert cell.bench.driver.interlocks.is_over
