@@ -55,13 +55,16 @@ class Bench:
     """A machine that carries out a list of steps and notes what each of them brought."""
 
     def __init__(self, *steps: Step, timing: LineTiming | None = None,
-                 forget_on_send: bool = False, duplex: Duplex = Duplex.HALF) -> None:
+                 forget_on_send: bool = False, duplex: Duplex = Duplex.HALF,
+                 start: float | None = 0.0) -> None:
         self.got: list[Symbol | None] = []
         self.error: Exception | None = None
         self.machine = Machine(
             self._procedure, checksum=Checksum.CRC, duplex=duplex, timing=timing,
             forget_on_send=forget_on_send)
         self._steps = steps
+        if start is not None:
+            self.machine.start(start)
 
     def _procedure(self, machine: Machine) -> Procedure:
         assert machine is self.machine
@@ -75,14 +78,13 @@ class Bench:
 
 
 def test_frame_goes_out_once() -> None:
-    bench = Bench(Step(FRAME, 1.0))
-    bench.machine.start(5.0)
+    bench = Bench(Step(FRAME, 1.0), start=5.0)
     assert bench.machine.data_to_send() == FRAME
     assert bench.machine.data_to_send() == b''
 
 
 def test_nothing_happens_before_start() -> None:
-    bench = Bench(Step(FRAME, 1.0))
+    bench = Bench(Step(FRAME, 1.0), start=None)
     bench.machine.receive_data(ACK, 1.0)
     bench.machine.handle_timeout(2.0)
     bench.machine.wake(3.0)
@@ -90,14 +92,12 @@ def test_nothing_happens_before_start() -> None:
 
 
 def test_deadline_counts_from_the_last_byte_on_the_line() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
-    bench.machine.start(5.0)
+    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
     assert bench.machine.deadline == pytest.approx(5.0 + 10 * 0.01 + 1.0)
 
 
 def test_deadline_of_a_second_frame_waits_for_the_first_to_leave() -> None:
-    bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
-    bench.machine.start(5.0)
+    bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
     assert bench.machine.data_to_send() == FRAME + FRAME
     assert bench.got == [None]
     assert bench.machine.deadline == pytest.approx(5.0 + 20 * 0.01 + 1.0)
@@ -105,8 +105,7 @@ def test_deadline_of_a_second_frame_waits_for_the_first_to_leave() -> None:
 
 def test_deadline_after_an_idle_line_counts_from_now() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(b'', 0.5), Step(FRAME, 1.0),
-                  timing=LineTiming(char_time=0.01))
-    bench.machine.start(5.0)
+                  timing=LineTiming(char_time=0.01), start=5.0)
     bench.machine.receive_data(ACK, 6.0)
     assert bench.machine.deadline == pytest.approx(6.5)
     bench.machine.receive_data(ACK, 6.25)
@@ -115,7 +114,6 @@ def test_deadline_after_an_idle_line_counts_from_now() -> None:
 
 def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_set() -> None:
     bench = Bench(*[Step(FRAME, 1.0)] * 101, timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     for count in range(1, 101):
         bench.machine.receive_data(EOT, 0.01 * count)
         assert bench.machine.deadline == pytest.approx(0.01 * count + 0.1 + 1.0)
@@ -123,7 +121,6 @@ def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_s
 
 def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
     bench = Bench(*[Step(FRAME, 1.0)] * 3, timing=LineTiming(char_time=0.01), duplex=Duplex.FULL)
-    bench.machine.start(0.0)
     bench.machine.data_to_send()
     bench.machine.receive_data(MESSAGE, 0.05)  # the other end speaks whenever it likes
     assert bench.machine.deadline == pytest.approx(0.2 + 1.0)
@@ -134,7 +131,7 @@ def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
 
 def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0), timing=LineTiming(char_time=0.01),
-                  duplex=Duplex.FULL)
+                  duplex=Duplex.FULL, start=None)
     bench.machine.unsent = lambda: 3  # the line is no faster than it is set
     bench.machine.start(0.0)
     bench.machine.data_to_send()
@@ -146,7 +143,6 @@ def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
 
 def test_symbol_ends_a_step() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(ACK[:1], 0.25)
     assert bench.got == []
     bench.machine.receive_data(ACK[1:], 0.5)
@@ -157,7 +153,6 @@ def test_symbol_ends_a_step() -> None:
 
 def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0))
-    bench.machine.start(0.0)
     bench.machine.handle_timeout(0.999)
     assert (bench.got, bench.machine.now) == ([], 0.999)
     bench.machine.handle_timeout(1.0)
@@ -167,7 +162,6 @@ def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
 
 def test_step_without_limit_has_no_deadline() -> None:
     bench = Bench(Step(b'', None))
-    bench.machine.start(0.0)
     assert bench.machine.deadline is None
     bench.machine.handle_timeout(1e9)
     assert bench.got == []
@@ -175,14 +169,13 @@ def test_step_without_limit_has_no_deadline() -> None:
 
 def test_timeout_zero_does_not_wait() -> None:
     bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     assert bench.machine.data_to_send() == ACK + EOT + FRAME
     assert bench.got == [None, None]
     assert bench.machine.deadline == 1.0
 
 
 def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on() -> None:
-    bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0))
+    bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0), start=None)
     sent: list[tuple[bytes, int]] = []
     bench.machine.send_at_once = lambda data: sent.append((data, len(bench.got)))
     bench.machine.start(0.0)
@@ -191,7 +184,7 @@ def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on()
 
 
 def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:
-    bench = Bench(Step(ACK, 0), Step(b'', 0), timing=LineTiming(tx_delay=0.5))
+    bench = Bench(Step(ACK, 0), Step(b'', 0), timing=LineTiming(tx_delay=0.5), start=None)
     sent: list[bytes] = []
     bench.machine.send_at_once = sent.append
     bench.machine.start(0.0)
@@ -203,14 +196,12 @@ def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:
 
 def test_step_that_neither_sends_nor_waits_hears_what_is_here_already() -> None:
     bench = Bench(Step(None, None), Step(b'', 0), Step(ACK, 0), Step(b'', 0), Step(b'', 0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(ACK + EOT + EOT, 1.0)
     assert bench.got == [SAID_ACK, SAID_EOT, None, SAID_EOT, None]
 
 
 def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
     bench = Bench(Step(ACK, 0))
-    bench.machine.start(0.0)
     assert bench.machine.deadline is None
     assert bench.machine.data_to_send() == ACK
     bench.machine.receive_data(ACK, 1.0)
@@ -219,7 +210,6 @@ def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
 
 def test_tx_delay_passes_before_each_transmission() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
-    bench.machine.start(0.0)
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', 0.25)
     bench.machine.handle_timeout(0.2)
     assert bench.machine.data_to_send() == b''
@@ -234,7 +224,6 @@ def test_tx_delay_passes_before_each_transmission() -> None:
 def test_tx_delay_begins_when_the_line_is_free() -> None:
     bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0),
                   timing=LineTiming(char_time=0.01, tx_delay=0.25))
-    bench.machine.start(0.0)
     bench.machine.handle_timeout(0.25)
     assert bench.machine.data_to_send() == FRAME
     assert bench.machine.deadline == pytest.approx(0.25 + 0.1 + 0.25)
@@ -247,13 +236,11 @@ def test_tx_delay_begins_when_the_line_is_free() -> None:
     (0.0, 0.25, 0.25), (0.5, 0.25, 0.5), (0.25, 0.5, 0.5)])
 def test_longer_of_the_two_delays_counts(tx_delay: float, delay: float, passes: float) -> None:
     bench = Bench(Step(FRAME, 1.0, delay), timing=LineTiming(tx_delay=tx_delay))
-    bench.machine.start(0.0)
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', passes)
 
 
 def test_listening_is_not_delayed() -> None:
     bench = Bench(Step(b'', 1.0, 0.5), timing=LineTiming(tx_delay=0.25))
-    bench.machine.start(0.0)
     assert bench.machine.deadline == 1.0
     bench.machine.receive_data(ACK, 0.1)
     assert bench.got == [SAID_ACK]
@@ -261,7 +248,6 @@ def test_listening_is_not_delayed() -> None:
 
 def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
-    bench.machine.start(0.0)
     assert bench.machine.data_to_send() == FRAME
     bench.machine.receive_data(ACK + EOT + NAK[:1], 0.5)
     assert bench.got == [SAID_ACK]
@@ -272,7 +258,6 @@ def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
 
 def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
-    bench.machine.start(0.0)
     bench.machine.data_to_send()
     bench.machine.handle_timeout(10.0)  # after a pause of the process
     bench.machine.receive_data(ACK, 10.0)
@@ -284,7 +269,6 @@ def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
 
 def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25), forget_on_send=True)
-    bench.machine.start(0.0)
     bench.machine.receive_data(ACK + b'\x10', 0.1)
     bench.machine.handle_timeout(0.25)
     assert bench.machine.data_to_send() == FRAME
@@ -296,7 +280,6 @@ def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
 
 def test_without_forgetting_all_symbols_are_delivered() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0, 0.25), Step(b'', 1.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(ACK + EOT, 0.5)
     assert bench.got == [SAID_ACK]
     bench.machine.handle_timeout(0.75)
@@ -313,7 +296,6 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
         size: int, characters: int) -> None:
     bench = Bench(Step(FRAME, 1.0, reply_size=94), Step(FRAME, 1.0),
                   timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     frame = message_frame(REPLY.encode(), Checksum.CRC)
     bench.machine.receive_data(frame[:size], 0.1 + 0.01 * size)  # as fast as the line goes
     assert bench.machine.spare_time == pytest.approx(0.01 * characters)
@@ -324,7 +306,6 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
 
 def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
     bench = Bench(Step(FRAME, 1.0, reply_size=94), timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     bench.machine.receive_data(message_frame(REPLY.encode(), Checksum.CRC)[:20], 0.2)
     assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
@@ -336,7 +317,6 @@ def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
     (REPLY._replace(cmd=0x0F), 94)])  # a command of the station's own
 def test_any_other_message_is_heard_as_it_comes(packet: Packet, reply_size: int) -> None:
     bench = Bench(Step(FRAME, 1.0, reply_size=reply_size), timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     bench.machine.receive_data(message_frame(packet.encode(), Checksum.CRC)[:20], 0.5)
     assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
@@ -363,7 +343,6 @@ def test_silence_tells_what_was_heard_and_since_when() -> None:
 
 def test_listen_on_keeps_the_deadline() -> None:
     bench = Bench(Step(FRAME, 1.0), LISTEN_ON, LISTEN_ON, Step(b'', 3.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(NAK, 0.5)
     bench.machine.receive_data(EOT, 0.75)
     assert bench.machine.deadline == 1.0
@@ -373,7 +352,6 @@ def test_listen_on_keeps_the_deadline() -> None:
 
 def test_answer_that_has_begun_extends_the_deadline() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), forget_on_send=True)
-    bench.machine.start(0.0)
     for number, byte in enumerate(MESSAGE):
         bench.machine.data_to_send()
         bench.machine.receive_data(bytes((byte,)), 0.9 + 0.04 * number)
@@ -386,7 +364,6 @@ def test_answer_that_has_begun_extends_the_deadline() -> None:
 def test_message_may_not_crawl_for_ever(pause: float) -> None:
     """A byte takes 0.01 s at the set speed; none of the pauses alone would end the message."""
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     now = 1.0
     bench.machine.receive_data(STX, now)
     while not bench.got:
@@ -399,7 +376,6 @@ def test_message_may_not_crawl_for_ever(pause: float) -> None:
 
 def test_message_that_never_ends_is_given_up_after_the_time_of_the_longest() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     now = 1.0
     bench.machine.receive_data(STX, now)
     while not bench.got:
@@ -412,7 +388,6 @@ def test_message_that_never_ends_is_given_up_after_the_time_of_the_longest() -> 
 
 def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(b'', KEEP), timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     bench.machine.receive_data(MESSAGE[:5], 1.0)
     bench.machine.receive_data(MESSAGE[5:], 1.2)  # heard out to its end
     assert isinstance(bench.got[0], Frame)
@@ -423,7 +398,6 @@ def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
 
 def test_pause_ends_an_answer_that_has_begun() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     bench.machine.receive_data(MESSAGE[:5], 1.0)
     assert bench.machine.deadline == pytest.approx(1.0 + 20 * 0.01 + 0.1)
     bench.machine.handle_timeout(1.31)
@@ -432,21 +406,18 @@ def test_pause_ends_an_answer_that_has_begun() -> None:
 
 def test_answer_that_has_begun_does_not_shorten_the_deadline() -> None:
     bench = Bench(Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(MESSAGE[:5], 0.1)
     assert bench.machine.deadline == 1.0
 
 
 def test_noise_outside_of_a_message_does_not_extend_the_deadline() -> None:
     bench = Bench(Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(b'noise\x10', 0.95)
     assert bench.machine.deadline == 1.0
 
 
 def test_message_without_time_limit_gets_none() -> None:
     bench = Bench(Step(b'', None))
-    bench.machine.start(0.0)
     bench.machine.receive_data(MESSAGE[:5], 0.5)
     assert bench.machine.deadline is None
 
@@ -456,7 +427,6 @@ def test_message_without_time_limit_gets_none() -> None:
 def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, pause: float,
                                                                 forgotten: bool) -> None:
     bench = Bench(*[Step(b'', None)] * 3, timing=LineTiming(char_time=0.01))
-    bench.machine.start(0.0)
     bench.machine.receive_data(broken, 1.0)
     bench.machine.receive_data(EOT, 1.0 + pause)
     assert (bench.got == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
@@ -464,7 +434,6 @@ def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, p
 
 def test_pause_within_a_time_limit_ends_nothing() -> None:
     bench = Bench(Step(b'', 5.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(EOT[:1], 1.0)
     bench.machine.receive_data(EOT[1:], 4.0)
     assert bench.got == [SAID_EOT]
@@ -472,7 +441,6 @@ def test_pause_within_a_time_limit_ends_nothing() -> None:
 
 def test_wake_ends_a_rest() -> None:
     bench = Bench(Step(None, 10.0), Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     assert bench.machine.deadline == 10.0
     bench.machine.wake(3.0)
     assert bench.got == [None]
@@ -481,14 +449,12 @@ def test_wake_ends_a_rest() -> None:
 
 def test_time_ends_a_rest() -> None:
     bench = Bench(Step(None, 10.0), Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     bench.machine.handle_timeout(10.0)
     assert (bench.got, bench.machine.data_to_send()) == ([None], FRAME)
 
 
 def test_rest_without_limit_lasts_until_wake() -> None:
     bench = Bench(Step(None, None), Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     assert bench.machine.deadline is None
     bench.machine.wake(3.0)
     assert bench.got == [None]
@@ -497,7 +463,6 @@ def test_rest_without_limit_lasts_until_wake() -> None:
 @pytest.mark.parametrize('step', [Step(FRAME, 1.0), Step(b'', 1.0), Step(FRAME, 1.0, 0.5)])
 def test_wake_disturbs_no_transaction(step: Step) -> None:
     bench = Bench(step)
-    bench.machine.start(0.0)
     deadline = bench.machine.deadline
     bench.machine.wake(0.25)
     assert (bench.got, bench.machine.deadline) == ([], deadline)
@@ -505,7 +470,6 @@ def test_wake_disturbs_no_transaction(step: Step) -> None:
 
 def test_rest_is_deaf() -> None:
     bench = Bench(Step(None, 1.0), Step(FRAME, 1.0), forget_on_send=True)
-    bench.machine.start(0.0)
     bench.machine.receive_data(ACK, 0.5)
     bench.machine.handle_timeout(1.0)
     assert bench.got == [None]
@@ -514,7 +478,6 @@ def test_rest_is_deaf() -> None:
 
 def test_stop_raises_its_error_inside_the_procedure() -> None:
     bench = Bench(Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     error = OSError('unplugged')
     bench.machine.stop(error)
     assert bench.error is error
@@ -556,7 +519,6 @@ def test_stop_lets_another_error_through() -> None:
 
 def test_stop_without_error_closes_the_procedure() -> None:
     bench = Bench(Step(FRAME, 1.0))
-    bench.machine.start(0.0)
     bench.machine.stop()
     assert bench.error is None
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', None)
@@ -564,7 +526,6 @@ def test_stop_without_error_closes_the_procedure() -> None:
 
 def test_start_begins_afresh() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0), timing=LineTiming(char_time=1.0))
-    bench.machine.start(0.0)
     bench.machine.receive_data(ACK + b'\x10', 0.5)
     bench.machine.start(2.0)
     bench.machine.receive_data(b'\x06', 2.5)
@@ -593,7 +554,7 @@ def _stopped(machine: Machine) -> None:
 
 @pytest.mark.parametrize('prepare', [_deaf, _stopped])
 def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], None]) -> None:
-    machine = Bench(Step(FRAME, None), Step(EOT, None)).machine
+    machine = Bench(Step(FRAME, None), Step(EOT, None), start=None).machine
     machine.start(0.0)
     assert machine.counters.chars_sent == 10
     machine.receive_data(ACK, 0.5)
@@ -605,7 +566,6 @@ def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], 
 
 def test_frame_that_waits_is_counted_when_it_goes_out() -> None:
     bench = Bench(Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
-    bench.machine.start(0.0)
     assert bench.machine.counters.chars_sent == 0
     bench.machine.handle_timeout(0.25)
     assert bench.machine.counters.chars_sent == 10
@@ -691,7 +651,6 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
 
 def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
     bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), Step(FRAME, 1.0), Step(None, None))
-    bench.machine.start(0.0)
     bench.machine.handle_timeout(0.5)
     bench.machine.handle_timeout(1.25)
     bench.machine.receive_data(ACK, 2.0)
@@ -722,7 +681,7 @@ class Clockwork:
 
 @pytest.mark.parametrize('due, call', [(math.inf, 2.0), (1.5, 1.5), (3.0, 2.0)])
 def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(None, None))
+    bench = Bench(Step(FRAME, 1.0), Step(None, None), start=None)
     bench.machine.background = clockwork = Clockwork(due)
     bench.machine.start(1.0)
     assert bench.machine.next_call == call
@@ -732,7 +691,7 @@ def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> 
 
 
 def test_background_is_asked_when_the_machine_is_woken() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(None, None))
+    bench = Bench(Step(FRAME, 1.0), Step(None, None), start=None)
     bench.machine.background = clockwork = Clockwork(math.inf)
     bench.machine.start(1.0)
     bench.machine.wake(1.5)
@@ -747,8 +706,7 @@ QUESTION = master_frame(3, bytes(8), Checksum.CRC)
 
 def test_echo_of_an_ack_may_be_held_back_until_the_next_question() -> None:
     bench = Bench(Step(QUESTION, 1.0), Step(ACK, 0), Step(None, 0.015), Step(QUESTION, 1.0),
-                  forget_on_send=True)
-    bench.machine.start(5.0)
+                  forget_on_send=True, start=5.0)
     assert bench.machine.data_to_send() == QUESTION
     bench.machine.receive_data(QUESTION + EOT, 5.0)
     assert bench.machine.data_to_send() == ACK

@@ -15,6 +15,7 @@
 """The slave that is a driver of its own: its commands, its polls, its time limits."""
 
 from dataclasses import replace
+from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame
@@ -24,6 +25,7 @@ from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost, WrongCommandCode
 import pytest
 from support.multidrop import SlaveBench
+from support.peers import CommandTask
 
 US, MASTER, OTHER = 7, 5, 8
 SETTINGS = SlaveSettings(US, retries=2)
@@ -34,6 +36,21 @@ OTHERS_TRAFFIC = poll_frame(OTHER) + EOT
 def own(tns: int = 1, dst: int = OTHER) -> Packet:
     """Return a command of our own."""
     return Packet(dst, US, 0x0F, 0, tns, b'\x67')
+
+
+def polled(settings: SlaveSettings = SETTINGS, **options: Any) -> tuple[SlaveBench, CommandTask]:
+    """Return a slave that has sent own(1), and the task."""
+    bench = SlaveBench(settings, **options)
+    task = bench.add(own())
+    assert bench.poll() == bench.own(own())
+    return bench, task
+
+
+def acknowledged(*args: SlaveSettings, **options: Any) -> tuple[SlaveBench, CommandTask]:
+    """Return a slave whose own(1) has got its ACK, and the task."""
+    bench, task = polled(*args, **options)
+    assert bench.hear(ACK) == b''
+    return bench, task
 
 
 def test_command_leaves_at_a_poll_and_its_reply_ends_it() -> None:
@@ -170,9 +187,7 @@ def test_what_is_wrong_with_messages_for_us_is_told_by_number() -> None:
 
 
 def test_nak_leaves_a_command_that_the_master_has_taken() -> None:
-    bench = SlaveBench(SETTINGS)
-    task = bench.add(own())
-    bench.poll()
+    bench, task = polled()
     bench.hear(ACK, NAK)
     assert task.result is None
     bench.hear(bench.frame(own().reply()))
@@ -182,9 +197,7 @@ def test_nak_leaves_a_command_that_the_master_has_taken() -> None:
 @pytest.mark.parametrize('traffic', [poll_frame(OTHER), EOT, message_frame(
     FROM_MASTER.reply().encode(), Checksum.CRC), poll_frame(US)[:-1] + b'\x01'])
 def test_ack_after_any_other_traffic_is_another_stations(traffic: bytes) -> None:
-    bench = SlaveBench(SETTINGS)
-    task = bench.add(own())
-    bench.poll()
+    bench, task = polled()
     bench.hear(traffic, ACK)
     assert bench.poll() == bench.own(own())
     assert bench.counts()['nak_retries'] == 1
@@ -206,10 +219,7 @@ def test_our_own_voice_on_a_two_wire_adapter_is_no_other_traffic() -> None:
 
 
 def test_reply_with_a_wrong_command_code() -> None:
-    bench = SlaveBench(SETTINGS)
-    task = bench.add(own())
-    bench.poll()
-    bench.hear(ACK)
+    bench, task = acknowledged()
     assert bench.hear(bench.frame(own().reply()._replace(cmd=0x46))) == ACK
     assert isinstance(task.result, WrongCommandCode)
     assert task.result.args == (OTHER, 0x46, 0x4F)
@@ -220,10 +230,7 @@ def test_reply_with_a_wrong_command_code() -> None:
 @pytest.mark.parametrize('reply', [
     own(2).reply(), own().reply()._replace(src=9), own().reply()._replace(dst=9)])
 def test_reply_that_fits_nothing_is_stale(reply: Packet) -> None:
-    bench = SlaveBench(SETTINGS)
-    task = bench.add(own())
-    bench.poll()
-    bench.hear(ACK)
+    bench, task = acknowledged()
     assert bench.hear(bench.frame(reply)) == ACK
     assert task.result is None
     assert bench.numbers() == [(2510, reply.src, reply.dst, reply.tns)]
@@ -237,19 +244,14 @@ def test_reply_without_any_command_is_stale() -> None:
 
 
 def test_repeated_reply_is_acknowledged_and_passed_over() -> None:
-    bench = SlaveBench(SETTINGS)
-    bench.add(own())
-    bench.poll()
+    bench, _ = polled()
     assert bench.hear(ACK, *[bench.frame(own().reply())] * 2) == ACK + ACK
     assert bench.counts()['duplicate_messages'] == 1
     assert 'stale_messages' not in bench.counts()
 
 
 def test_reply_is_taken_by_a_sink_that_is_full_of_others() -> None:
-    bench = SlaveBench(replace(SETTINGS, queue_size=1))
-    task = bench.add(own())
-    bench.poll()
-    bench.hear(ACK)
+    bench, task = acknowledged(replace(SETTINGS, queue_size=1))
     assert bench.hear(bench.frame(FROM_MASTER)) == ACK
     assert bench.hear(bench.frame(FROM_MASTER._replace(tns=9))) == b''
     assert bench.hear(bench.frame(own().reply())) == ACK
@@ -257,9 +259,7 @@ def test_reply_is_taken_by_a_sink_that_is_full_of_others() -> None:
 
 
 def test_reply_with_an_error_is_counted_and_handed_on() -> None:
-    bench = SlaveBench(SETTINGS)
-    task = bench.add(own())
-    bench.poll()
+    bench, task = polled()
     bench.hear(ACK, bench.frame(own().reply(sts=2)))
     assert task.result == own().reply(sts=2)
     assert bench.counts()['error_messages_received'] == 1
@@ -289,9 +289,7 @@ def test_command_timeout_runs_from_the_masters_ack(busy: bool) -> None:
 
 
 def test_command_without_ack_is_not_kept_for_a_master_that_is_gone() -> None:
-    bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
-    task = bench.add(own())
-    bench.poll()
+    bench, task = polled(cmd_timeout=1.0)
     bench.wait(1.3)
     assert isinstance(task.result, CommandTimeout)
     assert bench.numbers() == [(2508,)]
@@ -299,10 +297,7 @@ def test_command_without_ack_is_not_kept_for_a_master_that_is_gone() -> None:
 
 
 def test_reply_that_comes_after_its_time_is_stale() -> None:
-    bench = SlaveBench(SETTINGS, cmd_timeout=1.0)
-    task = bench.add(own())
-    bench.poll()
-    bench.hear(ACK)
+    bench, task = acknowledged(cmd_timeout=1.0)
     bench.wait(2.0)
     bench.hear(bench.frame(own().reply()))
     assert isinstance(task.result, CommandTimeout)
@@ -350,9 +345,7 @@ def test_poll_timeout_zero_is_never() -> None:
 
 
 def test_held_command_is_not_sent_any_more_after_the_poll_timeout() -> None:
-    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
-    task = bench.add(own())
-    bench.poll()
+    bench, task = polled(poll_timeout=2.0)
     bench.wait(3.0)
     assert isinstance(task.result, CommandTimeout)
     assert task.sent
@@ -368,10 +361,7 @@ def test_held_reply_survives_the_poll_timeout() -> None:
 
 
 def test_poll_timeout_fails_a_command_that_waits_for_its_reply() -> None:
-    bench = SlaveBench(SETTINGS, poll_timeout=2.0, cmd_timeout=100.0)
-    task = bench.add(own())
-    bench.poll()
-    bench.hear(ACK)
+    bench, task = acknowledged(poll_timeout=2.0, cmd_timeout=100.0)
     bench.wait(3.0)
     assert isinstance(task.result, CommandTimeout)
 
@@ -543,9 +533,7 @@ def test_bytes_come_one_by_one() -> None:
 
 
 def test_suppressed_eot_leaves_a_poll_without_an_answer() -> None:
-    bench = SlaveBench(replace(SETTINGS, eot_suppression=True))
-    task = bench.add(own())
-    assert bench.poll() == bench.own(own())
+    bench, task = polled(replace(SETTINGS, eot_suppression=True))
     bench.hear(ACK)
     assert bench.poll() == b''
     assert task.result is None
