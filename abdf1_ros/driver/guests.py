@@ -39,7 +39,7 @@ from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.extent import Extent
 
-_MOST_WAITING = 4  # of a guest; a program that waits for its replies has one
+_MOST_WAITING = 16  # of a guest: AbDf1 sends as many before it waits for a reply
 
 _NO_BUFFER, _NOT_ACKNOWLEDGED, _NOT_CONNECTED, _NO_REPLY, _OFF_LINE = 0x01, 0x02, 0x04, 0x05, 0x07
 _NOT_ALLOWED = 0x60
