@@ -168,13 +168,14 @@ def _versions() -> dict[str, str]:
 
 
 def _without_data(entry: Entry) -> Entry:
-    """Return an entry without the data of its message, also not quoted in its text."""
+    """Return an entry without its guest, and its message's data, also not quoted in its text."""
     packet = entry.packet
     if packet is None:
         return replace(entry, text='')
     # The first byte of a command is its FNC. The words before the colon are stations and TNS.
     data = packet.data[:1] if entry.kind is Kind.COMMAND else b''
-    return replace(entry, packet=packet._replace(data=data), text=entry.text.partition(':')[0])
+    return replace(entry, packet=packet._replace(data=data), text=entry.text.partition(':')[0],
+                   guest='')
 
 
 def _without_names(text: str) -> str:

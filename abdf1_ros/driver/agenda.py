@@ -109,12 +109,15 @@ class Agenda:
         return job or has_writes and self._write(now, busy) \
             or has_guests and self._guest(now, busy) or None
 
-    def _guest(self, now: float, busy: Container[int]) -> Job | None:
+    def _guest(self, now: float, busy: Container[int]) -> JobTask | None:
         """Return a command of a guest."""
         job = self._guests.next(now, busy)
-        if job is not None:
-            self._since_guest = self._writes_in_a_row = 0
-        return job
+        if job is None:
+            return None
+        self._since_guest = self._writes_in_a_row = 0
+        task = self._tasks.start(job, now)
+        job.command.guest.sends(task.command)
+        return task
 
     def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a new write, or the next packet of one under way, in turns."""

@@ -77,9 +77,9 @@ class Guest:
 
     ``refused`` counts commands that were not allowed, ``unanswered`` those for which the PLC has
     given no reply, ``collisions`` writes to words that we write too; ``slowest`` is the longest
-    time (s) to a reply. ``is_connected`` is what its port says. ``wrote`` is called when a PLC may
-    have executed a command that is not a read, with the station and the words as far as known, and
-    ``was_refused`` with one that is not allowed.
+    time (s) to a reply. ``is_connected`` is what its port says. ``sends`` is called with each
+    command on its way to the line, ``wrote`` when a PLC may have executed one that is not a read,
+    with the station and the words as far as known, ``was_refused`` with one that is not allowed.
     """
 
     name: str
@@ -91,6 +91,7 @@ class Guest:
     slowest: float = 0.0
     collisions: int = 0
     waiting: deque[GuestCommand] = field(default_factory=deque)
+    sends: Callable[[Packet], None] = lambda command: None
     wrote: Callable[[Packet, int, list[Extent]], None] = lambda command, station, words: None
     was_refused: Callable[[Packet], None] = lambda command: None
 

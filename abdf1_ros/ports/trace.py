@@ -22,11 +22,12 @@ import math
 from pathlib import Path
 import time
 
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import is_pseudo_terminal, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction
+from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
 
 
 def begun_now() -> str:
@@ -46,8 +47,8 @@ class Trace:
         self._on_error = on_error
         self._writer: CaptureWriter | None = CaptureWriter(Path(path), limit, settings)
 
-    def write(self, chunk: Chunk) -> None:
-        """Write a chunk, or nothing after an error."""
+    def write(self, chunk: Chunk | str) -> None:
+        """Write a chunk or a setting, or nothing after an error."""
         if self._writer is None:
             return
         try:
@@ -124,6 +125,11 @@ class PortOpener:
             self._trace = Trace(path, settings, on_error, limit)
         except OSError as error:
             on_error(f'{error}; nothing is recorded')
+
+    def note_guest(self, place: str, command: Packet) -> None:
+        """Take note in the capture that a command which is sent now is a guest's."""
+        if self._trace is not None:
+            self._trace.write(setting_line('guest', f'{command.tns:04X} {place}'))
 
     def open(self) -> Port:  # noqa: A003
         """Open the port; raises OSError."""

@@ -203,6 +203,7 @@ class Session:
         lines = [GuestLine(place, network, self.driver.guests, self._wake_link, self._guest_fault)
                  for place in share_places(network.share)]
         for line in lines:
+            line.guest.sends = partial(self._surroundings.opener.note_guest, line.guest.name)
             line.guest.wrote = partial(self._guest_wrote, line.guest)
             line.guest.was_refused = partial(self._guest_refused, line.guest)
         return lines

@@ -26,7 +26,8 @@ A capture is ASCII, one line for each chunk of bytes as it was read or written::
     0.004210 < 10 04
 
 The first line gives the version of the format. Other lines with ``#`` are settings, "name:
-value", or remarks, and may stand anywhere. A chunk has the seconds since ``begun``, its
+value", or remarks, and may stand anywhere; "guest: A40E pty:/tmp/hmi" says that the next command
+with TNS A40E is that guest's (column Share). A chunk has the seconds since ``begun``, its
 direction (``>`` sent by whoever has recorded it, or by the first port of a tap; ``<`` received,
 or sent by the second port; ``?`` not known), and its bytes in hexadecimal.
 """
@@ -96,18 +97,16 @@ class CaptureWriter:
                  settings: Mapping[str, str] | None = None) -> None:
         self.path = path
         self._limit = limit / 2
-        head = '\n'.join([_FIRST_LINE, *(
-            f'# {name}: {printable(value)}' for name, value in (settings or {}).items())])
-        # Escaped here, so that the escaped length is counted.
-        self._head = head.encode('ascii', 'backslashreplace').decode('ascii')
+        self._head = '\n'.join([_FIRST_LINE, *(
+            setting_line(name, value) for name, value in (settings or {}).items())])
         self._written = 0
         for place in (path, Path(f'{path}.1')):
             if place.exists() and not _is_capture(place):
                 raise OSError(f'{place} exists and is not a capture; give another name')
         self._file = self._begin()
 
-    def write(self, chunk: Chunk) -> None:
-        """Write a chunk."""
+    def write(self, chunk: Chunk | str) -> None:
+        """Write a chunk, or a line that is one of ``setting_line``."""
         line = str(chunk)
         if self._written + len(line) + 1 > self._limit:
             self._file.close()
@@ -128,6 +127,12 @@ class CaptureWriter:
 
     def _put(self, text: str) -> None:
         self._written += self._file.write(f'{text}\n')
+
+
+def setting_line(name: str, value: str) -> str:
+    """Return the line of a setting, in ASCII."""
+    line = f'# {name}: {printable(value)}'
+    return line.encode('ascii', 'backslashreplace').decode('ascii')
 
 
 def _is_capture(path: Path) -> bool:

@@ -46,6 +46,7 @@ class Transaction:
 
     command: Packet
     time: float | None
+    guest: str = ''
     answered: bool = False
 
 
@@ -55,6 +56,7 @@ class MessageFacts(NamedTuple):
     command: Packet | None = None
     latency: float | None = None
     marks: tuple[Mark, ...] = ()
+    guest: str = ''
 
 
 class Conversation:
@@ -70,6 +72,7 @@ class Conversation:
         self._said: dict[tuple[int, int, bool, bool], _Said] = {}
         self._last: dict[Direction, _Said] = {}
         self._given_up: list[Transaction] = []
+        self._guest = ('', '')  # TNS and place
 
     def take(self, packet: Packet, time: float | None, direction: Direction,
              from_master: bool) -> MessageFacts:
@@ -79,7 +82,8 @@ class Conversation:
         marks = () if mark is None else (mark,)
         if not packet.is_reply:
             self._begin(packet, time, mark)
-            return MessageFacts(marks=marks)
+            known = self._open.get((packet.src, packet.dst, packet.tns))
+            return MessageFacts(marks=marks, guest=known.guest if known else '')
         transaction = self._open.get((packet.dst, packet.src, packet.tns))
         if transaction is None:
             return MessageFacts(marks=(*marks, Mark.STRAY))
@@ -90,7 +94,12 @@ class Conversation:
         if not transaction.answered and time is not None and begun is not None and begun <= time:
             latency = time - begun
         transaction.answered = True
-        return MessageFacts(command, latency, marks)
+        return MessageFacts(command, latency, marks, transaction.guest)
+
+    def note_guest(self, note: str) -> None:
+        """Take "TNS place", whose command will be the next with this TNS."""
+        tns, _, place = note.partition(' ')
+        self._guest = tns, place
 
     def acknowledge(self, direction: Direction) -> None:
         """Take an ACK in this ``direction``: it is for the last message in the other."""
@@ -139,7 +148,11 @@ class Conversation:
         if known is not None and not known.answered:
             self._given_up.append(known)  # its TNS is used for another command
         self._open.pop(key, None)  # the new one takes its place at the end
-        self._open[key] = Transaction(command, time)
+        tns, guest = self._guest
+        is_guests = tns == f'{command.tns:04X}'
+        if is_guests:
+            self._guest = ('', '')
+        self._open[key] = Transaction(command, time, guest if is_guests else '')
 
 
 def _path(packet: Packet) -> tuple[int, int, bool]:

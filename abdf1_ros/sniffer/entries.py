@@ -66,7 +66,8 @@ class Entry:
     on a full-duplex line the node that commands go to and replies come from. ``valid`` is the
     verdict of the check of kind ``checksum``, None where there is no check. ``latency`` is the
     seconds from a command to its reply. ``size`` counts the bytes of noise. ``wire`` has the bytes
-    on the line; it is empty for silence, for a missing reply and for noise.
+    on the line; it is empty for silence, for a missing reply and for noise. ``guest`` is the place
+    of the guest (column Share) whose command the recording node has sent.
     """
 
     time: float | None
@@ -81,3 +82,4 @@ class Entry:
     marks: tuple[Mark, ...] = ()
     size: int = 0
     wire: bytes = b''
+    guest: str = ''

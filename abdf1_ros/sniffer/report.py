@@ -35,7 +35,8 @@ def text_line(entry: Entry, colour: bool = False) -> str:
     """Return time, direction, station, kind, text, check, latency and marks of an entry."""
     time = '-' if entry.time is None else f'{entry.time:.6f}'
     station = '' if entry.station is None else str(entry.station)
-    parts = [part for part in (entry.text, _check(entry), _latency(entry)) if part]
+    guest = f'guest {entry.guest}' if entry.guest else ''
+    parts = [part for part in (entry.text, guest, _check(entry), _latency(entry)) if part]
     parts += [mark.value.upper() for mark in entry.marks]
     line = (f'{time:>13} {entry.direction.value} {station:>3} {entry.kind.value:<8} '
             f'{" | ".join(parts)}').rstrip()
@@ -68,7 +69,7 @@ def json_line(entry: Entry) -> str:
     fields: dict[str, Any] = {
         'time': None if entry.time is None else round(entry.time, 6),
         'direction': entry.direction.value, 'kind': entry.kind.value,
-        'station': entry.station, 'text': entry.text or None,
+        'station': entry.station, 'text': entry.text or None, 'guest': entry.guest or None,
         'check': entry.checksum.value if entry.checksum else None, 'valid': entry.valid,
         'latency_ms': _milliseconds(entry.latency),
         'marks': [mark.value for mark in entry.marks] or None, 'bytes': entry.size or None}

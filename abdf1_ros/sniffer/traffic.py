@@ -77,6 +77,7 @@ class TrafficDecoder:
         self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
         self._wires: dict[Direction, _OneDirection] = {}
         self._conversation = Conversation()
+        self.note_guest = self._conversation.note_guest
         self._station: int | None = None  # the last one that the master sent something to
         self._awaited: tuple[Direction, str] | None = None  # asker, and question
         self._last_asker = Direction.OUT
@@ -134,7 +135,8 @@ class TrafficDecoder:
     def _unanswered(self, transaction: Transaction, time: float | None) -> Entry:
         command = transaction.command
         return Entry(time, Direction.UNKNOWN, Kind.UNANSWERED,
-                     f'{_route(command)}: {describe(command)}', command.dst, packet=command)
+                     f'{_route(command)}: {describe(command)}', command.dst, packet=command,
+                     guest=transaction.guest)
 
     def _entries(self, symbol: Symbol, chunk: Chunk,
                  decoder: ListeningDecoder) -> Iterator[Entry]:
@@ -210,7 +212,8 @@ class TrafficDecoder:
         kind = Kind.REPLY if packet.is_reply else Kind.COMMAND
         return Entry(
             time, direction, kind, f'{_route(packet)}: {describe(packet, facts.command)}',
-            self._node(station, packet), packet=packet, latency=facts.latency, marks=facts.marks)
+            self._node(station, packet), packet=packet, latency=facts.latency, marks=facts.marks,
+            guest=facts.guest)
 
     def _damaged(self, frame: Frame, time: float | None, direction: Direction,
                  checksum: Checksum) -> Entry:

@@ -16,6 +16,7 @@
 
 from pathlib import Path
 
+from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.errors import RemoteError
 import pytest
@@ -24,11 +25,13 @@ from support.ros import Observer, OK, Process, until_status, WARN
 from support.simulator_process import make_files, OFTEN
 
 
-def test_hmi_reads_and_writes_through_the_node(tmp_path: Path) -> None:
+def test_hmi_reads_and_writes_through_the_node(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files, place = make_files(tmp_path), tmp_path / 'hmi'
     with (files.start_simulator(), Observer() as observer,
           Process('node', *files.args(OFTEN, f'net.share:="pty:{place}"',
-                                      'net.share_access:=Write')) as node):
+                                      'net.share_access:=Write',
+                                      f'trace_file:={tmp_path}/line.cap')) as node):
         setpoints = observer.listen(Float32MultiArray, '/abdf1/read/setpoint')
         diagnostics = observer.diagnostics(files.port)
         setpoints.values([21.5])
@@ -44,6 +47,13 @@ def test_hmi_reads_and_writes_through_the_node(tmp_path: Path) -> None:
                          lambda status: '1 writes to words of ours' in status.message)
         node.end()
     assert not place.is_symlink()
+    assert sniff([str(tmp_path / 'line.cap')]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    guests = [line for line in lines if f'| guest pty:{place} |' in line]
+    # Three commands of it, and their replies.
+    assert len(guests) == 6
+    assert sum('write F8:4 = 30.5' in line for line in guests) == 1
+    assert len([line for line in lines if ' command ' in line]) > 10
 
 
 def test_what_is_not_allowed_is_told_once(tmp_path: Path) -> None:

@@ -54,6 +54,16 @@ def test_reply_finds_its_command(talk: Talk) -> None:
     assert [open_one.command.dst for open_one in talk.unanswered()] == [2]
 
 
+def test_command_after_the_note_of_a_guest_is_the_guests(talk: Talk) -> None:
+    talk.note_guest(f'{COMMAND.tns:04X} pty:/tmp/hmi')
+    assert talk.out(Packet(2, 5, 0x0F, 0, COMMAND.tns + 1)).guest == ''
+    assert talk.out(COMMAND).guest == 'pty:/tmp/hmi'
+    assert talk.out(COMMAND) == MessageFacts(guest='pty:/tmp/hmi', marks=(Mark.RETRANSMISSION,))
+    assert talk.back(REPLY).guest == 'pty:/tmp/hmi'
+    # The TNS comes again, much later.
+    assert talk.out(Packet(1, 5, 0x06, 0, COMMAND.tns, b'\x03')).guest == ''
+
+
 def test_reply_to_nothing_and_to_another_command(talk: Talk) -> None:
     assert talk.back(REPLY).marks == (Mark.STRAY,)
     talk.out(COMMAND)
