@@ -15,9 +15,10 @@
 """
 The command ``conform``: plays one end of a line and checks the other against the manual.
 
-The other end is a slave or a master of a half-duplex line, or a node of a full-duplex one that
-answers commands (peer) or sends them (client). Every case is a rule: what is sent, what must come
-back and within what time, with document and page.
+The other end is a slave or a master of a half-duplex line, or a node of a full-duplex line or of a
+radio modem network that answers commands (peer, radio) or sends them (client, radio-client).
+Every case is a rule: what is sent, what must come back and within what time, with document and
+page.
 """
 
 from __future__ import annotations
@@ -44,13 +45,15 @@ from abdf1_ros.cli.terminal import (
     seconds_option,
     whole_option,
 )
-from abdf1_ros.conform import asking, client, data, duplicates, master, peer, slave
+from abdf1_ros.conform import asking, client, data, duplicates, master, peer, radio, slave
 from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
 from abdf1_ros.conform.ends import (
     AskingEnd,
     MasterEnd,
     PeerEnd,
+    RadioEnd,
+    RadioServerEnd,
     ServerEnd,
     SlaveEnd,
     Words,
@@ -78,7 +81,7 @@ _EXIT_USAGE = 2
 _INTERRUPTED = 130
 
 # Importing them enters their cases.
-_MODULES = (slave, master, peer, client, data, duplicates, asking)
+_MODULES = (slave, master, peer, client, radio, data, duplicates, asking)
 
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 
@@ -164,7 +167,8 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
         return _EXIT_USAGE
     try:
         wire = Wire(line, BlockCheck(network.error_code), time.monotonic,
-                    is_half_duplex=target.is_half_duplex, answer_time=options.answer_time,
+                    is_half_duplex=target.is_half_duplex, is_radio=target.is_radio,
+                    answer_time=options.answer_time,
                     char_time=0.0 if made else network.timing.char_time)
         return _judge(options, target, cases, wire, network)
     except OSError as error:
@@ -238,15 +242,16 @@ def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
 def _end(options: argparse.Namespace, target: Target, wire: Wire,
          network: Network) -> MasterEnd | PeerEnd | SlaveEnd | ServerEnd:
     """Return the end that we play."""
-    if target in (Target.SLAVE, Target.PEER):
-        kind = MasterEnd if target is Target.SLAVE else PeerEnd
+    if target in (Target.SLAVE, Target.PEER, Target.RADIO):
+        kind = MasterEnd if target is Target.SLAVE else (
+            PeerEnd if target is Target.PEER else RadioEnd)
         file, element = options.words or (7, 0)
         words = Words(file, element, options.count, options.family or '')
         return kind(wire, options.station, network.station, random.randrange(0x10000), words)
     serve = _server(options, network)
     if target is Target.MASTER:
         return SlaveEnd(wire, options.station, serve)
-    return ServerEnd(wire, serve)
+    return RadioServerEnd(wire, serve) if target.is_radio else ServerEnd(wire, serve)
 
 
 def _integer_words(text: str) -> tuple[int, int]:
@@ -290,7 +295,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('target', choices=[target.value for target in Target],
                         help='what stands at the other end')
     parser.add_argument('--station', type=whole_option, default=1, metavar='N',
-                        help='of the target; for master and client the one that we play '
+                        help='of the target; for master and clients the one that we play '
                              '(default: %(default)s)')
     parser.add_argument('--answer-time', type=seconds_option, default=1.0, metavar='S',
                         help='s that an answer may take, and that silence has to last '
@@ -305,7 +310,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--yes', action='store_true',
                         help='run cases that write, and those that reset the line')
     parser.add_argument('--data', metavar='FILE',
-                        help='for master and client: what we answer from (default: the example)')
+                        help='for master and clients: what we answer from (default: the example)')
     parser.add_argument('--only', action='append', default=[], metavar='CASE',
                         help='run this case; may be given again')
     parser.add_argument('--list', action='store_true', help='show the cases and end')

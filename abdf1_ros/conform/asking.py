@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Cases of the commands that a driver sends, in both disciplines; we answer them."""
+"""Cases of the commands that a driver sends, in every discipline; we answer them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.ends import AnsweringEnd
 from abdf1_ros.conform.wire import Failed
 
-_ASKING = (Target.MASTER, Target.CLIENT)
+_ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 
 _REPLY_BIT = 0x40
 

@@ -31,11 +31,18 @@ class Target(Enum):
     MASTER = 'master'
     PEER = 'peer'
     CLIENT = 'client'
+    RADIO = 'radio'
+    RADIO_CLIENT = 'radio-client'
 
     @property
     def is_half_duplex(self) -> bool:
         """Tell whether it is on a half-duplex line."""
         return self in (Target.SLAVE, Target.MASTER)
+
+    @property
+    def is_radio(self) -> bool:
+        """Tell whether it is a node of a radio modem network."""
+        return self in (Target.RADIO, Target.RADIO_CLIENT)
 
 
 class Permission(Enum):

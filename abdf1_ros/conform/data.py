@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Cases of the commands, which a half-duplex slave and a full-duplex node answer alike.
+Cases of the commands, which slaves, full-duplex nodes and radio modem nodes answer alike.
 
 Statuses are those of M 8-2 to 8-4. The commands are written out byte by byte, as M 7-17 (SLC 500
 and MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
@@ -21,12 +21,14 @@ and MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from abdf1_ros.conform.case import case, Permission, Target
-from abdf1_ros.conform.codec import HEADER_SIZE, SymbolKind
-from abdf1_ros.conform.ends import AskingEnd, check_reply, Words
+from abdf1_ros.conform.codec import HEADER_SIZE
+from abdf1_ros.conform.ends import AskingEnd, Words
 from abdf1_ros.conform.wire import Failed, Skipped
 
-_ANSWERING = (Target.SLAVE, Target.PEER)
+_ANSWERING = (Target.SLAVE, Target.PEER, Target.RADIO)
 
 _ECHO = 0x06
 _TYPED = 0x0F
@@ -82,13 +84,9 @@ def echo_sizes(end: AskingEnd) -> None:
 def largest_packet(end: AskingEnd) -> None:
     for size in _LARGE_ECHO_SIZES:
         data = bytes(range(size))
-        command = end.command(_ECHO, b'\x00' + data)
-        response = end.offer(command)
-        if response is None or response.kind is not SymbolKind.ACK:
+        reply = end.attempt(end.command(_ECHO, b'\x00' + data))
+        if reply is None or reply[3]:
             continue  # too long for this product
-        reply = check_reply(command, end.collect())
-        if reply[3]:
-            continue
         if reply[HEADER_SIZE:] != data:
             raise Failed(f'{size} bytes, or an STS', f'{len(reply) - HEADER_SIZE} bytes')
         return
@@ -163,6 +161,17 @@ def _read(end: AskingEnd, count: int) -> bytes:
     if len(data) < 2 * count:
         raise Failed(f'{2 * count} bytes of data', data.hex(' '))
     return data[len(data) - 2 * count:]
+
+
+def changes_nothing(end: AskingEnd, send: Callable[[bytes], object]) -> None:
+    """Give ``send`` a command that writes; raises Failed where the words are what it says."""
+    words = _words_of(end)
+    before = _read(end, words.count)
+    written = bytes(byte ^ 0xFF for byte in before)
+    send(end.command(_TYPED, _write_body(words, written)))
+    if _read(end, words.count) == written:
+        _data(end.ask(_TYPED, _write_body(words, before)))
+        raise Failed(before.hex(' '), written.hex(' '))
 
 
 @case('A typed read returns the words that were asked for.', 'M 7-17, 7-28', *_ANSWERING)

@@ -27,6 +27,7 @@ from abdf1_ros.conform.ends import AskingEnd, check_reply
 from abdf1_ros.conform.wire import Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER)
+_EVERYBODY = (*_ANSWERING, Target.RADIO)
 _SOURCE = 'M 3-4, 4-4, KF2 4-31'
 
 _ECHO = b'\x00twice'
@@ -53,14 +54,14 @@ def duplicate_discarded(end: AskingEnd) -> None:
         raise Skipped('two replies to a message sent twice: duplicate detection is off')
 
 
-@case('A message with another TNS is not a duplicate.', _SOURCE, *_ANSWERING)
+@case('A message with another TNS is not a duplicate.', _SOURCE, *_EVERYBODY)
 def new_tns_executed(end: AskingEnd) -> None:
     for _ in range(2):
         _carried_out(end, end.command(body=_ECHO))
 
 
 @case('A message with the TNS of the last one and another CMD is not a duplicate.',
-      _SOURCE, *_ANSWERING)
+      _SOURCE, *_EVERYBODY)
 def other_command_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     _carried_out(end, first)
@@ -68,7 +69,7 @@ def other_command_executed(end: AskingEnd) -> None:
 
 
 @case('A message with the TNS of the last one and another SRC is not a duplicate.',
-      _SOURCE, *_ANSWERING)
+      _SOURCE, *_EVERYBODY)
 def other_source_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     _carried_out(end, first)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ends that a script plays: a master, a slave, and a full-duplex node."""
+"""The ends that a script plays: a master, a slave, full-duplex nodes and radio modem nodes."""
 
 from __future__ import annotations
 
@@ -132,6 +132,12 @@ class AskingEnd(ABC):
     def further(self, seconds: float) -> Symbol | None:
         """Return the first answer within so many seconds that is not DLE EOT."""
 
+    def attempt(self, command: bytes) -> bytes | None:
+        """Return the reply to a command; None where it is not taken."""
+        response = self.offer(command)
+        is_taken = response is not None and response.kind is SymbolKind.ACK
+        return check_reply(command, self.collect()) if is_taken else None
+
     def taken(self, symbol: Symbol, acknowledge: bool = True) -> bytes:
         """Acknowledge a message, and return its link data."""
         self.owed.discard(symbol.data[4:6])
@@ -211,6 +217,22 @@ class PeerEnd(AskingEnd):
 
     def further(self, seconds: float) -> Symbol | None:
         return self.wire.hear(seconds)
+
+
+class RadioEnd(PeerEnd):
+    """A node of a radio modem network that sends commands to another, ``station``."""
+
+    def deliver(self, command: bytes) -> None:
+        self.send(command)
+        self.owed.add(command[4:6])
+
+    def attempt(self, command: bytes) -> bytes | None:
+        self.deliver(command)
+        symbol = self.further(_REPLY_TIMES * self.wire.answer_time)
+        return None if symbol is None else check_reply(command, self.taken(symbol))
+
+    def taken(self, symbol: Symbol, acknowledge: bool = True) -> bytes:
+        return super().taken(symbol, acknowledge=False)
 
 
 Serve = Callable[[bytes], bytes]
@@ -298,3 +320,10 @@ class ServerEnd(AnsweringEnd):
     def finish(self, command: Symbol) -> None:
         self.wire.send(codec.ACK)
         self.reply_and_hear(command)
+
+
+class RadioServerEnd(ServerEnd):
+    """A node of a radio modem network that answers the commands of another."""
+
+    def finish(self, command: Symbol) -> None:
+        self.reply_to(command)

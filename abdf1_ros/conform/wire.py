@@ -68,16 +68,18 @@ class Wire:
     One end of a line.
 
     ``answer_time`` is how long (s) an answer may take; after so long without bytes there is
-    silence. It counts from the end of what was sent, at ``char_time`` s a byte. ``transcript``
-    keeps all bytes in order; ``has_heard`` tells whether any byte came. A response inside a
-    message is heard before that message.
+    silence. It counts from the end of what was sent, at ``char_time`` s a byte. Where it
+    ``is_radio`` nothing has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in
+    order; ``has_heard`` tells whether any byte came. A response inside a message is heard before
+    that message.
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
-                 is_half_duplex: bool, answer_time: float = 1.0,
+                 is_half_duplex: bool, is_radio: bool = False, answer_time: float = 1.0,
                  char_time: float = 0.0) -> None:
         self.check = check
         self.is_half_duplex = is_half_duplex
+        self._is_radio = is_radio
         self.answer_time = answer_time
         self.transcript: list[Sent | Symbol] = []
         self.has_heard = False
@@ -111,6 +113,7 @@ class Wire:
         begun = max(self._clock(), self._sent_until)
         end = begun + (self.answer_time if within is None else within)
         symbol = self._next(begun, end)
+        answers = answers and not self._is_radio
         while answers and symbol is not None and symbol.kind is SymbolKind.ENQ:
             self.send(self._response)
             symbol = self._next(begun, end) if self._clock() < end else None

@@ -25,6 +25,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
@@ -49,18 +50,22 @@ class SpoiledLine(ScriptedLine):
         return self.spoil(super().read(timeout))
 
 
-def answering(family: str, check: str, is_half_duplex: bool) -> SpoiledLine:
+def answering(family: str, check: str, target: Target) -> SpoiledLine:
     """Return a line with a simulated PLC 1 at its end."""
     plc = simulated_plc(1, family, lambda: 0.0, ('N7:0', 20), checksum=check)
-    if is_half_duplex:
+    if target.is_half_duplex:
         return SpoiledLine(Machine(multidrop([plc]), checksum=Checksum[check]))
 
     def run(machine: Machine) -> Procedure:
+        if target.is_radio:
+            settings = RadioSettings(1, Checksum[check], store_forward={1, 5, 254, 255})
+            return RadioNode(machine, settings, ActiveStationList(), plc.serve).run(plc)
         return FullDuplexPeer(machine, PeerSettings(Checksum[check]), ActiveStationList(),
                               plc.serve).run(plc)
 
     plc.be_full_duplex()
-    return SpoiledLine(Machine(run, checksum=Checksum[check], duplex=Duplex.FULL))
+    return SpoiledLine(Machine(
+        run, checksum=Checksum[check], duplex=Duplex.FULL, counters=plc.counters))
 
 
 def asking(check: str, mode: str) -> SpoiledLine:
@@ -75,16 +80,17 @@ def asking(check: str, mode: str) -> SpoiledLine:
 
 @pytest.mark.parametrize('check', CHECKS)
 @pytest.mark.parametrize('family', ['SLC', 'PLC5'])
-@pytest.mark.parametrize('target', [Target.SLAVE, Target.PEER])
+@pytest.mark.parametrize('target', [Target.SLAVE, Target.PEER, Target.RADIO])
 def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None:
-    results = results_of(answering(family, check, target.is_half_duplex), target, check, family)
+    results = results_of(answering(family, check, target), target, check, family)
     assert failures(results) == []
     skipped = {result.case.name for result in results if result.verdict is Verdict.SKIP}
     assert skipped <= {'poll-stuffing', 'crc-covers-station', 'address-forms'}
 
 
 @pytest.mark.parametrize('check', CHECKS)
-@pytest.mark.parametrize(('target', 'mode'), [(Target.MASTER, 'Master'), (Target.CLIENT, 'Peer')])
+@pytest.mark.parametrize(('target', 'mode'), [(Target.MASTER, 'Master'), (Target.CLIENT, 'Peer'),
+                                              (Target.RADIO_CLIENT, 'Radio')])
 def test_our_driver_passes_every_case(target: Target, mode: str, check: str) -> None:
     results = results_of(asking(check, mode), target, check)
     assert failures(results) == []
@@ -116,7 +122,7 @@ def _flipped(raw: bytes) -> bytes:
 ])
 def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[bytes], bytes],
                                     expected: str) -> None:
-    line = answering('SLC', 'CRC', target.is_half_duplex)
+    line = answering('SLC', 'CRC', target)
     line.spoil = spoil
     result, = results_of(line, target, 'CRC', only=name)
     assert result.verdict is Verdict.FAIL
@@ -127,13 +133,13 @@ def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[
 @pytest.mark.parametrize('name', ['read-words', 'write-and-read'])
 def test_other_family_refuses(name: str) -> None:
     """A PLC-5 does not know the commands of an SLC, and says so."""
-    line = answering('PLC5', 'CRC', is_half_duplex=True)
+    line = answering('PLC5', 'CRC', Target.SLAVE)
     result, = results_of(line, Target.SLAVE, 'CRC', 'SLC', only=name)
     assert (result.verdict, result.expected, result.got) == (Verdict.FAIL, 'STS 00', 'STS 10')
 
 
 def test_case_that_needs_leave_is_skipped() -> None:
-    line = answering('SLC', 'CRC', is_half_duplex=True)
+    line = answering('SLC', 'CRC', Target.SLAVE)
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
     case = next(case for case in CASES if case.name == 'nak-resets')
     result, = run_cases([case], wire, MasterEnd(wire, 1, 5, first_tns=1),
@@ -144,5 +150,6 @@ def test_case_that_needs_leave_is_skipped() -> None:
 def test_every_case_cites_its_source() -> None:
     assert MODULES
     assert {target: sum(target in case.targets for case in CASES) for target in Target} == {
-        Target.SLAVE: 35, Target.MASTER: 10, Target.PEER: 31, Target.CLIENT: 13}
-    assert all(case.source.startswith(('M ', 'KF2 ')) for case in CASES)
+        Target.SLAVE: 35, Target.MASTER: 10, Target.PEER: 31, Target.CLIENT: 13,
+        Target.RADIO: 28, Target.RADIO_CLIENT: 9}
+    assert all(case.source.startswith(('M ', 'KF2 ', 'SLC ', 'ML11 ')) for case in CASES)

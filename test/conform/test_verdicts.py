@@ -22,33 +22,44 @@ from abdf1_ros.conform.wire import Failed, Wire
 import pytest
 from support.cases import for_all
 from support.conformance import failures, results_of
-from support.mutated_ends import Habit, MutatedClient, MutatedMaster, MutatedPeer, MutatedSlave
+from support.mutated_ends import (
+    Habit,
+    MutatedClient,
+    MutatedMaster,
+    MutatedPeer,
+    MutatedRadioClient,
+    MutatedRadioNode,
+    MutatedSlave,
+)
 
 ENDS = {Target.SLAVE: MutatedSlave, Target.PEER: MutatedPeer, Target.MASTER: MutatedMaster,
-        Target.CLIENT: MutatedClient}
+        Target.CLIENT: MutatedClient, Target.RADIO: MutatedRadioNode,
+        Target.RADIO_CLIENT: MutatedRadioClient}
 BOTH = (Target.SLAVE, Target.PEER)
+ALL = (*BOTH, Target.RADIO)
+RADIO, SENDER = (Target.RADIO,), (Target.RADIO_CLIENT,)
 
 # Whom a fault is given, the fault, and the case that has to find it.
 FAULTS = [(target, habit, name) for targets, habit, name in [
     (BOTH, Habit.NO_ACK, 'message-acknowledged'),
-    (BOTH, Habit.UNSTUFFED, 'stuffing'),
-    (BOTH, Habit.BAD_CHECK_OF_HIGH_BYTES, 'check-of-all-bytes'),
-    (BOTH, Habit.CUTS_ECHO_AT_80, 'echo-sizes'),
-    (BOTH, Habit.CUTS_ECHO, 'largest-packet'),
-    (BOTH, Habit.EXCHANGES_TNS, 'tns-returned'),
-    (BOTH, Habit.DOES_ALL_COMMANDS, 'unknown-command'),
-    (BOTH, Habit.DOES_ALL_FUNCTIONS, 'unknown-function'),
-    (BOTH, Habit.NO_IDENTITY, 'identity'),
-    (BOTH, Habit.READS_SHORT, 'read-words'),
-    (BOTH, Habit.READS_ZEROS_BEYOND, 'element-too-high'),
-    (BOTH, Habit.WRITES_NOTHING, 'write-and-read'),
-    (BOTH, Habit.MASKS_NOTHING, 'masked-write'),
+    (ALL, Habit.UNSTUFFED, 'stuffing'),
+    (ALL, Habit.BAD_CHECK_OF_HIGH_BYTES, 'check-of-all-bytes'),
+    (ALL, Habit.CUTS_ECHO_AT_80, 'echo-sizes'),
+    (ALL, Habit.CUTS_ECHO, 'largest-packet'),
+    (ALL, Habit.EXCHANGES_TNS, 'tns-returned'),
+    (ALL, Habit.DOES_ALL_COMMANDS, 'unknown-command'),
+    (ALL, Habit.DOES_ALL_FUNCTIONS, 'unknown-function'),
+    (ALL, Habit.NO_IDENTITY, 'identity'),
+    (ALL, Habit.READS_SHORT, 'read-words'),
+    (ALL, Habit.READS_ZEROS_BEYOND, 'element-too-high'),
+    (ALL, Habit.WRITES_NOTHING, 'write-and-read'),
+    (ALL, Habit.MASKS_NOTHING, 'masked-write'),
     (BOTH, Habit.DUPLICATE_WITHOUT_ACK, 'duplicate-discarded'),
-    (BOTH, Habit.DUPLICATE_BY_COMMAND_AND_SOURCE, 'new-tns-executed'),
-    (BOTH, Habit.DUPLICATE_BY_TNS, 'other-command-executed'),
-    (BOTH, Habit.DUPLICATE_WITHOUT_SOURCE, 'other-source-executed'),
+    (ALL, Habit.DUPLICATE_BY_COMMAND_AND_SOURCE, 'new-tns-executed'),
+    (ALL, Habit.DUPLICATE_BY_TNS, 'other-command-executed'),
+    (ALL, Habit.DUPLICATE_WITHOUT_SOURCE, 'other-source-executed'),
     (BOTH, Habit.REMEMBERS_99, 'older-header-executed'),
-    (BOTH, Habit.LOST_AFTER_NOISE, 'noise-before-message'),
+    (ALL, Habit.LOST_AFTER_NOISE, 'noise-before-message'),
     ((Target.SLAVE,), Habit.TAKES_BAD_CHECK, 'bad-check-ignored'),
     ((Target.SLAVE,), Habit.NAKS_BAD_CHECK, 'bad-check-ignored'),
     ((Target.SLAVE,), Habit.CRC_WITHOUT_STATION, 'crc-covers-station'),
@@ -105,15 +116,37 @@ FAULTS = [(target, habit, name) for targets, habit, name in [
     ((Target.CLIENT,), Habit.ENQ_NOT_ANSWERED, 'enquiry-repeats-response'),
     ((Target.CLIENT,), Habit.RESPONSE_IS_DATA, 'embedded-response'),
     ((Target.CLIENT,), Habit.ENQUIRES_ALWAYS, 'no-needless-enquiry'),
+    (RADIO, Habit.ACKNOWLEDGES, 'reply-alone'),
+    (RADIO, Habit.ENQUIRES_ALWAYS, 'reply-alone'),
+    (RADIO, Habit.ANSWERS_SYMBOLS, 'symbols-ignored'),
+    (RADIO, Habit.TAKES_BAD_CHECK, 'bad-check-ignored'),
+    (RADIO, Habit.NAKS_BAD_CHECK, 'bad-check-ignored'),
+    (RADIO, Habit.TAKES_SHORT, 'short-message-ignored'),
+    (RADIO, Habit.LOST_AFTER_BROKEN_MESSAGE, 'broken-message'),
+    (RADIO, Habit.REPLIES_FOR_OTHERS, 'other-destination-ignored'),
+    (RADIO, Habit.EXECUTES_FOR_OTHERS, 'other-destination-not-executed'),
+    (RADIO, Habit.REPLIES_TO_BROADCAST, 'broadcast-unanswered'),
+    (RADIO, Habit.EXECUTES_DUPLICATES, 'duplicate-executed-once'),
+    (RADIO, Habit.SENDS_ON_AGAIN, 'sent-on-once'),
+    (RADIO, Habit.SENDS_ON_OWN, 'own-packet-dropped'),
+    (SENDER, Habit.STS_IN_COMMAND, 'command-form'),
+    (SENDER, Habit.SAME_TNS, 'tns-differs'),
+    (SENDER, Habit.ACKNOWLEDGES, 'reply-taken'),
+    (SENDER, Habit.ACKNOWLEDGES, 'duplicate-reply-ignored'),
+    (SENDER, Habit.SILENCE_REPEATED, 'silence-not-enquired'),
+    (SENDER, Habit.TAKES_BAD_CHECK, 'bad-reply-ignored'),
+    (SENDER, Habit.NAKS_BAD_CHECK, 'bad-reply-ignored'),
+    (SENDER, Habit.TAKES_ANY_REPLY, 'other-reply-ignored'),
+    (SENDER, Habit.SENDS_ON_OWN, 'own-command-dropped'),
 ] for target in targets]
 
 # What the manual allows, or leaves to a setting, and the cases that cannot be judged then.
 ALLOWED = [(target, habit, names) for targets, habit, names in [
-    (BOTH, Habit.SLOW, set()),
-    (BOTH, Habit.LATE_REPLY, set()),
-    (BOTH, Habit.VERY_LATE_REPLY, set()),
+    (ALL, Habit.SLOW, set()),
+    (ALL, Habit.LATE_REPLY, set()),
+    (ALL, Habit.VERY_LATE_REPLY, set()),
     (BOTH, Habit.EXECUTES_DUPLICATES, {'duplicate-discarded'}),
-    (BOTH, Habit.SMALL_PACKETS, {'largest-packet'}),
+    (ALL, Habit.SMALL_PACKETS, {'largest-packet'}),
     ((Target.SLAVE,), Habit.NEVER_GIVES_UP, {'repetitions-limited'}),
     ((Target.SLAVE,), Habit.NO_EOT, {'poll-idle'}),
     ((Target.SLAVE,), Habit.LAST_REPLY_FIRST, set()),
@@ -124,6 +157,11 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     ((Target.MASTER,), Habit.POLLS_OTHERS, set()),
     ((Target.MASTER,), Habit.POLLS_LATE, set()),
     ((Target.CLIENT,), Habit.NEVER_GIVES_UP, {'nak-limit'}),
+    (RADIO, Habit.REPEATS_REPLY, set()),
+    (RADIO, Habit.SENDS_ON, set()),
+    (SENDER, Habit.NO_REPETITION, set()),
+    (SENDER, Habit.NEVER_GIVES_UP, {'repetitions-limited'}),
+    (SENDER, Habit.SENDS_ON, set()),
 ] for target in targets]
 
 NOT_HERE = {'address-forms', 'poll-stuffing'}  # for a PLC-5, and for station 16

@@ -17,16 +17,24 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from abdf1_ros.conform import asking, client, data, duplicates, master, peer, slave
+from abdf1_ros.conform import asking, client, data, duplicates, master, peer, radio, slave
 from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck
-from abdf1_ros.conform.ends import MasterEnd, PeerEnd, ServerEnd, SlaveEnd, Words
+from abdf1_ros.conform.ends import (
+    MasterEnd,
+    PeerEnd,
+    RadioEnd,
+    RadioServerEnd,
+    ServerEnd,
+    SlaveEnd,
+    Words,
+)
 from abdf1_ros.conform.wire import RawLine, Wire
 from abdf1_ros.df1.packet import Packet
 from support.driver_bench import simulated_plc
 
 # Importing them enters their cases.
-MODULES = (asking, client, data, duplicates, master, peer, slave)
+MODULES = (asking, client, data, duplicates, master, peer, radio, slave)
 
 
 class TimedLine(RawLine, Protocol):
@@ -40,7 +48,7 @@ def results_of(line: TimedLine, target: Target, check: str, family: str = 'SLC',
                only: str = '', station: int = 1) -> list[CaseResult]:
     """Return how the cases of ``target`` end."""
     wire = Wire(line, BlockCheck(check), line.clock, is_half_duplex=target.is_half_duplex,
-                answer_time=1.0)
+                is_radio=target.is_radio, answer_time=1.0)
     words = Words(7, 2, 3, family)
     plc = simulated_plc(1, 'PLC5', line.clock, ('N7:0', 20), checksum=check)
 
@@ -51,7 +59,9 @@ def results_of(line: TimedLine, target: Target, check: str, family: str = 'SLC',
         Target.SLAVE: lambda: MasterEnd(wire, station, 5, 0x2000, words),
         Target.PEER: lambda: PeerEnd(wire, station, 5, 0x2000, words),
         Target.MASTER: lambda: SlaveEnd(wire, station, serve),
-        Target.CLIENT: lambda: ServerEnd(wire, serve)}
+        Target.CLIENT: lambda: ServerEnd(wire, serve),
+        Target.RADIO: lambda: RadioEnd(wire, station, 5, 0x2000, words),
+        Target.RADIO_CLIENT: lambda: RadioServerEnd(wire, serve)}
     cases = [case for case in CASES if target in case.targets and only in ('', case.name)]
     return list(run_cases(cases, wire, ends[target](), frozenset(Permission)))
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Ends of a line with habits that can be switched on: a slave, a peer, a master and a client.
+Ends of a line with habits that can be switched on: slave, peer, master, client, radio nodes.
 
 Without a habit each keeps the rules of the manual. A habit is a fault, or something that the
 manual allows. Bytes are made and read by a codec that is neither that of the package nor that of
@@ -112,6 +112,16 @@ class Habit(Enum):
     POLLS_BETWEEN_REPETITIONS = auto()
     POLLS_OTHERS = auto()
     POLLS_LATE = auto()
+    # Of a radio modem node or client.
+    ACKNOWLEDGES = auto()
+    ANSWERS_SYMBOLS = auto()
+    REPLIES_FOR_OTHERS = auto()
+    EXECUTES_FOR_OTHERS = auto()  # in silence
+    REPEATS_REPLY = auto()
+    SENDS_ON = auto()
+    SENDS_ON_OWN = auto()
+    SENDS_ON_AGAIN = auto()  # whenever it is heard
+    TAKES_ANY_REPLY = auto()
 
 
 Symbol = tuple[object, ...]
@@ -621,6 +631,130 @@ class MutatedClient(_FullDuplex):
             if mine == self._round:
                 self._ask()
         self.after(0.15, go_on)
+
+
+class _Radio(Wire):
+    """What both radio modem nodes have in common (SLC 13-76 to 13-80): what is taken, sent on."""
+
+    number: int
+
+    def __init__(self, check: str, habits: frozenset[Habit]) -> None:
+        super().__init__(check, habits, is_half_duplex=False)
+        self._sent_on: set[bytes] = set()
+
+    def taken(self, data: bytes, is_ours: bool) -> None:
+        """Take a good message."""
+        raise NotImplementedError
+
+    def take(self, symbol: Symbol) -> None:
+        """Take a message, or pass over anything else."""
+        if symbol[0] != 'message':
+            if self.has(Habit.ANSWERS_SYMBOLS) and symbol == (_ENQ,):
+                self.say(bytes((_DLE, _NAK)))
+            return
+        data, is_good = symbol[2], symbol[3]
+        assert isinstance(data, bytes)
+        if not is_good and self.has(Habit.NAKS_BAD_CHECK):
+            self.say(bytes((_DLE, _NAK)))
+        if is_good and self.has(Habit.ACKNOWLEDGES):
+            self.say(bytes((_DLE, _ACK)))
+        if not (is_good or self.has(Habit.TAKES_BAD_CHECK)) or \
+                len(data) < (5 if self.has(Habit.TAKES_SHORT) else 6):
+            return
+        dst, src = data[:2]
+        if src == self.number:
+            if self.has(Habit.SENDS_ON_OWN):
+                self.say(self.frame(data), 0.1)
+            return
+        is_new = data not in self._sent_on or self.has(Habit.SENDS_ON_AGAIN)
+        if dst != self.number and is_new and self.habits & {
+                Habit.SENDS_ON, Habit.SENDS_ON_AGAIN}:
+            self._sent_on.add(data)
+            self.say(self.frame(data), 0.1)
+        self.taken(data, dst == self.number)
+
+
+class MutatedRadioNode(_Radio):
+    """A radio modem node that answers commands."""
+
+    def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
+        super().__init__(check, frozenset(habits))
+        self.number = station
+        self._plc = _Executor(self, station, family)
+        self._replies: dict[bytes, bytes] = {}
+        self._executed = 0
+
+    def taken(self, data: bytes, is_ours: bool) -> None:
+        """Execute a command; the reply comes by itself."""
+        is_broadcast = data[0] == 0xFF
+        if not (is_ours or is_broadcast or self.habits & {
+                Habit.REPLIES_FOR_OTHERS, Habit.EXECUTES_FOR_OTHERS}):
+            return
+        if self.has(Habit.SMALL_PACKETS) and len(data) > 110:
+            return
+        if self._plc.is_duplicate(data):
+            if self.has(Habit.REPEATS_REPLY):
+                self.say(self.frame(self._replies[data]))
+            return
+        self._plc.remember(data)
+        self._executed += 1
+        if len(data) < 6:
+            return self.say(self.frame(data))
+        reply = self._plc.serve(data)
+        if data[6:7] == b'\x01' and data[2] == 0x06:  # this counter counts what is executed
+            reply = reply[:8] + self._executed.to_bytes(2, 'little') + reply[10:]
+        self._replies[data] = reply
+        if is_ours or self.has(Habit.REPLIES_FOR_OTHERS) and not is_broadcast or \
+                is_broadcast and self.has(Habit.REPLIES_TO_BROADCAST):
+            late = 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
+            self.say(self.frame(reply), late)
+            if self.has(Habit.ENQUIRES_ALWAYS):
+                self.say(bytes((_DLE, _ENQ)), late + 1.0)
+
+
+class MutatedRadioClient(_Radio):
+    """A radio modem node that reads station 1, one command after the other."""
+
+    number = 5
+
+    def __init__(self, check: str, *habits: Habit) -> None:
+        super().__init__(check, frozenset(habits))
+        self._asker = _Asker(self)
+        self._command = b''
+        self._tries = self._round = 0
+        self.after(0.1, self._ask)
+
+    def _ask(self) -> None:
+        self._command, self._tries = self._asker.next_command(), 0
+        self._try()
+
+    def _try(self) -> None:
+        if self._tries > (0 if self.has(Habit.NO_REPETITION) else _LIMIT) and not self.has(
+                Habit.NEVER_GIVES_UP):
+            return self._ask()
+        self._tries += 1
+        self.say(self.frame(self._command))
+        if self.has(Habit.SILENCE_REPEATED):
+            self.say(bytes((_DLE, _ENQ)), 1.0)
+        self._then(_COMMAND_TIMEOUT, self._try)
+
+    def _then(self, seconds: float, action: Callable[[], None]) -> None:
+        """Do something later, unless something else is to be done before."""
+        self._round += 1
+        mine = self._round
+
+        def act() -> None:
+            if mine == self._round:
+                action()
+        self.after(seconds, act)
+
+    def taken(self, data: bytes, is_ours: bool) -> None:
+        """Go on after a reply."""
+        mine = self._command
+        is_reply = is_ours and data[1] == mine[0] and data[4:6] == mine[4:6]
+        if is_reply or self.has(Habit.TAKES_ANY_REPLY):
+            self._command = bytes(6)  # nothing is waited for
+            self._then(0.15, self._ask)
 
 
 class MutatedMaster(Wire):
