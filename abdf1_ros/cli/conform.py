@@ -45,7 +45,7 @@ from abdf1_ros.cli.terminal import (
     seconds_option,
     whole_option,
 )
-from abdf1_ros.conform import asking, client, data, duplicates, master, peer, radio, slave
+from abdf1_ros.conform import asking, client, damage, data, duplicates, master, peer, radio, slave
 from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
 from abdf1_ros.conform.ends import (
@@ -81,7 +81,7 @@ _EXIT_USAGE = 2
 _INTERRUPTED = 130
 
 # Importing them enters their cases.
-_MODULES = (slave, master, peer, client, radio, data, duplicates, asking)
+_MODULES = (slave, master, peer, client, radio, damage, data, duplicates, asking)
 
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.ends import AnsweringEnd
-from abdf1_ros.conform.wire import Failed
+from abdf1_ros.conform.ends import AnsweringEnd, MOST_REPETITIONS, PATIENCE
+from abdf1_ros.conform.wire import Failed, Skipped
 
 _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 
@@ -45,3 +45,14 @@ def tns_differs(end: AnsweringEnd) -> None:
         end.finish(command)
     if len(set(seen)) < len(seen):
         raise Failed('three different TNS', ', '.join(tns.hex(' ') for tns in seen))
+
+
+@case('A command that is never answered is given up.', 'M 3-13 to 3-15, SLC 13-76 to 13-80',
+      Target.MASTER, Target.RADIO_CLIENT)
+def repetitions_limited(end: AnsweringEnd) -> None:
+    first = end.next_command()
+    for _ in range(MOST_REPETITIONS):
+        symbol = end.wire.hear(PATIENCE)
+        if symbol is None or symbol.data != first.data:
+            return
+    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')

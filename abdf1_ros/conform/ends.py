@@ -104,9 +104,13 @@ class AskingEnd(ABC):
     def settle(self) -> None:
         """Take what the other end still sends or owes, so that a case begins clean."""
 
-    @abstractmethod
+    def frame(self, command: bytes) -> bytes:
+        """Return a message as it stands on the line."""
+        return codec.message(command, self.wire.check)
+
     def send(self, command: bytes) -> None:
         """Send a message."""
+        self.wire.send(self.frame(command))
 
     def offer(self, command: bytes) -> Symbol | None:
         """Send a message and return the response to it."""
@@ -168,8 +172,8 @@ class MasterEnd(AskingEnd):
                 break
         self.owed.clear()
 
-    def send(self, command: bytes) -> None:
-        self.wire.send(codec.master_message(self.station, command, self.wire.check))
+    def frame(self, command: bytes) -> bytes:
+        return codec.master_message(self.station, command, self.wire.check)
 
     def poll(self) -> Symbol | None:
         """Poll once and return what comes."""
@@ -206,9 +210,6 @@ class PeerEnd(AskingEnd):
             if symbol.kind is SymbolKind.MESSAGE:
                 self.taken(symbol)
         self.owed.clear()
-
-    def send(self, command: bytes) -> None:
-        self.wire.send(codec.message(command, self.wire.check))
 
     def collect(self, acknowledge: bool = True) -> bytes:
         symbol = self.wire.expect(SymbolKind.MESSAGE, 'the reply',

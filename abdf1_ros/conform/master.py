@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import Symbol, SymbolKind
-from abdf1_ros.conform.ends import MOST_REPETITIONS, PATIENCE, SlaveEnd
-from abdf1_ros.conform.wire import Failed, Skipped
+from abdf1_ros.conform.codec import SymbolKind
+from abdf1_ros.conform.ends import PATIENCE, SlaveEnd
+from abdf1_ros.conform.wire import Failed
 
 _MASTER = Target.MASTER
 
@@ -37,20 +37,6 @@ def no_ack_repeated(end: SlaveEnd) -> None:
     if second.data != first.data:
         raise Failed(f'the same message: {first.data.hex(" ")}', second.data.hex(' '))
     end.finish(second)
-
-
-@case('A message that is never acknowledged is given up.', 'M 3-13 to 3-15', _MASTER)
-def repetitions_limited(end: SlaveEnd) -> None:
-    first = end.next_command()
-
-    def is_other(symbol: Symbol) -> bool:
-        return symbol.kind is not SymbolKind.MASTER_MESSAGE or symbol.data != first.data
-
-    for _ in range(MOST_REPETITIONS):
-        symbol = end.wire.hear(PATIENCE)
-        if symbol is None or is_other(symbol):
-            return
-    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
 @case('After DLE ACK the master polls for the reply.', 'M 3-13', _MASTER)

@@ -145,9 +145,3 @@ def embedded_response(end: PeerEnd) -> None:
     if symbol is None or symbol.kind is not SymbolKind.MESSAGE:
         raise Failed('the next reply: the first has been acknowledged', str(symbol or 'silence'))
     check_reply(second, end.taken(symbol))
-
-
-@case('Bytes outside of a message do not spoil the next one.', 'M 4-7 to 4-9', _PEER)
-def noise_before_message(end: PeerEnd) -> None:
-    end.wire.send(b'\x55\x00\xFF\x03')
-    end.deliver(end.command())

@@ -25,14 +25,7 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.data import changes_nothing
-from abdf1_ros.conform.ends import (
-    check_reply,
-    header,
-    MOST_REPETITIONS,
-    PATIENCE,
-    RadioEnd,
-    RadioServerEnd,
-)
+from abdf1_ros.conform.ends import check_reply, header, PATIENCE, RadioEnd, RadioServerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _NODE, _SENDER = Target.RADIO, Target.RADIO_CLIENT
@@ -72,31 +65,6 @@ def symbols_ignored(end: RadioEnd) -> None:
     for symbol in (codec.NAK, codec.ENQ, codec.ACK, codec.EOT):
         end.wire.send(symbol)
         end.wire.expect_silence('symbols mean nothing here')
-    end.ask(0x06, b'\x00')
-
-
-@case('A message with a wrong check is dropped in silence.', _RULES, _NODE)
-def bad_check_ignored(end: RadioEnd) -> None:
-    end.wire.send(codec.damaged(codec.message(end.command(), end.wire.check)))
-    end.wire.expect_silence('the check was wrong')
-
-
-@case('A message of fewer than six bytes is dropped in silence.', f'M 4-4, {_RULES}', _NODE)
-def short_message_ignored(end: RadioEnd) -> None:
-    end.send(end.command()[:5])
-    end.wire.expect_silence('the message was shorter than its header')
-
-
-@case('A message that breaks off leaves the node ready for the next one.', _RULES, _NODE)
-def broken_message(end: RadioEnd) -> None:
-    end.wire.send(codec.divided(codec.message(end.command(), end.wire.check))[0])
-    end.wire.expect_silence('the message was not complete')
-    end.ask(0x06, b'\x00')
-
-
-@case('Bytes outside of a message do not spoil the next one.', _RULES, _NODE)
-def noise_before_message(end: RadioEnd) -> None:
-    end.wire.send(b'\x55\x00\xFF\x03')
     end.ask(0x06, b'\x00')
 
 
@@ -169,16 +137,6 @@ def silence_not_enquired(end: RadioServerEnd) -> None:
     if second.data[4:6] == first.data[4:6] and second.data != first.data:
         raise Failed(f'the same message: {first.data.hex(" ")}', second.data.hex(' '))
     end.finish(second)
-
-
-@case('A command that is never answered is given up.', _RULES, _SENDER)
-def repetitions_limited(end: RadioServerEnd) -> None:
-    first = end.next_command()
-    for _ in range(MOST_REPETITIONS):
-        symbol = end.wire.hear(PATIENCE)
-        if symbol is None or symbol.data != first.data:
-            return
-    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
 
 
 def _not_taken(end: RadioServerEnd, command: Symbol, *frames: bytes) -> None:

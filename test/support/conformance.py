@@ -17,7 +17,7 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from abdf1_ros.conform import asking, client, data, duplicates, master, peer, radio, slave
+from abdf1_ros.conform import asking, client, damage, data, duplicates, master, peer, radio, slave
 from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import (
@@ -34,7 +34,7 @@ from abdf1_ros.df1.packet import Packet
 from support.driver_bench import simulated_plc
 
 # Importing them enters their cases.
-MODULES = (asking, client, data, duplicates, master, peer, radio, slave)
+MODULES = (asking, client, damage, data, duplicates, master, peer, radio, slave)
 
 
 class TimedLine(RawLine, Protocol):
