@@ -97,7 +97,7 @@ def parts(work: Path) -> dict[str, Part]:
         'properties': Part(0.3, lambda seed, left: [
             '-m', 'pytest', '-q', '-m', 'hypothesis', f'--hypothesis-seed={seed}',
             '-p', 'no:cacheprovider', '--hypothesis-show-statistics', '--timeout=3000'],
-            {'examples': r'(\d+) passing examples', 'that failed': r'(\d+) failing examples'}),
+            {'examples': r'(\d+) passing', 'that failed': r'\d+ passing.*?, (\d+) failing'}),
         'fuzz': Part(0.2, lambda seed, left: script(
             'fuzz/run.py', f'--seconds={left:.0f}', f'--work={work / "fuzz"}'),
             {'inputs': r'(?m)^\w+ +([\d,]+)[ \d,]+  '}),

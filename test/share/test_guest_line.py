@@ -173,7 +173,7 @@ def test_place_is_a_peer_of_the_manual(
     with shared(tmp_path, f'pty:{tmp_path}/hmi?check=BCC', 'All'):
         wait_for((tmp_path / 'hmi').exists)
         status = conform(['peer', '--port', str(tmp_path / 'hmi'), '--check', 'BCC',
-                          '--answer-time', '0.2', '--words', 'N7:0', '--yes',
+                          '--answer-time', '1', '--words', 'N7:0', '--yes',
                           *(word for case in QUICK for word in ('--only', case))])
     said = capsys.readouterr().out
     assert status == 0, said
