@@ -36,8 +36,8 @@ class LinkSettings:
     What a link has to know of its line; times in seconds.
 
     ``mode`` is Master, Slave, Peer or Radio, ``polling`` of a master Message or Standard.
-    ``timeout`` is for each answer of a station, ``cmd_timeout`` for a reply. ``store_forward`` is
-    that of a radio modem node.
+    ``timeout`` is for each answer of a station, ``cmd_timeout`` for a reply. ``store_forward`` and
+    ``avoids_collisions`` are those of a radio modem node.
     """
 
     mode: str
@@ -50,6 +50,7 @@ class LinkSettings:
     cmd_timeout: float = 1.0
     polling: str = 'Message'
     store_forward: tuple[int, ...] = ()
+    avoids_collisions: bool = False
 
     @property
     def duplex(self) -> Duplex:

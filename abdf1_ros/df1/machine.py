@@ -101,7 +101,7 @@ _NOTHING = Silence()
 MIN_RESPONSE_TIME = 0.02
 
 # What an operating system or a device server may hold bytes of a frame back (s).
-_HELD_BACK = 0.1
+HELD_BACK = 0.1
 
 # A message that has begun may take so many times as long as its bytes take at the set speed, but
 # no longer than the longest one, and two pauses besides. Without a limit a station that dribbles,
@@ -202,7 +202,7 @@ class Machine:
         self._timing = timing or LineTiming()
         self._outgoing = Outgoing(checksum, self._timing.char_time)
         self.rate = LineRate(self._timing.char_time, duplex is Duplex.HALF)
-        self._pause_limit = 20 * self._timing.char_time + _HELD_BACK  # inside a frame
+        self._pause_limit = 20 * self._timing.char_time + HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
         self._procedure: Procedure | None = None

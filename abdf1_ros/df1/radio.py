@@ -30,19 +30,20 @@ its table, and not among the last packets.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+import math
 from random import Random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Frame
-from abdf1_ros.df1.link import EqualNode
+from abdf1_ros.df1.frames import Frame, MAX_LINK_DATA
+from abdf1_ros.df1.link import EqualNode, LinkSettings
 from abdf1_ros.df1.machine import (
     Heard,
-    LineTiming,
+    HELD_BACK,
     Machine,
     MIN_RESPONSE_TIME,
     Procedure,
@@ -55,9 +56,9 @@ from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
 
-# Packets that a node remembers (1763-RM001C), and for how long (s): some programs always send
-# TNS 0.
-_MOST_RECENT = 20
+# Packets that a node does not send on once more (1763-RM001C), and for how long (s): some programs
+# always send TNS 0.
+_MOST_HEARD = 20
 _RECENT = 10.0
 
 # Replies and packets of others that wait for a quiet line; with more, the newest are dropped.
@@ -73,21 +74,39 @@ _MOST_BACK_OFF = 8
 # A line that is never quiet does not keep us from it for longer (s).
 LONGEST_WAIT = 2.0
 
-_SHORT_FRAME = 24  # characters of a command that reads
+# Characters of a command that reads, and of the longest packet.
+_SHORT_FRAME, _LONG_FRAME = 24, MAX_LINK_DATA + 8
 
 _MOMENT = 0.0001  # s after the last byte
 
+# So often (s) a node that waits for replies looks whether there is something for other stations.
+_TICK = 0.05
 
-def usual_wait(timing: LineTiming) -> float:
+# Commands that may be under way where the radios avoid collisions. With default settings so many
+# of the longest replies need Cmd_Timeout on the air.
+MOST_UNDER_WAY = 4
+
+
+def usual_wait(line: LinkSettings) -> float:
     """Return the seconds that a first try waits on a quiet line, mostly."""
+    if line.avoids_collisions:
+        return 0.0
+    timing = line.timing
     most = MIN_RESPONSE_TIME + timing.tx_delay + _SHORT_FRAME * timing.char_time
     return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time + most / 2
 
 
-def longest_wait(timing: LineTiming, frames_time: float) -> float:
-    """Return the seconds until a frame has left, and any that was coming in, at most."""
-    return LONGEST_WAIT + timing.tx_delay + 2 * frames_time \
-        + MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time
+def longest_transaction(line: LinkSettings) -> float:
+    """Return the seconds of a command at most, with all its tries and frames."""
+    char_time = line.timing.char_time
+    frame = _LONG_FRAME * char_time
+    # What comes in is heard out, also where it breaks off.
+    heard = frame + _QUIET_CHARACTERS * char_time + HELD_BACK
+    wait = 0.0 if line.avoids_collisions else LONGEST_WAIT
+    send = wait + line.timing.tx_delay + frame + heard
+    # In turns go a packet of another, a repetition and, where there is room, a new command.
+    turns = 3 * MOST_UNDER_WAY if line.avoids_collisions else 2
+    return (line.nak_retries + 1) * (turns * send + line.cmd_timeout + heard)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +116,9 @@ class RadioSettings:
 
     A command is sent again ``retries`` times, each ``cmd_timeout`` after the one before. Packets
     between nodes of ``store_forward`` are sent again; 255 in it stands for broadcasts. ``also``
-    are further numbers that are ours: of PLCs that are simulated by one node.
+    are further numbers that are ours: of PLCs that are simulated by one node. Where
+    the equipment ``avoids_collisions`` nothing waits for a quiet line, and several commands may
+    wait for their replies, one of each station.
     """
 
     station: int
@@ -106,6 +127,17 @@ class RadioSettings:
     cmd_timeout: float = 1.0
     store_forward: Collection[int] = ()
     also: Collection[int] = ()
+    avoids_collisions: bool = False
+
+    @property
+    def most_under_way(self) -> int:
+        """Return how many commands may wait for their replies."""
+        return MOST_UNDER_WAY if self.avoids_collisions else 1
+
+    @property
+    def repetition_time(self) -> float:
+        """Return the seconds within which a node of these settings repeats a command."""
+        return (self.retries + 1) * (self.cmd_timeout + 2 * LONGEST_WAIT)
 
     @property
     def numbers(self) -> set[int]:
@@ -114,17 +146,32 @@ class RadioSettings:
 
 
 @dataclass(slots=True)
-class _Recent:
-    """A packet that has been heard, when (clock value in s), and our reply to it."""
+class _Executed:
+    """A command for us, when it came and was answered last (clock values in s), our reply."""
 
-    data: bytes
+    command: Packet
     when: float
-    reply: Packet | None = None
+    answered: float
+    reply: Packet | None
+
+
+@dataclass(slots=True)
+class _Command:
+    """
+    A command that waits for its reply, which is overdue at ``deadline`` (clock value in s).
+
+    It has been sent ``tries`` times, and is sent ``most`` times.
+    """
+
+    task: Task
+    most: int
+    tries: int = 0
+    deadline: float = -math.inf
 
 
 class RadioNode(EqualNode):
     """
-    Carry out tasks on the line of ``machine``, one at a time, and serve commands that come.
+    Carry out tasks on the line of ``machine``, and serve commands that come.
 
     ``serve`` executes a command and returns its reply, if it gives one; it is called once for each
     command.
@@ -142,108 +189,132 @@ class RadioNode(EqualNode):
 
     def _forget(self) -> None:
         self._waiting: deque[bytes] = deque()  # link data to be sent
-        self._recent: deque[_Recent] = deque(maxlen=_MOST_RECENT)
-        self._task: Task | None = None
+        self._heard: deque[tuple[bytes, float]] = deque(maxlen=_MOST_HEARD)  # and when
+        self._executed: defaultdict[int, deque[_Executed]] = defaultdict(
+            lambda: deque(maxlen=MOST_UNDER_WAY))  # by SRC
+        self._under_way: dict[int, _Command] = {}  # by station
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve others, for ever."""
         self._forget()
         while True:
-            # In turns, or others could keep our commands waiting for ever.
+            # In turns, or one kind could keep the others waiting for ever.
             if self._waiting:
                 yield from self._send(self._waiting.popleft())
-            task = source.next_task(self._machine.now)
-            if task is not None:
-                yield from self._carry_out(task)
+            if (command := self._overdue()) is not None:
+                yield from self._try(command)
+            task = self._has_room and source.next_task(self._machine.now, self._under_way)
+            if task:
+                yield from self._begin(task)
             elif not self._waiting:
-                due = source.next_due()
-                left = None if due is None else max(due - self._machine.now, 0.0)
-                symbol = yield Step(None, left)
-                self._hear(symbol)
+                self._hear((yield self._rest(source)))
 
-    def _carry_out(self, task: Task) -> Procedure:
-        """Send a command until its reply is here, or until all tries are over."""
+    @property
+    def _has_room(self) -> bool:
+        return len(self._under_way) < self._settings.most_under_way
+
+    def _overdue(self) -> _Command | None:
+        """Return the command whose reply is overdue for the longest time, None for none."""
+        first = min(self._under_way.values(), key=lambda command: command.deadline, default=None)
+        return first if first and first.deadline <= self._machine.now else None
+
+    def _rest(self, source: TaskSource) -> Step:
+        """Return the step up to the next moment at which something is due."""
+        if not self._under_way:
+            due = source.next_due()
+            return Step(None, None if due is None else max(due - self._machine.now, 0.0))
+        first = min(command.deadline for command in self._under_way.values())
+        left = max(first - self._machine.now, 0.0)
+        return Step(b'', min(left, _TICK) if self._has_room else left)
+
+    def _begin(self, task: Task) -> Procedure:
+        """Send a command the first time; a broadcast ends by that."""
         number = task.command.dst
         self._accounting.sent(task.command)
-        if number == BROADCAST:
-            yield from self._transmit(task, 0)
-            if task.sent:
-                task.reply(task.command.reply())
-            return
-        self._task = task
         # A station that did not answer last time gets one try, not a whole cycle of them.
-        tries = self._settings.retries + 1 if self._stations[number].active else 1
-        for count in range(tries):
-            if count:
-                self._counters.nak_retries += 1
-                self._note(Message.NTC_NAK_RETRY, count, Message.ERR_COMMAND_TIMEOUT.number,
-                           station=number)
-            yield from self._transmit(task, count)
-            yield from self._await_reply()
-            if self._task is None:
-                return
-        self._task = None
-        self._accounting.late(number, keeps_others_waiting=True)
-        self._stations.lost(number, self._machine.now)
-        self._note(Message.ERR_INACTIVE_STATION, number, station=number)
-        task.fail(StationInactive(number))
+        most = self._settings.retries + 1 if self._stations[number].active else 1
+        self._under_way[number] = command = _Command(task, most)
+        yield from self._try(command)
+        if number == BROADCAST and not self._is_over(command):
+            del self._under_way[number]
+            task.reply(task.command.reply())
 
-    def _transmit(self, task: Task, count: int) -> Procedure:
-        """Send a command when the line is quiet; one that has become too old ends its task."""
-        is_sent, task.sent = task.sent, True
+    def _try(self, command: _Command) -> Procedure:
+        """Send a command, or once more; end it after the last try, or when it is too old."""
+        task, number = command.task, command.task.command.dst
+        if command.tries == command.most:
+            del self._under_way[number]
+            self._accounting.late(number, keeps_others_waiting=True)
+            self._stations.lost(number, self._machine.now)
+            self._note(Message.ERR_INACTIVE_STATION, number, station=number)
+            task.fail(StationInactive(number))
+            return
         try:
-            yield from self._send(task.command.encode(), count, task.expires)
+            yield from self._send(task.command.encode(), command)
         except CommandExpired as error:
-            task.sent = error.sent = is_sent
-            self._task = None
+            task.sent = error.sent = command.tries > 0
+            del self._under_way[number]
             task.fail(error)
+        command.tries += 1
+        command.deadline = self._machine.free_at + self._settings.cmd_timeout
 
-    def _await_reply(self) -> Procedure:
-        """Wait for the reply to our command; meanwhile others are answered."""
-        end = self._machine.free_at + self._settings.cmd_timeout
-        while self._task is not None and (left := end - self._machine.now) > 0:
-            if self._waiting:
-                yield from self._send(self._waiting.popleft())
-            else:
-                self._hear((yield Step(b'', left)))
-
-    def _send(self, data: bytes, count: int = 0, expires: float = float('inf')) -> Procedure:
-        """Send link data when the line has been quiet."""
-        machine = self._machine
+    def _send(self, data: bytes, command: _Command | None = None) -> Procedure:
+        """Send link data when the line is quiet, but no command that has its reply by then."""
         frame = frames.message_frame(data, self._settings.checksum)
-        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * machine.char_time
-        most = min(1 << count, _MOST_BACK_OFF) * (
-            MIN_RESPONSE_TIME + machine.tx_delay + len(frame) * machine.char_time)
-        give_up = machine.now + LONGEST_WAIT
-        pause = quiet + self._random.uniform(0.0, most)
-        begun = machine.now
-        while (left := min(begun + pause, give_up) - machine.now) > 0:
-            symbol = yield Step(b'', left)
-            if isinstance(symbol, Silence):
-                begun = max(begun, machine.now - symbol.seconds)
-            else:
-                self._hear(symbol)
-                begun, pause = machine.now, quiet + self._random.uniform(0.0, most)
+        yield from self._wait_for_quiet(len(frame), command)
+        expires = math.inf
+        if command is not None:
+            if self._is_over(command):
+                return
+            self._count_try(command)
+            command.task.sent, expires = True, command.task.expires
         self._counters.messages_sent += 1
-        self._remember(data)
         try:
             symbol = yield Step(frame, _MOMENT, expires=expires)
         except CommandExpired:
             self._counters.messages_sent -= 1
             raise
         self._hear(symbol)
-        while (left := machine.free_at - machine.now) > 0:  # nothing of ours follows before that
+        while (left := self._machine.free_at - self._machine.now) > 0:  # nothing of ours follows
             self._hear((yield Step(b'', left)))
 
-    def _remember(self, data: bytes) -> _Recent:
-        recent = _Recent(data, self._machine.now)
-        self._recent.append(recent)
-        return recent
+    def _wait_for_quiet(self, size: int, command: _Command | None) -> Procedure:
+        """Wait until a frame of so many characters may go, or its command has had its reply."""
+        machine = self._machine
+        if self._settings.avoids_collisions:
+            return
+        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * machine.char_time
+        most = min(1 << command.tries if command else 1, _MOST_BACK_OFF) * (
+            MIN_RESPONSE_TIME + machine.tx_delay + size * machine.char_time)
+        give_up = machine.now + LONGEST_WAIT
+        pause = quiet + self._random.uniform(0.0, most)
+        begun = machine.now
+        while (left := min(begun + pause, give_up) - machine.now) > 0 \
+                and not (command and self._is_over(command)):
+            symbol = yield Step(b'', left)
+            if isinstance(symbol, Silence):
+                begun = max(begun, machine.now - symbol.seconds)
+            else:
+                self._hear(symbol)
+                begun, pause = machine.now, quiet + self._random.uniform(0.0, most)
 
-    def _known(self, data: bytes) -> _Recent | None:
-        """Return the packet of these link data, if it is among the last ones."""
-        return next((recent for recent in self._recent if recent.data == data
-                     and self._machine.now - recent.when < _RECENT), None)
+    def _is_over(self, command: _Command) -> bool:
+        return self._under_way.get(command.task.command.dst) is not command
+
+    def _count_try(self, command: _Command) -> None:
+        """Count and report a command that is sent again."""
+        if command.tries:
+            self._counters.nak_retries += 1
+            self._note(Message.NTC_NAK_RETRY, command.tries, Message.ERR_COMMAND_TIMEOUT.number,
+                       station=command.task.command.dst)
+
+    def _is_known(self, data: bytes) -> bool:
+        """Tell whether these link data are among the last ones that were heard, and keep them."""
+        now = self._machine.now
+        is_known = any(seen == data and now - when < _RECENT for seen, when in self._heard)
+        if not is_known:
+            self._heard.append((data, now))
+        return is_known
 
     def _hear(self, symbol: Heard) -> None:
         """Take a packet; a symbol of another mode is noise."""
@@ -256,10 +327,9 @@ class RadioNode(EqualNode):
         if packet.src in self._settings.numbers:
             return  # ours, sent on by another node
         is_ours = packet.dst in self._settings.numbers
-        known = self._known(symbol.data)
-        recent = known or self._remember(symbol.data)
+        is_known = self._is_known(symbol.data)
         between = {packet.src, packet.dst}
-        if known is None and not is_ours and between <= {*self._settings.store_forward}:
+        if not is_known and not is_ours and between <= {*self._settings.store_forward}:
             self._put(symbol.data)
         if not is_ours and packet.dst != BROADCAST:
             return
@@ -268,44 +338,58 @@ class RadioNode(EqualNode):
             self._counters.invalid_messages += 1
             self._report(wrong_message(packet, packet.src))
         elif packet.is_reply:
-            self._take_reply(packet, is_repetition=known is not None)
-        elif known is None:
-            self._counters.commands_received += 1
-            reply = self._serve(packet)
-            if packet.dst != BROADCAST:
-                recent.reply = reply
-                self._answer(recent)
+            self._take_reply(packet, is_repetition=is_known)
         else:
+            self._take_command(packet)
+
+    def _take_command(self, command: Packet) -> None:
+        """Execute a command once, and give its reply once more when it is repeated."""
+        now, executed = self._machine.now, self._executed[command.src]
+        known = next((entry for entry in executed if entry.command == command
+                      and now - entry.when < self._settings.repetition_time), None)
+        if known is not None:
             self._counters.duplicate_messages += 1
             # What a node has sent on comes soon after the first; a sender waits for longer.
-            if self._machine.now - recent.when > self._settings.cmd_timeout / 2:
-                recent.when = self._machine.now
-                self._answer(recent)
+            if now - known.answered > self._settings.cmd_timeout / 2:
+                known.answered = now
+                self._answer(known.reply)
+        elif self._is_full:
+            self._counters.refused_for_memory += 1  # not executed: its sender repeats it
+        else:
+            self._counters.commands_received += 1
+            reply = self._serve(command)
+            executed.append(_Executed(
+                command, now, now, None if command.dst == BROADCAST else reply))
+            self._answer(executed[-1].reply)
 
-    def _answer(self, recent: _Recent) -> None:
-        if recent.reply is not None:
-            self._accounting.sent(recent.reply)
-            self._put(recent.reply.encode())
+    def _answer(self, reply: Packet | None) -> None:
+        if reply is not None:
+            self._accounting.sent(reply)
+            self._put(reply.encode())
+
+    @property
+    def _is_full(self) -> bool:
+        return len(self._waiting) >= _MOST_WAITING
 
     def _put(self, data: bytes) -> None:
         """Let link data wait for the line."""
-        if len(self._waiting) < _MOST_WAITING:
-            self._waiting.append(data)
-        else:
+        if self._is_full:
             self._counters.refused_for_memory += 1
+        else:
+            self._waiting.append(data)
 
     def _take_reply(self, packet: Packet, *, is_repetition: bool) -> None:
         """Give a reply to the command that waits for it."""
-        task = self._task
-        if task is None or not packet.answers(task.command):
+        command = self._under_way.get(packet.src)
+        if command is None or not packet.answers(command.task.command):
             if is_repetition:
                 self._counters.duplicate_messages += 1
             else:
                 self._accounting.received(packet)
                 self._accounting.stale(packet)
             return
-        self._task = None
+        del self._under_way[packet.src]
         self._accounting.received(packet)
         if not is_local_status(packet.sts):
             self._stations.heard(packet.src, self._machine.now)
-        self._accounting.complete(task, packet, keeps_others_waiting=True)
+        self._accounting.complete(command.task, packet, keeps_others_waiting=True)

@@ -53,7 +53,7 @@ from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.plan.forecast import line_model, longest_probe, poll_cycle
+from abdf1_ros.plan.forecast import answer_time, line_model, longest_probe, poll_cycle
 from abdf1_ros.plan.interlocks import MODE_PERIOD
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
@@ -107,7 +107,7 @@ class Driver:
         self._served = self._make_served()
         self.link = make_link(network.line, settings, self.machine, self.stations,
                               self._serve, listener.happened)
-        self.expected_poll_cycle = poll_cycle(self.blocks)
+        self.expected_poll_cycle = poll_cycle(self.blocks, answer_time(network, self.blocks))
 
     def _make_queues(self) -> None:
         """Make the queues of jobs, and who decides between them."""

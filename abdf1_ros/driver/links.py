@@ -79,8 +79,9 @@ def make_link(line: LinkSettings, settings: DriverSettings, machine: Machine,
             settings.max_outstanding, settings.duplicate_detection, line.station)
         return FullDuplexPeer(machine, peer_settings, stations, serve, report)
     if line.mode == 'Radio':
-        radio_settings = RadioSettings(line.station, line.checksum, line.nak_retries,
-                                       line.cmd_timeout, line.store_forward)
+        radio_settings = RadioSettings(
+            line.station, line.checksum, line.nak_retries, line.cmd_timeout, line.store_forward,
+            avoids_collisions=line.avoids_collisions)
         return RadioNode(machine, radio_settings, stations, serve, report)
     if line.mode == 'Slave':
         slave_settings = SlaveSettings(

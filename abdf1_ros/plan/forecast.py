@@ -24,8 +24,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from abdf1_ros.df1 import radio
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
-from abdf1_ros.df1.radio import LONGEST_WAIT, usual_wait
+from abdf1_ros.df1.radio import MOST_UNDER_WAY
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -42,13 +43,27 @@ PATIENCE = 4
 
 def line_model(network: Network) -> LineModel:
     """Return the line of a net CSV."""
-    wait = usual_wait(network.timing) if network.mode == 'Radio' else 0.0
+    wait = radio.usual_wait(network.line) if network.mode == 'Radio' else 0.0
     return LineModel(network.checksum, network.duplex, network.timing, wait)
 
 
 def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> float:
     """Return the seconds that a block takes when each answer takes ``response_time`` s."""
     return block.line_time + ANSWERS * response_time * len(block.requests)
+
+
+def answer_time(network: Network, blocks: Iterable[Block],
+                response_time: float = USUAL_RESPONSE_TIME) -> float:
+    """
+    Return the seconds that the line waits for an answer of a station that takes so long.
+
+    By radio a transaction has one answer, and several stations may work on theirs at a time.
+    """
+    if network.mode != 'Radio':
+        return response_time
+    stations = len({block.station for block in blocks})
+    at_once = MOST_UNDER_WAY if network.line.avoids_collisions else 1
+    return response_time / ANSWERS / max(1, min(at_once, stations))
 
 
 def poll_cycle(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
@@ -115,10 +130,10 @@ def longest_transaction(network: Network) -> float:
     """
     Return the seconds that a transaction takes at most, every repetition included (S0).
 
-    The time of the frames on the line has to be added.
+    The time of the frames on the line has to be added, but not by radio.
     """
     if network.mode == 'Radio':
-        return (network.nak_retries + 1) * (network.cmd_timeout / 1000 + LONGEST_WAIT)
+        return radio.longest_transaction(network.line)
     tries = network.nak_retries + 1 + network.enq_retries + 1
     return (tries * network.timeout + network.cmd_timeout) / 1000
 
@@ -126,6 +141,6 @@ def longest_transaction(network: Network) -> float:
 def longest_probe(network: Network) -> float:
     """Return the seconds that one poll of a silent station takes, or one command by radio."""
     if network.mode == 'Radio':
-        return network.cmd_timeout / 1000 + usual_wait(network.timing)
+        return network.cmd_timeout / 1000 + radio.usual_wait(network.line)
     return max(network.timeout / 1000, MIN_RESPONSE_TIME) + network.timing.tx_delay \
         + _POLL_CHARACTERS * network.timing.char_time

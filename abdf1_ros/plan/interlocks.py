@@ -27,7 +27,6 @@ import math
 
 from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
-from abdf1_ros.df1.radio import longest_wait
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.planner import Block, Planner
@@ -161,12 +160,13 @@ class Times:
 
     def _wait(self, mapping: Mapping) -> float:
         """Return how long a fallback that is due may have to wait, and take, at most (s)."""
+        network = self._network
         # In standard polling the others have the line meanwhile; that is in each scan.
         own = [other for other in self._own
                if not self._is_standard or other.station == mapping.station]
-        writes = sum(len(_packets(self._network, other)) for other in own)
+        writes = sum(len(_packets(network, other)) for other in own)
         reads = 1 + (writes - 1) // OWN_IN_A_ROW
-        if self._is_standard and len(own) < len(self._own):
+        if network.line.avoids_collisions or self._is_standard and len(own) < len(self._own):
             reads = writes  # others may have had the writes between two reads
         # What is under way, the reads that have a turn in between, and all of ours.
         return (1 + reads) * self._at_most(self._any_frames) + writes * self._at_most(self._frames)
@@ -181,9 +181,8 @@ class Times:
     def _at_most(self, frames: float) -> float:
         """Return the seconds of a transaction whose ``frames`` take so long (s) on the line."""
         network, char_time = self._network, self._network.timing.char_time
-        if network.mode == 'Radio':  # in each try a packet of another may go before ours
-            sends = longest_wait(network.timing, self._any_frames)
-            return sends + (network.nak_retries + 1) * (2 * sends + network.cmd_timeout / 1000)
+        if network.mode == 'Radio':
+            return forecast.longest_transaction(network)
         longest = max(network.nak_retries, network.enq_retries) + 1
         # A frame that breaks off is over after a pause, and a peer pauses after NAKs and retries.
         quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time

@@ -85,13 +85,17 @@ class Report:
     @property
     def poll_cycle(self) -> float:
         """Return the seconds that it takes to read every block once."""
-        return forecast.poll_cycle(self.blocks, self.response_time)
+        return forecast.poll_cycle(self.blocks, self._answer_time)
 
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        return forecast.load(self.blocks, self.response_time) + interlocks.own_load(
-            self.network, self.mappings, self.default_period, self.response_time)
+        return forecast.load(self.blocks, self._answer_time) + interlocks.own_load(
+            self.network, self.mappings, self.default_period, self._answer_time)
+
+    @property
+    def _answer_time(self) -> float:
+        return forecast.answer_time(self.network, self.blocks, self.response_time)
 
     @property
     def longest_transaction(self) -> float:
@@ -123,7 +127,7 @@ class Report:
 
     def time(self, block: Block) -> float:
         """Return the seconds that a block takes, answers included."""
-        return forecast.block_time(block, self.response_time)
+        return forecast.block_time(block, self._answer_time)
 
     def needed_baud(self) -> int | None:
         """Return the lowest baud rate that is enough for all that is to be done, or None."""

@@ -172,6 +172,9 @@ class Network:
     store_forward: str = _net(
         'Store_Forward', '', 'Mode Radio: nodes between which packets are sent on, as in 1,3-5; '
         '255 for broadcasts')
+    collision_avoidance: str = _net(
+        'Collision_Avoidance', 'No', 'Mode Radio, Yes: radios avoid collisions and buffer both '
+        'directions, so commands to several stations may be under way', choices=('Yes', 'No'))
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
@@ -186,7 +189,8 @@ class Network:
         return LinkSettings(
             self.mode, self.station, self.checksum, self.timing, self.nak_retries,
             self.enq_retries, self.timeout / 1000, self.cmd_timeout / 1000, self.polling,
-            parse_stations(self.store_forward, BROADCAST)[0])
+            parse_stations(self.store_forward, BROADCAST)[0],
+            self.mode == 'Radio' and self.collision_avoidance == 'Yes')
 
     @property
     def duplex(self) -> Duplex:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from random import Random
 
 from abdf1_ros.df1.frames import Duplex
@@ -25,6 +26,7 @@ from abdf1_ros.df1.radio import RadioNode, RadioSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.plan.interlocks import Times
+from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 import pytest
@@ -33,34 +35,35 @@ from support.mappings import make_mapping
 from support.virtual_line import char_time, VirtualLine
 
 FIRST, SECOND = 1, 2
-NETWORK = Network(mode='Radio', baud=19200, cmd_timeout=500, nak_retries=1)
+NETWORK = Network(station=200, mode='Radio', baud=19200, cmd_timeout=500, nak_retries=1)
 
 
 class RadioBench(DriverBench):
-    """A driver, and two SLCs behind one radio modem; a share ``loss`` of all packets is lost."""
+    """A driver, and SLCs behind one radio modem; a share ``loss`` of all packets is lost."""
 
-    def __init__(self) -> None:
-        self.read = [make_mapping('N7:0', station=number, plc='SLC') for number in (FIRST, SECOND)]
+    def __init__(self, network: Network = NETWORK, stations: int = SECOND) -> None:
+        numbers = range(1, stations + 1)
+        self.read = [make_mapping('N7:0', station=number, plc='SLC') for number in numbers]
         self.beat = make_mapping('N10:0', 'Heartbeat', station=FIRST, plc='SLC', period=2000,
                                  heartbeat=Heartbeat())
         self.speed = make_mapping('N10:1', 'Write', station=FIRST, plc='SLC',
                                   fallback=Fallback((7,), 1000))
         rows = [*self.read, self.beat, self.speed]
-        super().__init__(rows, network=NETWORK, start=False)
+        super().__init__(rows, network=network, start=False)
         self.loss = 0.0
         self._random = Random(1)
         self.plcs = {number: simulated_plc(number, 'SLC', self.clock, ('N7:0', 4), ('N10:0', 4))
-                     for number in (FIRST, SECOND)}
-        settings = RadioSettings(FIRST, also=[SECOND])
+                     for number in numbers}
+        settings = RadioSettings(FIRST, also=numbers)
         self.modem = Machine(
             lambda machine: RadioNode(machine, settings, ActiveStationList(), self._serve,
                                       random=self._random).run(self.plcs[FIRST]),
-            checksum=NETWORK.checksum, duplex=Duplex.FULL, timing=LineTiming(char_time(19200)))
+            checksum=network.checksum, duplex=Duplex.FULL, timing=LineTiming(char_time(19200)))
         assert isinstance(self.driver.link, RadioNode)
         self.driver.link._random = self._random
         self.line = VirtualLine(self.driver.machine, self.modem, baud=19200, chunk=1000)
         self.line.noise = self
-        self.bound = next(bound for bound in Times(NETWORK, rows).bounds()
+        self.bound = next(bound for bound in Times(network, rows).bounds()
                           if bound.mapping is self.speed)
         self.line.start()
 
@@ -83,6 +86,19 @@ def test_values_come_over_the_air(loss: float) -> None:
     for row, value in zip(bench.read, (11, 22), strict=True):
         assert len(bench.listener.values(row)) >= 20
         assert {tuple(values) for values in bench.listener.values(row)} == {(value,)}
+
+
+def test_radios_that_avoid_collisions_carry_several_commands_as_forecast() -> None:
+    cycles = []
+    for several in ('No', 'Yes'):
+        bench = RadioBench(replace(NETWORK, collision_avoidance=several), stations=8)
+        bench.line.propagation = 0.1
+        bench.run(60.0)
+        cycle = 60.0 / len(bench.listener.values(bench.read[-1]))
+        # The forecast leaves the heartbeat out, and counts waits that overlap in fact.
+        assert 0.6 < cycle / make_report(bench.network, bench.read, 0.1, 0.2).poll_cycle < 1.6
+        cycles.append(cycle)
+    assert cycles[0] > 3 * cycles[1]
 
 
 def test_write_is_confirmed_by_its_reply() -> None:

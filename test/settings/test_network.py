@@ -74,7 +74,8 @@ def test_columns_are_those_of_the_specification_polling_and_radio() -> None:
     assert [entry.column for entry in FIELDS.values()] == [
         'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
         'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
-        'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access', 'Store_Forward']
+        'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access', 'Store_Forward',
+        'Collision_Avoidance']
 
 
 def test_columns_that_are_left_out_have_defaults() -> None:
@@ -301,5 +302,8 @@ def test_shipped_file_is_good() -> None:
 def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
     network = load(path, 'Mode,Store_Forward', 'Radio,"1-3, 7, 255"')
     assert (network.duplex, network.line.store_forward) == (Duplex.FULL, (1, 2, 3, 7, 255))
+    assert not network.line.avoids_collisions
+    assert load(path, 'Mode,Collision_Avoidance', 'Radio,yes').line.avoids_collisions
+    assert not load(path, 'Mode,Collision_Avoidance', 'Peer,Yes').line.avoids_collisions
     with pytest.raises(ConfigurationError, match='Store_Forward = "256" should be a station from'):
         load(path, 'Mode,Store_Forward', 'Radio,"1,256"')
