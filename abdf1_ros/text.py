@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import re
 
 
@@ -41,6 +42,12 @@ def value_text(value: float) -> str:
 def cut(text: str, width: int) -> str:
     """Return ``text`` in at most ``width`` characters; a longer one ends with "..."."""
     return text if len(text) <= width else text[:max(width - 3, 0)] + '...'[:width]
+
+
+def first(names: Sequence[str], most: int) -> str:
+    """Return names as text, ``most`` of them; how many more there are is counted."""
+    more = f' and {len(names) - most} more' if len(names) > most else ''
+    return printable(', '.join(names[:most])) + more
 
 
 def by_number(name: str) -> list[tuple[int, str]]:

@@ -77,7 +77,7 @@ ROOMS = (
     Room(('settings',), 'both CSV files',
          (*_BASE, 'problems', 'numbers', 'text', 'df1', 'pccc')),
     Room(('plan',), 'what is read together, what it costs, what comes of it',
-         ('problems', 'df1', 'pccc', 'settings')),
+         ('problems', 'text', 'df1', 'pccc', 'settings')),
     Room(('driver',), 'carrying it out: who goes next, points, served words',
          (*_BASE, 'numbers', 'text', 'df1', 'pccc', 'settings', 'plan')),
     Room(('sniffer',), 'recorded bytes, and traffic told to people',

@@ -35,13 +35,13 @@ from abdf1_ros.cli.terminal import (
     command_parser,
     GREEN,
     has_reader_left,
+    number_option,
     prepare_output,
     RED,
     table,
     YELLOW,
 )
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.numbers import decimal_number
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.interlocks import Bound
 from abdf1_ros.plan.planner import Block
@@ -54,7 +54,7 @@ from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, Network
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.text import by_number, printable
+from abdf1_ros.text import by_number, first, printable
 
 EXIT_FAULTY = 2
 EXIT_INTERRUPTED = 130
@@ -200,23 +200,17 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('map', metavar='MAP', nargs='?', help='the map CSV')
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object, with every tag of every block')
-    parser.add_argument('--default-period', type=_duration, metavar='MS',
+    duration = number_option(f'ms from 0 to {MAX_PERIOD}', 0, MAX_PERIOD)
+    parser.add_argument('--default-period', type=duration, metavar='MS',
                         default=DriverSettings().default_period * 1000,
                         help="the node's default_period (default: %(default)g)")
-    parser.add_argument('--response-time', type=_duration, metavar='MS',
+    parser.add_argument('--response-time', type=duration, metavar='MS',
                         default=USUAL_RESPONSE_TIME * 1000,
                         help='ms that a PLC takes for each answer (default: %(default)g)')
     options = parser.parse_args(args)
     if options.map is None and not Path(options.net).is_dir():
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV has to follow')
     return options
-
-
-def _duration(text: str) -> float:
-    value = decimal_number(text)
-    if value is None or not 0 <= value <= MAX_PERIOD:
-        raise argparse.ArgumentTypeError(f'"{text}" should be ms from 0 to {MAX_PERIOD}')
-    return value
 
 
 def _text(found: Findings, report: Report | None) -> str:
@@ -299,10 +293,7 @@ def _plan_text(report: Report) -> str:
     for block in report.blocks:
         entry = _entry(report, block)
         tags = entry.pop('tags')
-        names = printable(', '.join(tags[:_SHOWN_TAGS]))
-        if len(tags) > _SHOWN_TAGS:
-            names += f' and {len(tags) - _SHOWN_TAGS} more'
-        rows.append([*map(_cell, entry.values()), names])
+        rows.append([*map(_cell, entry.values()), first(tags, _SHOWN_TAGS)])
     return table(head, rows, right=(0, 4, 5, 6, 7, 8, 9))
 
 

@@ -21,7 +21,6 @@ the domain is one of our own unless ROS_DOMAIN_ID is set.
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -37,8 +36,13 @@ import tempfile
 import time
 from typing import Any
 
-from abdf1_ros.cli.terminal import called, command_parser, ignore_further, interruptible
-from abdf1_ros.numbers import decimal_number
+from abdf1_ros.cli.terminal import (
+    called,
+    command_parser,
+    ignore_further,
+    interruptible,
+    number_option,
+)
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.messages import MESSAGES
 from abdf1_ros.settings.map_file import load_mappings
@@ -491,17 +495,11 @@ def _shown(values: Any) -> str:
     return '[' + ', '.join(f'{value:g}' for value in values) + ']'
 
 
-def _seconds(text: str) -> float:
-    value = decimal_number(text)
-    if value is None or value < 0:
-        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds from 0')
-    return value
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo; return 0, or 1 when a step was not seen as it should be."""
     parser = command_parser('demo', __doc__)
-    parser.add_argument('--seconds', type=_seconds, default=30.0,
+    parser.add_argument('--seconds', default=30.0,
+                        type=number_option('a number of seconds from 0', 0),
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
     parser.add_argument('--peer', action='store_true',
                         help='show a full-duplex line, on which the PLC writes by itself')

@@ -22,6 +22,7 @@ from contextlib import contextmanager
 import difflib
 import errno
 import io
+import math
 import os
 from pathlib import Path
 import shlex
@@ -237,17 +238,16 @@ class Progress:
             self._is_shown = False
 
 
-def seconds_option(text: str) -> float:
-    """Return the seconds of an option, above 0; for argparse."""
-    value = decimal_number(text)
-    if value is None or value <= 0:
-        raise argparse.ArgumentTypeError(f'"{text}" should be a number of seconds above 0')
-    return value
+def number_option(right: str, low: float, high: float = math.inf,
+                  parse: Callable[[str], Any] = decimal_number) -> Callable[[str], Any]:
+    """Return what reads the number of an option, for argparse; ``right`` is what it should be."""
+    def read(text: str) -> Any:
+        value = parse(text)
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'"{text}" should be {right}')
+        return value
+    return read
 
 
-def whole_option(text: str) -> int:
-    """Return the whole number of an option; for argparse."""
-    value = whole_number(text)
-    if value is None:
-        raise argparse.ArgumentTypeError(f'"{text}" should be a whole number')
-    return value
+seconds_option = number_option('a number of seconds above 0', math.ulp(0.0))
+whole_option = number_option('a whole number', -math.inf, parse=whole_number)

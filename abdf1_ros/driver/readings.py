@@ -45,7 +45,7 @@ _TURNS_OF_A_READ = 10
 
 
 class ValueListener(Protocol):
-    """Gets what was read; called in the link thread."""
+    """Gets what was read; called in the link thread. What is not overridden does nothing."""
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a good read that are to be published."""

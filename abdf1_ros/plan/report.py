@@ -38,6 +38,7 @@ from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import BAUD_RATES, Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.share import share_places
+from abdf1_ros.text import first
 
 _HIGH_LOAD = 0.8
 _OURS_BESIDE_GUESTS = 0.75  # of the commands (driver.agenda)
@@ -415,9 +416,7 @@ def last_address(address: Address, offset: int) -> Address:
 
 
 def _tags(mappings: Sequence[Mapping]) -> str:
-    names = [mapping.tag for mapping in mappings]
-    rest = len(names) - _NAMED_TAGS
-    return ', '.join(names[:_NAMED_TAGS]) + (f' and {rest} more' if rest > 0 else '')
+    return first([mapping.tag for mapping in mappings], _NAMED_TAGS)
 
 
 def _ms(seconds: float) -> str:

@@ -32,7 +32,7 @@ import traceback
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.address import Area
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import printable
+from abdf1_ros.text import first, printable
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -64,8 +64,7 @@ _ROUTINE = (
 
 def few(names: Sequence[str]) -> str:
     """Return names as text, the first of them where there are many."""
-    more = f' and {len(names) - _MOST_NAMES} more' if len(names) > _MOST_NAMES else ''
-    return printable(', '.join(names[:_MOST_NAMES])) + more
+    return first(names, _MOST_NAMES)
 
 
 def where(mapping: Mapping) -> str:

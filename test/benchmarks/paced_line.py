@@ -41,14 +41,14 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList, Station
+from abdf1_ros.driver import driver
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.problems import Place
@@ -82,27 +82,15 @@ class Wire(threading.Thread):
                 os.write(self._target, bytes((byte,)))
 
 
-class Listener:
+class Listener(driver.Listener):
     """Counts what should not happen."""
 
     def __init__(self) -> None:
         self.troubles = 0
 
-    def read(self, mapping: Mapping, values: Values) -> None:
-        """Take values."""
-
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Count a read without a value."""
         self.troubles += 1
-
-    def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Do nothing: no row has Publish_While."""
-
-    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Do nothing: no row is a heartbeat."""
-
-    def written(self, result: WriteResult) -> None:
-        """Take the result of a write."""
 
     def happened(self, event: Event) -> None:
         """Count errors and retries."""

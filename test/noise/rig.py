@@ -28,9 +28,9 @@ from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.df1.stations import ActiveStationList, Station
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, show, WriteResult
 from abdf1_ros.errors import LinkError
@@ -104,7 +104,7 @@ class _WatchedDriver(Driver):
         return None if task is None else _WatchedTask(task, self.end)
 
 
-class DriverEnd:
+class DriverEnd(Listener):
     """A driver, its listener, and what the judge is told of it."""
 
     def __init__(self, rig: Rig, network: Network, mappings: Sequence[Mapping]) -> None:
@@ -152,12 +152,6 @@ class DriverEnd:
         """Count reads without a value."""
         self._rig.judge.counts['unreadable'] += 1
 
-    def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Do nothing: no row has Publish_While."""
-
-    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Do nothing: no row is a heartbeat."""
-
     def written(self, result: WriteResult) -> None:
         """Hand on a result."""
         content = self._texts.pop(result.value)
@@ -169,9 +163,6 @@ class DriverEnd:
     def happened(self, event: Event) -> None:
         """Count events."""
         self._rig.judge.counts[event.message.name] += 1
-
-    def station_changed(self, station: Station) -> None:
-        """Do nothing."""
 
     def is_fresh(self, since: float) -> bool:
         """Tell whether everything has been read since then, and all stations are active."""

@@ -22,14 +22,12 @@ from typing import Any
 
 from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.slave_link import SlaveLink
-from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.fallback_rows import FallbackCause
 from abdf1_ros.driver.heartbeat_rows import BeatState
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
 from abdf1_ros.messages import Event, Message
-from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
@@ -51,29 +49,8 @@ ROWS = ('speed,Read,N7:0,1,PLC5,1000', 'level,ReadWrite,F8:4,2,SLC,1000',
 NOW = float(int(time.monotonic()) + 1000)
 
 
-class Listener:
-    """Takes what a driver tells, and does nothing with it."""
-
-    def read(self, mapping: Mapping, values: Values) -> None:
-        """Take values."""
-
-    def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Take a reason."""
-
-    def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Take the end of a withholding."""
-
-    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Take another value of a heartbeat."""
-
-    def written(self, result: WriteResult) -> None:
-        """Take a result."""
-
-    def happened(self, event: Event) -> None:
-        """Take an event."""
-
-    def station_changed(self, station: Station) -> None:
-        """Take a change."""
+class Quiet(Listener):
+    """Does nothing with what a driver tells."""
 
 
 class Bench:
@@ -83,7 +60,7 @@ class Bench:
                  header: str = HEADER) -> None:
         mappings, left_out = load_mappings(str(write_csv(folder / 'map.csv', header, rows)))
         self.folder = folder
-        self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Listener())
+        self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Quiet())
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.diagnostics = Diagnostics('line_a', self.driver, PORT, left_out)
         self.opener = PortOpener(PortSettings.of(Network(), PORT))

@@ -28,7 +28,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import Station
-from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import WriteResult
 from abdf1_ros.errors import PortLost
@@ -69,7 +69,7 @@ class Sink:
         return take
 
 
-class Ear:
+class Ear(Listener):
     """Who listens to a driver: what the node has, without ROS."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -89,12 +89,6 @@ class Ear:
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Log why there is no value."""
         self._lines.error(mapping.tag, reason)
-
-    def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Do nothing: no row has Publish_While."""
-
-    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Do nothing: no row is a heartbeat."""
 
     def written(self, result: WriteResult) -> None:
         """Count the result of a write."""

@@ -22,8 +22,8 @@ from typing import Any
 
 from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
-from abdf1_ros.cli.terminal import command_parser
-from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.cli.terminal import command_parser, number_option
+from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
@@ -32,6 +32,7 @@ from abdf1_ros.settings.network import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
 
 DEFAULT_STATION = 1
+_COUNT = number_option('a whole number from 1', 1, parse=whole_number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,7 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     ping = add('ping', 'measure how long a PLC takes to send something back',
                'ping 1 --count 10 --net net.csv')
     _add_station(ping)
-    ping.add_argument('--count', type=_count, default=4, metavar='N',
+    ping.add_argument('--count', type=_COUNT, default=4, metavar='N',
                       help='how often (default: %(default)s)')
     scan = add('scan', 'look for stations', 'scan 0-31 --net net.csv')
     scan.add_argument('stations', metavar='STATIONS', nargs='?', type=_stations,
@@ -200,9 +201,10 @@ def _complete_write(write: argparse.ArgumentParser) -> None:
 
 def _complete_watch(watch: argparse.ArgumentParser) -> None:
     _add_addresses(watch)
-    watch.add_argument('--period', type=_seconds, default=0.5, metavar='S',
+    watch.add_argument('--period', default=0.5, metavar='S',
+                       type=number_option('seconds from 0 to 86400', 0, 86400),
                        help='s between reads (default: %(default)s)')
-    watch.add_argument('--count', type=_count, metavar='N', help='end after so many reads')
+    watch.add_argument('--count', type=_COUNT, metavar='N', help='end after so many reads')
 
 
 def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
@@ -258,20 +260,6 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='elements of each address (default: %(default)s)')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                         help='how whole numbers are written (default: %(default)s)')
-
-
-def _seconds(text: str) -> float:
-    value = decimal_number(text)
-    if value is None or not 0 <= value <= 86400:
-        raise argparse.ArgumentTypeError(f'"{text}" should be seconds from 0 to 86400')
-    return value
-
-
-def _count(text: str) -> int:
-    value = whole_number(text)
-    if value is None or value < 1:
-        raise argparse.ArgumentTypeError(f'"{text}" should be a whole number from 1')
-    return value
 
 
 def _stations(text: str) -> tuple[int, ...]:
