@@ -274,8 +274,8 @@ class Driver:
         return next((station.number for station in self.stations), dst)
 
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent]:
-        families = {mapping.plc_type for mapping in self.mappings if mapping.station == station}
-        return written_extents(command, station, families)
+        # A PLC-5 has words for each number that writes as to a PLC-2; on the line it is ours.
+        return written_extents(command._replace(src=self.network.station), station, self.mappings)
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""

@@ -12,36 +12,49 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a PLC a guest's command writes, as far as its address can be read."""
+"""Which words of a PLC a guest's command writes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-import re
+from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.describe import describe
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import FileType, PlcType
-
-# The addresses in what people are told of a command.
-_ADDRESS = re.compile(r'\b[A-Z]{1,2}\d*:[\w.:/]+')
-_TWO_WORDS = (FileType.FLOAT, FileType.LONG)
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.server import Server
+from abdf1_ros.settings.mapping import Mapping
 
 
-def written_extents(command: Packet, station: int, families: Iterable[PlcType]) -> list[Extent]:
-    """Return the words that a command writes, by the addresses of ``families``; or none."""
-    text = describe(command)
-    values = max(1, len(text.partition('=')[2].split()))
+class _NotedTable(DataTable):
+    """The files of some rows, each without end; what is written is noted, and not kept."""
+
+    def __init__(self, plc_type: PlcType, rows: Sequence[Mapping]) -> None:
+        super().__init__(plc_type)
+        self._types = {row.address.file: row.address.file_type for row in rows}
+        self.written: list[tuple[Address, int]] = []
+
+    def find(self, address: Address, words: int) -> tuple[bytearray, int]:
+        """Return words that are forgotten."""
+        return bytearray(2 * words), 0
+
+    def write(self, address: Address, data: bytes) -> None:
+        """Note which words are written."""
+        self.written.append((address, len(data) // 2))
+
+
+def written_extents(command: Packet, station: int, mappings: Sequence[Mapping]) -> list[Extent]:
+    """
+    Return the words of the files of ``mappings`` that a command to a station writes.
+
+    A server of the family says so: a PLC-5's address does not tell the type of its file.
+    """
+    rows = [mapping for mapping in mappings if mapping.station == station]
     found = []
-    for family in families:
-        for word in _ADDRESS.findall(text):
-            try:
-                address = parse_address(word, family)
-            except FormatError:
-                continue
-            size = values * (2 if address.file_type in _TWO_WORDS else 1)
-            found.append(Extent(station, address.area, address.offset, address.offset + size))
+    for plc_type in {row.plc_type for row in rows}:
+        table = _NotedTable(plc_type, rows)
+        Server(table).serve(command)
+        found += [Extent(station, address.area, address.offset, address.offset + words)
+                  for address, words in table.written]
     return found

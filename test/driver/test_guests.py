@@ -23,7 +23,6 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.network import Network
 import pytest
@@ -130,28 +129,49 @@ def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
     assert bench.driver.counters.commands_sent == sent
 
 
-def test_a_write_of_a_guest_is_read_again_at_once() -> None:
-    mapping = make_mapping('N7:0', station=1, plc='SLC', period=10000)
+@pytest.mark.parametrize(('kind', 'address', 'write', 'read', 'expected'), [
+    ('SLC', 'N7:0', WRITE_N7, READ_N7, '34 12'),
+    ('PLC5', 'N20:0', bytes.fromhex('67 00 00 01 00 06 14 00 93 09 42 34 12'),
+     bytes.fromhex('68 00 00 01 00 06 14 00 01 00'), '93 09 42 34 12')])
+def test_a_write_of_a_guest_is_read_again_at_once(
+        kind: str, address: str, write: bytes, read: bytes, expected: str) -> None:
+    mapping = make_mapping(address, station=1, plc=kind, period=10000)
     bench = DriverBench([mapping])
-    plc = bench.plc(1, 'SLC', ('N7:0', 20))
+    plc = bench.plc(1, kind, (address, 20))
     bench.run(1.0)
     program = Program(bench, ShareAccess.WRITE)
     wrote: list[tuple[int, list[Extent]]] = []
     program.guest.wrote = lambda command, station, words: wrote.append((station, words))
-    program.ask(WRITE_N7)
+    program.ask(write)
     bench.run(0.5)
-    assert stored(plc, 'N7:0') == b'\x34\x12'
+    assert stored(plc, address) == b'\x34\x12'
     assert bench.listener.values(mapping)[-1] == [0x1234]
     assert wrote == [(1, [mapping.extent])]
+    program.ask(read)
+    bench.run(0.5)
+    assert program.replies[-1][1].data.hex(' ') == expected
 
 
 @for_all('entry', [
-    ('AA 04 07 89 05 00 34 12 00 00', 'N7:5', 2), ('AA 04 08 8A 02 00 00 00 80 3F', 'F8:2', 1),
-    ('AB 02 03 85 01 00 01 00 01 00', 'B3:1', 1), ('80 01', '', 0)])
-def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, int]) -> None:
-    data, address, length = entry
-    found = written_extents(Packet(1, 9, 0x0F, 0, 1, bytes.fromhex(data)), 1, [PlcType.SLC])
-    expected = [make_mapping(address, plc='SLC', length=length).extent] if address else []
+    ('SLC', '0F AA 04 07 89 05 00 34 12 00 00', 'N7:5', 2),
+    ('SLC', '0F AA 04 08 8A 02 00 00 00 80 3F', 'F8:2', 1),
+    ('SLC', '0F AB 02 03 85 01 00 01 00 01 00', 'B3:1', 1),
+    ('SLC', '0F AA 04 09 89 05 00 34 12 00 00', '', 0),  # no row is in N9
+    ('SLC', '0F A2 02 07 89 00 00', '', 0), ('SLC', '0F 80 01', '', 0), ('SLC', '0F', '', 0),
+    # Typed writes: the third word of a transaction of 3; file 20, whose type no address tells.
+    ('PLC5', '0F 67 02 00 03 00 06 07 05 93 09 42 34 12', 'N7:7', 1),
+    ('PLC5', '0F 67 00 00 02 00 06 14 03 95 09 42 01 00 02 00', 'N20:3', 2),
+    ('PLC5', '0F 67 00 00 01 00 06 08 02 96 09 94 08 00 00 80 3F', 'F8:2', 1),
+    ('PLC5', '0F 26 06 14 03 FE FF 01 00', 'N20:3', 1),
+    ('PLC5', '0F 00 00 00 02 00 06 14 03 01 00 02 00', 'N20:3', 2),
+    ('PLC5', '08 06 00 34 12', 'N9:3', 1)])
+def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, int]) -> None:
+    plc, text, address, length = entry
+    data = bytes.fromhex(text)
+    rows = [make_mapping(text, plc=plc, station=1, period=50) for text in (
+        'N7:0', 'F8:0', 'B3:0', *(('N20:0', 'N9:0') if plc == 'PLC5' else ()))]
+    found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, rows)
+    expected = [make_mapping(address, plc=plc, length=length).extent] if address else []
     assert found == expected
 
 

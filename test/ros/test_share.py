@@ -45,13 +45,16 @@ def test_hmi_reads_and_writes_through_the_node(
                           'logical write F8:4 = 30.5, words of setpoint')
             until_status(diagnostics, 'guests', WARN,
                          lambda status: '1 writes to words of ours' in status.message)
+        with Client(str(place), plc_type='PLC5', station=1, timeout=3.0, cmd_timeout=3.0) as hmi:
+            hmi.write('A10:0', [1, 2, 3])
+        node.wait_for('[WARN] ', 'typed write A10:0 = 0001 0002 0003, words of label')
         node.end()
     assert not place.is_symlink()
     assert sniff([str(tmp_path / 'line.cap')]) == 0
     lines = capsys.readouterr().out.splitlines()
     guests = [line for line in lines if f'| guest pty:{place} |' in line]
-    # Three commands of it, and their replies.
-    assert len(guests) == 6
+    # Four commands of it, and their replies.
+    assert len(guests) == 8
     assert sum('write F8:4 = 30.5' in line for line in guests) == 1
     assert len([line for line in lines if ' command ' in line]) > 10
 
