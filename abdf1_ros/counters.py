@@ -86,6 +86,7 @@ class Counters:
     # The specification has no numbers for these: a PLC's diagnostic counters show them (M 9-6).
     enqs_received: int = 0
     refused_for_memory: int = 0
+    unsent_messages: int = 0  # by radio, when the port was lost
 
     def by_mnemonic(self) -> dict[str, int]:
         """Return every counter by its mnemonic, in the order of the numbers."""

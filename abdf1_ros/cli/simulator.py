@@ -355,10 +355,12 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
         return replies[0] if replies else None
 
     first, *others = plcs
+    for plc in plcs:
+        plc.be_radio(first.counters)
     settings = RadioSettings(first.station, checksum, also=[plc.station for plc in others])
     return Machine(
         lambda machine: RadioNode(machine, settings, ActiveStationList(), serve).run(first),
-        checksum=checksum, duplex=Duplex.FULL, timing=timing)
+        checksum=checksum, duplex=Duplex.FULL, timing=timing, counters=first.counters)
 
 
 def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThread,

@@ -53,7 +53,7 @@ from abdf1_ros.df1.machine import (
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
-from abdf1_ros.errors import CommandExpired, StationInactive
+from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.messages import Event, Message
 
 # Packets that a node does not send on once more (1763-RM001C), and for how long (s): some programs
@@ -197,6 +197,14 @@ class RadioNode(EqualNode):
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve others, for ever."""
         self._forget()
+        try:
+            yield from self._work(source)
+        except PortLost:
+            machine = self._machine
+            self._counters.unsent_messages += not machine.has_left(machine.position)
+            raise
+
+    def _work(self, source: TaskSource) -> Procedure:
         while True:
             # In turns, or one kind could keep the others waiting for ever.
             if self._waiting:

@@ -229,8 +229,7 @@ class Driver:
 
     def _make_served(self) -> Served:
         plc_type, mode = PlcType(self.network.plc_type), self.network.mode
-        counters = served_counters(self.counters, plc_type, is_full_duplex=mode == 'Peer',
-                                   is_master=mode == 'Master')
+        counters = served_counters(self.counters, plc_type, mode)
         return Served(
             plc_type, self.mappings, self._readings.served, counters, mode == 'Peer')
 

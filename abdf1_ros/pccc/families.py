@@ -58,16 +58,15 @@ def known_commands() -> dict[CommandCode, KnownCommand]:
             for code, command in family.described.items()}
 
 
-def served_counters(counters: Counters, plc_type: PlcType, *, is_full_duplex: bool,
-                    is_master: bool = False) -> ServedCounters | None:
+def served_counters(counters: Counters, plc_type: PlcType, mode: str) -> ServedCounters | None:
     """
-    Return our counters as a processor of the family in the same role shows its own.
+    Return our counters as a processor of the family in the same mode shows its own.
 
     The modules in front of a PLC-2 or PLC-3 have blocks of their own (M 9-10), which are not
     emulated: None.
     """
     layout_in = FAMILIES[plc_type].served_counters
-    return layout_in and ServedCounters(counters, layout_in(is_full_duplex, is_master))
+    return layout_in and ServedCounters(counters, layout_in(mode))
 
 
 def family_of(plc_type: PlcType) -> Family:

@@ -44,8 +44,8 @@ class Family:
     a processor, None for the usual.
     ``described`` has its commands for people. ``meanings`` are those of its own error codes.
     ``by_processor`` is for a family whose processors take packets of different lengths.
-    ``served_counters`` returns the layout of a port for full duplex and for a master, None where
-    its counters are not emulated; they are at every address where ``counters_anywhere``.
+    ``served_counters`` returns the layout of a port in a mode (Master, Slave, Peer, Radio), None
+    where its counters are not emulated; they are at every address where ``counters_anywhere``.
     ``is_spoken_by_all`` tells that PLCs of other families know its commands too.
     ``file_search`` finds out which files a PLC has, None where they cannot be looked for.
     ``clock`` is the first of six words: year, month, day, hour, minute, second.
@@ -59,7 +59,7 @@ class Family:
     described: Mapping[CommandCode, KnownCommand]
     meanings: Meanings = USUAL_MEANINGS
     by_processor: Mapping[Processor, Dialect] = field(default_factory=dict)
-    served_counters: Callable[[bool, bool], CounterLayout] | None = None
+    served_counters: Callable[[str], CounterLayout] | None = None
     counters_anywhere: bool = False
     max_echo: int = MAX_ECHO
     is_spoken_by_all: bool = False

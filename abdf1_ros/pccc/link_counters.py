@@ -34,6 +34,7 @@ BAD, NO_MEMORY = 'bad messages received', 'messages refused for lack of memory'
 DUPLICATES = 'duplicate messages received'
 ENQ_SENT, ENQ_RECEIVED, NAK_RECEIVED = 'ENQ sent', 'ENQ received', 'NAK received'
 NAK_SENT, ENQ_OR_SENT_AGAIN = 'NAK sent', 'ENQ sent, or messages sent again'
+UNSENT = 'messages undelivered for lack of handshake'
 RETRIES, POLLS = 'messages sent again', 'polls received'
 DCD, LOST = 'carrier recovered', 'modem lost'
 UNUSED = ''
@@ -107,6 +108,7 @@ class ServedCounters:
         return {
             SENT: counters.messages_sent, RECEIVED: counters.messages_received,
             UNDELIVERED: counters.nak_limit_exceeded + counters.enq_limit_exceeded,
+            UNSENT: counters.unsent_messages,
             ENQ_SENT: counters.enq_retries, RETRIES: counters.nak_retries,
             ENQ_OR_SENT_AGAIN: counters.enq_retries + counters.nak_retries,
             NAK_RECEIVED: counters.naks_received, ENQ_RECEIVED: counters.enqs_received,

@@ -31,7 +31,7 @@ from abdf1_ros.ports.link_thread import LinkThread, RELEASED
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import Problem
 from abdf1_ros.ros.interlock_status import InterlockStatus
-from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen
+from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen, unnumbered_counts
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
 from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
 from abdf1_ros.ros.write_log import WriteLog
@@ -212,6 +212,7 @@ class Diagnostics:
             'expected poll cycle': milliseconds(self._driver.expected_poll_cycle),
             **paces(self._driver.points.values()),
             **poll_scans(self._driver),
+            **unnumbered_counts(self._driver),
             **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
             'files': changed_text(self.changed_files) or 'as read',
             'last error': with_age(self._last_error, now),

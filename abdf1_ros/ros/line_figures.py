@@ -22,6 +22,7 @@ from statistics import fmean
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.points import ReadPoint
+from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.status import milliseconds
 
@@ -75,6 +76,13 @@ def speed_seen(driver: Driver, has_speed: bool) -> str:
     if seen is None:
         return 'nothing speaks against the set one'
     return f'{"at least" if seen > 1 else "about"} {_rounded(driver.network.baud * seen)} baud'
+
+
+def unnumbered_counts(driver: Driver) -> dict[str, str]:
+    """Return what a radio modem node counts besides the numbered counters, by its name."""
+    counters = driver.counters
+    return {} if driver.network.mode != 'Radio' else {
+        UNSENT: str(counters.unsent_messages), NO_MEMORY: str(counters.refused_for_memory)}
 
 
 def poll_scans(driver: Driver) -> dict[str, str]:

@@ -144,7 +144,7 @@ class SimulatedPlc:
         self.processor = EmulatedProcessor(table.plc_type)
         self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self.serve)
         self.outbox: deque[Sending] = deque()
-        self._server = self._make_server()
+        self._server = self._make_server('Slave')
         self._tns = random.Random(seed).randrange(0x10000)
         self._clock = clock
         self._movers: list[_Mover] = []
@@ -164,12 +164,16 @@ class SimulatedPlc:
     def be_full_duplex(self) -> None:
         """Answer from now on as a PLC with a full-duplex port."""
         self.processor.is_full_duplex = True
-        self._server = self._make_server()
+        self._server = self._make_server('Peer')
 
-    def _make_server(self) -> Server:
-        processor = self.processor
-        return Server(self.table, processor, served_counters(
-            self.counters, processor.plc_type, is_full_duplex=processor.is_full_duplex))
+    def be_radio(self, counters: Counters) -> None:
+        """Answer from now on as a PLC behind a radio modem whose port has these counters."""
+        self.slave.counters = counters
+        self._server = self._make_server('Radio')
+
+    def _make_server(self, mode: str) -> Server:
+        return Server(self.table, self.processor, served_counters(
+            self.counters, self.processor.plc_type, mode))
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer a symbol, with the effects of the faults."""

@@ -29,7 +29,7 @@ from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.radio import longest_transaction, MOST_UNDER_WAY, RadioNode, RadioSettings
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.errors import CommandExpired, StationInactive
+from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.messages import Event
 import pytest
 from support.multidrop import CommandTasks
@@ -236,6 +236,26 @@ def test_broadcast_is_executed_and_not_answered() -> None:
     bench.hear(framed(THEIRS._replace(dst=BROADCAST)))
     assert bench.wait(5.0) == []
     assert bench.executed == {(PLC, THEIRS.tns): 1}
+
+
+def test_command_for_which_there_is_no_room_is_not_executed() -> None:
+    bench = Bench()
+    commands = [framed(THEIRS._replace(tns=tns)) for tns in range(18)]
+    bench.hear(*commands)
+    assert (bench.machine.counters.refused_for_memory, len(bench.executed)) == (1, 17)
+    bench.wait(10.0)
+    bench.hear(commands[-1])
+    assert bench.executed[PLC, 17] == 1
+
+
+@pytest.mark.parametrize('unsent', [0, 3])
+def test_what_has_not_left_when_the_port_is_lost_is_undelivered(unsent: int) -> None:
+    bench = Bench()
+    bench.begin(COMMAND)
+    bench.wait(0.2)
+    bench.machine.unsent = lambda: unsent
+    bench.machine.stop(PortLost('the line takes nothing'))
+    assert bench.machine.counters.unsent_messages == (unsent > 0)
 
 
 @pytest.mark.parametrize('heard', [

@@ -51,7 +51,7 @@ def server_of(capture: Capture) -> Server:
     """Return a server that has the words of the capture's server."""
     return Server(
         capture.table(), EmulatedProcessor(capture.family, is_full_duplex=True),
-        served_counters(Counters(), capture.family, is_full_duplex=True))
+        served_counters(Counters(), capture.family, 'Peer'))
 
 
 @pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)

@@ -115,7 +115,7 @@ def plc(family: PlcType, files: dict[str, str]) -> tuple[DataTable, Server]:
         address, data = parse_address(place, family), bytes.fromhex(text)
         words.create(address, len(data) // 2)
         words.write(address, data)
-    return words, Server(words, counters=served_counters(Counters(), family, is_full_duplex=False))
+    return words, Server(words, counters=served_counters(Counters(), family, 'Slave'))
 
 
 @for_all('entry', CALLS)

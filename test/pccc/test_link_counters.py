@@ -14,6 +14,8 @@
 
 """Diagnostic counters of a port, as bytes and by name (M 9-6, 9-7, 9-31)."""
 
+import struct
+
 from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.families import served_counters
@@ -139,21 +141,27 @@ def test_own_counters_begin_again_behind_16_bits() -> None:
     assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '1'
 
 
-@pytest.mark.parametrize(('plc_type', 'full_duplex', 'master', 'size'), [
-    (PlcType.PLC5, False, True, 26), (PlcType.SLC, True, False, 26),
-    (PlcType.SLC, False, False, 26), (PlcType.SLC, False, True, 28)])
-def test_block_by_family_and_role(plc_type: PlcType, full_duplex: bool, master: bool,
-                                  size: int) -> None:
-    served = served_counters(
-        Counters(enq_retries=1, nak_retries=2), plc_type, is_full_duplex=full_duplex,
-        is_master=master)
+@pytest.mark.parametrize(('plc_type', 'mode', 'size', 'expected'), [
+    (PlcType.PLC5, 'Master', 26, 3), (PlcType.SLC, 'Peer', 26, 1), (PlcType.SLC, 'Slave', 26, 2),
+    (PlcType.SLC, 'Master', 28, 2), (PlcType.SLC, 'Radio', 20, 0)])
+def test_block_by_family_and_mode(plc_type: PlcType, mode: str, size: int, expected: int) -> None:
+    served = served_counters(Counters(enq_retries=1, nak_retries=2), plc_type, mode)
     assert served is not None
     block = served.encode()
     assert len(block) == size
-    expected = 3 if plc_type == PlcType.PLC5 else 1 if full_duplex else 2
     assert block[8:10] == bytes((expected, 0))
+
+
+def test_words_of_a_radio_modem_port_are_where_its_channel_status_has_them() -> None:
+    counters = Counters(messages_sent=10, messages_received=11, unsent_messages=12, bcc_errors=16,
+                        refused_for_memory=17, duplicate_messages=18, nak_retries=1,
+                        nak_limit_exceeded=1)
+    served = served_counters(counters, PlcType.SLC, 'Radio')
+    assert served is not None
+    status = struct.unpack('<10H', served.encode())  # from CSx:9 on
+    assert status == (0, 10, 11, 12, 0, 0, 0, 16, 17, 18)
 
 
 @pytest.mark.parametrize('plc_type', [PlcType.PLC2, PlcType.PLC3])
 def test_modules_have_blocks_that_are_not_emulated(plc_type: PlcType) -> None:
-    assert served_counters(Counters(), plc_type, is_full_duplex=True) is None
+    assert served_counters(Counters(), plc_type, 'Peer') is None

@@ -133,7 +133,7 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
 FAMILY = Family(
     ADDRESSING, {Access.TYPED: ToyDialect()}, ToyCommands, decode, encode,
     {(CMD, READ): KnownCommand('toy read', Reader.rest, lambda data: f'W{data[0]:X}')},
-    served_counters=lambda is_full_duplex, is_master: COUNTERS)
+    served_counters=lambda mode: COUNTERS)
 
 
 def main() -> None:

@@ -28,5 +28,5 @@ from abdf1_ros.pccc.plc5.server import Plc5Commands
 FAMILY = Family(
     ADDRESSING, {Access.TYPED: PLC5_TYPED, Access.WORD_RANGE: PLC5_WORD_RANGE},
     Plc5Commands, identity.decode, identity.encode, DESCRIBED,
-    served_counters=lambda is_full_duplex, is_master: identity.COUNTERS, counters_anywhere=True,
+    served_counters=lambda mode: identity.COUNTERS, counters_anywhere=True,
     file_search=Plc5FileSearch(), clock='S:18')

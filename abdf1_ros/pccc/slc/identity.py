@@ -91,6 +91,11 @@ SLAVE_COUNTERS = CounterLayout((
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.RETRIES,
     names.UNUSED, names.POLLS, names.BAD, names.NO_MEMORY, names.DUPLICATES, names.UNUSED,
     names.DCD, names.LOST))
+# No source shows this reply by radio. The words are where the status CSx of a radio modem port has
+# them (1763-RM001C 522: CSx:9 to CSx:18), and where the other DF1 ports have those of the names.
+RADIO_COUNTERS = CounterLayout((
+    names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNSENT, *3 * [names.UNUSED], names.BAD,
+    names.NO_MEMORY, names.DUPLICATES))
 ML1000_COUNTERS = CounterLayout((
     names.UNUSED, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_SENT,
     names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NO_MEMORY, names.DUPLICATES,
@@ -133,11 +138,10 @@ def _counters(processor: Processor | None, interface: int) -> CounterLayout:
     return SLAVE_COUNTERS if interface == HALF_DUPLEX_PORT else FULL_DUPLEX_COUNTERS
 
 
-def served_counters(is_full_duplex: bool, is_master: bool) -> CounterLayout:
-    """Return the layout of the port of an SLC in such a role."""
-    if is_full_duplex:
-        return FULL_DUPLEX_COUNTERS
-    return MASTER_COUNTERS if is_master else SLAVE_COUNTERS
+def served_counters(mode: str) -> CounterLayout:
+    """Return the layout of the port of an SLC in such a mode."""
+    return {'Peer': FULL_DUPLEX_COUNTERS, 'Master': MASTER_COUNTERS,
+            'Radio': RADIO_COUNTERS}.get(mode, SLAVE_COUNTERS)
 
 
 def _model(code: int, name: str) -> tuple[str, Processor | None, tuple[str, ...]]:
