@@ -177,10 +177,15 @@ def beginning_of(symbol: Symbol) -> bytes:
 
 
 class Duplex(Enum):
-    """Which line discipline gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8)."""
+    """
+    Which line discipline gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8).
+
+    By radio modem the messages of full duplex are sent without any other symbol.
+    """
 
     HALF = 'half duplex'
     FULL = 'full duplex'
+    RADIO = 'radio modem'
 
 
 class Need(Enum):

@@ -55,7 +55,7 @@ class LinkSettings:
     @property
     def duplex(self) -> Duplex:
         """Return the line discipline of the mode."""
-        return Duplex.FULL if self.mode in ('Peer', 'Radio') else Duplex.HALF
+        return {'Peer': Duplex.FULL, 'Radio': Duplex.RADIO}.get(self.mode, Duplex.HALF)
 
 
 @dataclass(slots=True)

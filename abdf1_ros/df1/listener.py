@@ -140,11 +140,11 @@ class ListeningDecoder(FrameDecoder):
     def _begin(self, pair: bytes) -> Decoded:
         kind = self._kind
         if not self._duplex_given:
-            if pair in (SOH, EOT):
+            if pair in (SOH, EOT) and kind.duplex is not Duplex.RADIO:
                 kind.duplex = Duplex.HALF
             elif pair == STX and kind.duplex is None:
                 kind.duplex = Duplex.FULL
-        self._is_half_duplex = kind.duplex is not Duplex.FULL
+        self._is_half_duplex = kind.duplex in (None, Duplex.HALF)
         return super()._begin(pair)
 
     def _poll_check(self) -> Poll:

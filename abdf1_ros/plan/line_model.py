@@ -74,6 +74,6 @@ def _overhead(duplex: Duplex, checksum: Checksum, station: int) -> int:
     """Return the characters of a transaction, without what commands and replies have after TNS."""
     # Of a frame only the size counts, so the check need not be that of its data.
     message = frames.message_frame(b'', checksum)
-    sent = message if duplex is Duplex.FULL else \
+    sent = message if duplex is not Duplex.HALF else \
         frames.master_frame(station, b'', checksum) + frames.poll_frame(station)
     return len(sent) + len(message) + 2 * (HEADER_SIZE + len(frames.ACK))

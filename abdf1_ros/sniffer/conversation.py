@@ -29,6 +29,11 @@ from abdf1_ros.sniffer.entries import Mark
 _PATIENCE = 10.0
 _MOST_OPEN = 1000
 
+# By radio modem a message that comes again within so many seconds is taken for one that a node
+# sends on. Its sender waits for longer until it repeats it: for the time-out of its command.
+_FORWARDED_WITHIN = 1.0
+_MOST_RECENT = 20  # messages; a node that sends on remembers as many (1763-RM001C)
+
 _Key = tuple[int, int, int]
 
 
@@ -59,6 +64,39 @@ class MessageFacts(NamedTuple):
     guest: str = ''
 
 
+class Copies:
+    """
+    Tell, by radio modem, what a node sends on from what its sender repeats.
+
+    ``recorder`` is the number of the node at ``>``, where all that is said there first has one.
+    """
+
+    def __init__(self) -> None:
+        self._recent: dict[Packet, tuple[float | None, Direction]] = {}
+        self._recorders: set[int] = set()
+
+    @property
+    def recorder(self) -> int | None:
+        return min(self._recorders) if len(self._recorders) == 1 else None
+
+    def mark(self, packet: Packet, time: float | None, direction: Direction) -> Mark | None:
+        """Return what a message is that has come before, None for a new one."""
+        begun, side = self._recent.get(packet, (None, direction))
+        age = None if time is None or begun is None else abs(time - begun)
+        is_new = packet not in self._recent or (age or 0.0) > _PATIENCE
+        is_own = direction is Direction.OUT and packet.src == self.recorder
+        if not is_new and not is_own and (
+                side is not direction or age is not None and age < _FORWARDED_WITHIN):
+            return Mark.FORWARDED
+        if is_new and direction is Direction.OUT:
+            self._recorders.add(packet.src)
+        self._recent.pop(packet, None)
+        self._recent[packet] = time, direction
+        if len(self._recent) > _MOST_RECENT:
+            del self._recent[next(iter(self._recent))]
+        return None if is_new else Mark.RETRANSMISSION
+
+
 class Conversation:
     """
     Remember the messages of a line; every good one is handed to ``take``.
@@ -73,12 +111,15 @@ class Conversation:
         self._last: dict[Direction, _Said] = {}
         self._given_up: list[Transaction] = []
         self._guest = ('', '')  # TNS and place
+        self.copies = Copies()
 
     def take(self, packet: Packet, time: float | None, direction: Direction,
-             from_master: bool) -> MessageFacts:
+             from_master: bool, is_radio: bool = False) -> MessageFacts:
         """Return what is known of a message; ``from_master`` tells frames with DLE SOH."""
         mark = self._repetition(packet, from_master)
         self._last[direction] = self._said[*_path(packet), from_master]
+        copy = self.copies.mark(packet, time, direction)
+        mark = copy if is_radio else mark
         marks = () if mark is None else (mark,)
         if not packet.is_reply:
             self._begin(packet, time, mark)
@@ -140,8 +181,8 @@ class Conversation:
     def _begin(self, command: Packet, time: float | None, mark: Mark | None) -> None:
         key = command.src, command.dst, command.tns
         known = self._open.get(key)
-        if command.dst == BROADCAST:
-            return  # no station replies
+        if command.dst == BROADCAST or mark is Mark.FORWARDED:
+            return  # no station replies, or the command has been taken
         if known is not None and mark is not None and not (
                 mark is Mark.DUPLICATE and known.answered):
             return

@@ -47,12 +47,14 @@ class Mark(Enum):
 
     A message that comes again is a duplicate once the other side has acknowledged it (the
     receiver has to drop it, M 3-4), before that a retransmission. A master passes messages of
-    slaves to slaves on as they are. A stray reply is one to no command that was seen.
+    slaves to slaves on as they are. By radio modem a node has forwarded a message that comes again
+    soon, or from the other side. A stray reply is one to no command that was seen.
     """
 
     RETRANSMISSION = 'retransmission'
     DUPLICATE = 'duplicate'
     RELAYED = 'relayed'
+    FORWARDED = 'forwarded'
     STRAY = 'stray'
     WRONG_COMMAND = 'wrong command code'
 

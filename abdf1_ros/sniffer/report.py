@@ -117,7 +117,8 @@ def summary_lines(summary: Summary, kind: LineKind) -> Iterator[str]:
         (counts.kinds[Kind.COMMAND], 'commands'), (counts.kinds[Kind.REPLY], 'replies'),
         (counts.errors, 'of them with an error'), (counts.kinds[Kind.POLL], 'polls'),
         (counts.kinds[Kind.EOT], 'EOT'), (counts.kinds[Kind.ACK], 'ACK'),
-        (counts.kinds[Kind.NAK], 'NAK'), (counts.kinds[Kind.ENQ], 'ENQ'))
+        (counts.kinds[Kind.NAK], 'NAK'), (counts.kinds[Kind.ENQ], 'ENQ'),
+        (counts.marks[Mark.FORWARDED], 'forwarded'))
     yield '  faults: ' + _listed(
         (counts.damaged, 'damaged'), (counts.noise, 'bytes of noise'),
         (counts.marks[Mark.RETRANSMISSION], 'retransmissions'),

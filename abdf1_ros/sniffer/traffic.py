@@ -26,7 +26,7 @@ from abdf1_ros.df1.packet import BROADCAST, HEADER_SIZE, Packet
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.conversation import Conversation, Transaction
-from abdf1_ros.sniffer.entries import Entry, Kind
+from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 
 # Seconds of silence after which an unfinished frame is given up, as a receiver does: some
 # characters, plus the time that an operating system or a device server may hold bytes back.
@@ -35,6 +35,9 @@ _PAUSE = 0.15
 # Bytes for a decoder at once, which drops more than MAX_WAITING: one line of a dump can be as long
 # as its file.
 _PART = 4096
+
+# After so many replies without any DLE ACK, NAK or ENQ the line has none: it is radio modem.
+_RADIO_REPLIES = 3
 
 _CONTROLS = {
     Code.ACK: (Kind.ACK, ''), Code.NAK: (Kind.NAK, ''),
@@ -81,6 +84,8 @@ class TrafficDecoder:
         self._station: int | None = None  # the last one that the master sent something to
         self._awaited: tuple[Direction, str] | None = None  # asker, and question
         self._last_asker = Direction.OUT
+        self._finds_duplex = duplex is None
+        self._without_ack = 0  # replies since the last symbol
 
     def feed(self, chunk: Chunk) -> Iterator[Entry]:
         """Yield the entries that these bytes complete."""
@@ -192,12 +197,20 @@ class TrafficDecoder:
         station = self._station if self._is_half else None
         if isinstance(symbol, Unknown):
             return Entry(time, direction, Kind.UNKNOWN, f'DLE {symbol.byte:02X}', station)
+        if symbol is not Control.EOT:
+            self._without_ack = 0
+            self._guess_duplex(Duplex.RADIO, Duplex.FULL)
         kind, text = _CONTROLS[symbol.code]
         if kind is Kind.ACK:
             self._conversation.acknowledge(direction)
         if kind is Kind.NAK:
             text = 'resets all slaves' if self._is_half else 'refuses the message'
         return Entry(time, direction, kind, text, station)
+
+    def _guess_duplex(self, before: Duplex, now: Duplex) -> None:
+        """Take the line for another kind, if it is one of this kind and nobody has said so."""
+        if self._finds_duplex and self.kind.duplex is before:
+            self.kind.duplex = now
 
     def _frame(self, frame: Frame, time: float | None, direction: Direction,
                checksum: Checksum) -> Entry:
@@ -208,10 +221,18 @@ class TrafficDecoder:
 
     def _message(self, packet: Packet, time: float | None, direction: Direction,
                  station: int | None = None) -> Entry:
-        facts = self._conversation.take(packet, time, direction, station is not None)
+        is_radio = self.kind.duplex is Duplex.RADIO
+        facts = self._conversation.take(packet, time, direction, station is not None, is_radio)
+        if facts.command is not None and not facts.marks:
+            self._without_ack += 1
+            if self._without_ack == _RADIO_REPLIES:
+                self._guess_duplex(Duplex.FULL, Duplex.RADIO)
         kind = Kind.REPLY if packet.is_reply else Kind.COMMAND
+        sender = self._conversation.copies.recorder
+        is_recorders = Mark.FORWARDED in facts.marks and direction is Direction.OUT
+        by = f', sent on by {sender}' if is_recorders and sender is not None else ''
         return Entry(
-            time, direction, kind, f'{_route(packet)}: {describe(packet, facts.command)}',
+            time, direction, kind, f'{_route(packet)}{by}: {describe(packet, facts.command)}',
             self._node(station, packet), packet=packet, latency=facts.latency, marks=facts.marks,
             guest=facts.guest)
 

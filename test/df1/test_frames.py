@@ -122,8 +122,8 @@ def test_poll_vector_encodes(entry: Vector) -> None:
 def test_vectors_cover_every_mode() -> None:
     assert {(entry.kind, entry.duplex, entry.station is None) for entry in VECTORS} == {
         ('symbol', HALF, True), ('poll', HALF, False), ('message', HALF, False),
-        ('message', HALF, True), ('message', FULL, True)}
-    assert len(VECTORS) == 192
+        ('message', HALF, True), ('message', FULL, True), ('message', Duplex.RADIO, True)}
+    assert len(VECTORS) == 198
 
 
 @for_all('entry', CAPTURED)

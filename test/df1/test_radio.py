@@ -34,6 +34,7 @@ from abdf1_ros.messages import Event
 import pytest
 from support.multidrop import CommandTasks
 from support.peers import CommandTask
+from support.vectors import MESSAGES, Vector, vector
 from support.virtual_line import char_time, VirtualLine
 
 US, PLC, OTHER = 5, 1, 2
@@ -58,7 +59,7 @@ class Node(CommandTasks):
         self.most_under_way = 0
         self.executed: Counter[tuple[int, int]] = Counter()
         self.stations = ActiveStationList()
-        self.machine = Machine(lambda machine: self.link.run(self), checksum=Checksum.CRC,
+        self.machine = Machine(lambda machine: self.link.run(self), checksum=settings.checksum,
                                duplex=Duplex.FULL, timing=LineTiming(char_time(BAUD)))
         self.link = RadioNode(self.machine, settings, self.stations, self._serve,
                               self.events.append, Random(seed))
@@ -307,6 +308,19 @@ def test_numbers_that_are_ours_too_are_served() -> None:
     bench.hear(framed(THEIRS._replace(dst=7)))
     assert len(bench.wait(1.0)) == 1
     assert bench.executed == {(PLC, THEIRS.tns): 1}
+
+
+@pytest.mark.parametrize('entry', [
+    entry for entry in MESSAGES if entry.duplex is Duplex.RADIO], ids=lambda entry: entry.name)
+def test_vectors_are_executed_answered_or_dropped_as_they_say(entry: Vector) -> None:
+    bench = Bench(checksum=entry.checksum)
+    bench.hear(entry.frame)
+    replies = bench.wait(1.0)
+    is_command = entry.valid and entry.header is not None and not entry.packet.is_reply
+    assert sum(bench.executed.values()) == is_command
+    assert len(replies) == (is_command and entry.packet.dst != BROADCAST)
+    if entry.pair and is_command:  # up to the data
+        assert replies[0][:8] == vector('radio_reply').frame[:8]
 
 
 # Many nodes on the air
