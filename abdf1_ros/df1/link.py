@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Protocol
 
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.frames import ACK, Duplex, Frame, Symbol
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.messages import Event
@@ -56,6 +57,17 @@ class LinkSettings:
     def duplex(self) -> Duplex:
         """Return the line discipline of the mode."""
         return {'Peer': Duplex.FULL, 'Radio': Duplex.RADIO}.get(self.mode, Duplex.HALF)
+
+
+@cache
+def ack_on_reply(sender: int | None = None) -> Callable[[Symbol], bytes]:
+    """Return the reflex to a good reply to another node, of this sender if one is given."""
+    def reflex(symbol: Symbol) -> bytes:
+        if not isinstance(symbol, Frame) or symbol.fault is not None or symbol.station is not None:
+            return b''
+        dst, src, cmd = symbol.data[:3]
+        return ACK if cmd & REPLY_BIT and dst != src and sender in (src, None) else b''
+    return reflex
 
 
 @dataclass(slots=True)

@@ -70,6 +70,10 @@ class Step(NamedTuple):
     (clock value in s) it does not go out any more: CommandExpired is raised at the ``yield``.
     ``reply_size`` is the bytes after the header of the reply that is expected, if that tells no
     error; 0 where it is not known.
+
+    ``reflex`` gives the frame that answers the next symbol, empty for none. That goes on the line
+    before the procedure hears of the symbol, and has to be what the procedure then sends. It is
+    not asked where there is a TX_Delay, or something else still has to go out.
     """
 
     frame: bytes | None
@@ -77,6 +81,7 @@ class Step(NamedTuple):
     delay: float = 0.0
     expires: float = math.inf
     reply_size: int = 0
+    reflex: Callable[[Symbol], bytes] | None = None
 
 
 class Silence(NamedTuple):
@@ -170,7 +175,7 @@ class Machine:
     was heard before a transmission is dropped: for the master of a half-duplex line it cannot
     be the answer. ``counters`` gets the characters in both directions.
 
-    A frame after which nothing is waited for, such as the ACK of a reply, is handed to
+    A reflex, and a frame after which nothing is waited for, such as an ACK, is handed to
     ``send_at_once`` where that is set, so that it is on the line while the reply is made use of.
     All others come from ``data_to_send``.
 
@@ -190,7 +195,7 @@ class Machine:
         self.counters = counters or Counters()
         self.now = 0.0
         self.deadline: float | None = None
-        self.send_at_once: Callable[[bytes], None] | None = None
+        self.send_at_once: Callable[[bytes], None] = self._keep
         self.unsent: Callable[[], int] = lambda: 0
         self.background: Background | None = None
         self.late = 0.0
@@ -213,6 +218,8 @@ class Machine:
         self._is_listening = False
         self._line_free = -math.inf
         self._reply_size = 0
+        self._reflex: Callable[[Symbol], bytes] | None = None
+        self._ahead = b''  # on the line by reflex, and not yet sent by the procedure
         self._last_heard = -math.inf
         self._echo = LineEcho(duplex is Duplex.HALF)
         self._due = -math.inf  # the deadline, before a message was heard out
@@ -288,7 +295,7 @@ class Machine:
         is left without a result.
         """
         procedure, self._procedure = self._procedure, None
-        self._out, self.send_before = b'', math.inf
+        self._out, self._ahead, self.send_before = b'', b'', math.inf
         self._outgoing.clear()
         self.embeds = False
         self.decoder.reset()
@@ -398,6 +405,10 @@ class Machine:
     def _deliver_symbols(self) -> None:
         while self._is_listening and self.decoder.waiting \
                 and (symbol := self._next_symbol()) is not None:
+            if self._reflex is not None and not (self._out or self._outgoing.size) \
+                    and (frame := self._reflex(symbol)):
+                self._ahead = frame
+                self.send_at_once(frame)
             if self._is_half_duplex:  # what we have sent has left
                 self.rate.answered(self.counters.chars_received, self.now)
                 self._line_free = min(self._line_free, self.now)
@@ -409,6 +420,9 @@ class Machine:
                     self.rate.message(self.counters.chars_received - self._message.heard,
                                       self.now - self._message.begun)
             self._resume(symbol)
+
+    def _keep(self, data: bytes) -> None:
+        self._out += data
 
     def _take_as_answer(self) -> None:
         """Conclude from an answer that what we have sent has left, but what is still here."""
@@ -439,6 +453,7 @@ class Machine:
     def _take_step(self, step: Step) -> bool:
         """Carry out a step; return whether the procedure goes on at once."""
         self._resting = step.frame is None
+        self._reflex = None if self._timing.tx_delay else step.reflex
         if self._resting:
             self._is_listening = not self._forget_on_send
             self._reply_size, self._due = step.reply_size, self.now + (step.timeout or 0.0)
@@ -459,7 +474,9 @@ class Machine:
             is_alone = not self._outgoing.size
             is_divided = self.embeds or not is_alone
             self._fresh = self._given_out(step.frame, free) if is_divided else step.frame
-            self._out += self._fresh
+            ahead, self._ahead = self._ahead, b''
+            assert ahead in (b'', step.frame)
+            self._out += b'' if ahead else self._fresh
             self.send_before = step.expires if is_alone else math.inf
             self.counters.chars_sent += size
             self.position += size
@@ -474,7 +491,7 @@ class Machine:
             if step.frame:
                 self.rate.sent(len(step.frame), self.counters.chars_received, self.now)
             return False
-        if self.send_at_once is not None and self._out:
+        if self._out:
             self.send_at_once(self.data_to_send())
         return True
 

@@ -94,7 +94,8 @@ class HalfDuplexMaster:
             if number != BROADCAST and not self._stations.records[number].active:
                 yield from self._line.probe(number)
             task.sent = True
-            started = yield from self._line.deliver(number, command, task.expires)
+            started = yield from self._line.deliver(
+                number, command, task.expires, is_polled_next=True)
             reply = command.reply() if number == BROADCAST else (
                 yield from self._collect(number, command, started, task.reply_size))
         except CommandExpired as error:

@@ -29,13 +29,15 @@ from collections import deque
 from collections.abc import Callable, Container, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 import math
 from typing import NoReturn, TypeGuard
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
+from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
+from abdf1_ros.df1.link import ack_on_reply
 from abdf1_ros.df1.machine import (
     Heard,
     LISTEN_ON,
@@ -50,7 +52,6 @@ from abdf1_ros.df1.packet import (
     is_local_status,
     Packet,
     REPLY_BIT,
-    source,
     STS_NOT_DELIVERED,
 )
 from abdf1_ros.df1.stations import ActiveStationList
@@ -133,12 +134,13 @@ class MasterLine:
         self._last_code = 0
         self.forwards: deque[Packet] = deque()
 
-    def deliver(self, number: int, packet: Packet, expires: float = math.inf
-                ) -> Generator[Step, Heard, float]:
+    def deliver(self, number: int, packet: Packet, expires: float = math.inf,
+                *, is_polled_next: bool = False) -> Generator[Step, Heard, float]:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
         Return when the transmission began that was acknowledged (clock value in s).
+        ``is_polled_next`` tells that its poll is what the caller sends then.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -147,12 +149,14 @@ class MasterLine:
             begun = self.machine.now
             yield Step(frame, BROADCAST_PAUSE)
             return begun
+        reflex = _poll_on_ack(number) if is_polled_next else None
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             begun = self.machine.now
             try:
                 answer = yield from self._ask(
-                    Step(frame, self._timeout, expires=expires), number, _MESSAGE_ANSWERS)
+                    Step(frame, self._timeout, expires=expires, reflex=reflex), number,
+                    _MESSAGE_ANSWERS)
             except CommandExpired as error:
                 self.counters.messages_sent -= 1
                 error.sent = retry > 1
@@ -228,8 +232,8 @@ class MasterLine:
         """Poll once; return EOT, NAK, a frame good or bad, or silence."""
         self.counters.polls_sent += 1
         return self._ask(
-            Step(frames.poll_frame(number), self._timeout, pause, reply_size=reply_size), number,
-            _POLL_ANSWERS)
+            Step(frames.poll_frame(number), self._timeout, pause, reply_size=reply_size,
+                 reflex=ack_on_reply(number)), number, _POLL_ANSWERS)
 
     def _ask(self, question: Step, number: int,
              wanted: tuple[Control, ...]) -> Generator[Step, Heard, Heard]:
@@ -292,7 +296,7 @@ class MasterLine:
         It answers an earlier poll, whose time was up. It gets no ACK: the station asked now would
         take that for its own message. So the message comes again, and is then a repetition.
         """
-        src = source(frame.data)
+        src = frame.data[1]
         if src == number or self._speaks_for(number, src) or src not in self.stations:
             return False
         packet = Packet.decode(frame.data)
@@ -456,6 +460,13 @@ class MasterLine:
         event = count_fault(frame, self.settings.checksum, self.counters, number)
         self._report(event)
         return event.message
+
+
+@cache
+def _poll_on_ack(number: int) -> Callable[[Symbol], bytes]:
+    """Return the reflex to the ACK of a station."""
+    poll = frames.poll_frame(number)
+    return lambda symbol: poll if symbol is Control.ACK else b''
 
 
 def is_good(answer: Heard) -> TypeGuard[Control | Frame]:

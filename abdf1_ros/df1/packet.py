@@ -37,11 +37,6 @@ def is_local_status(sts: int) -> bool:
     return 0 < sts < 0x10
 
 
-def source(link_data: bytes) -> int:
-    """Return SRC of link data that hold a header."""
-    return link_data[1]
-
-
 def begins_good_reply(link_data: bytes | bytearray) -> bool:
     """Tell whether the header is there, and is that of a reply without an error."""
     return len(link_data) >= HEADER_SIZE and link_data[2] & REPLY_BIT != 0 and link_data[3] == 0

@@ -52,7 +52,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
-from abdf1_ros.df1.link import EqualNode
+from abdf1_ros.df1.link import ack_on_reply, EqualNode
 from abdf1_ros.df1.machine import (
     Heard,
     Machine,
@@ -84,6 +84,8 @@ _LATE_RESPONSE = 0.1
 # The ACK time-out (s) and the number of ENQs in the default settings of the products.
 _ACK_TIMEOUT = 1.0
 _ENQ_LIMIT = 3
+
+_REFLEX = ack_on_reply()
 
 # While a response is waited for, overdue commands are looked for so often (s).
 _TICK = 0.25
@@ -165,7 +167,7 @@ class FullDuplexPeer(EqualNode):
                 continue
             if self._replies:
                 continue
-            symbol = yield Step(None, self._idle_time(source))
+            symbol = yield Step(None, self._idle_time(source), reflex=_REFLEX)
             if not isinstance(symbol, Silence):
                 yield from self._answer(symbol)
 
@@ -280,7 +282,7 @@ class FullDuplexPeer(EqualNode):
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
         machine = self._machine
         last_byte, begun = 0, machine.now
-        symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires)
+        symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires, reflex=_REFLEX)
         end, position = machine.free_at + self._timeout, machine.position
         while not isinstance(symbol, Silence) or self._left(end) > 0:
             if symbol in (Control.ACK, Control.NAK) and machine.has_left(position):
@@ -319,7 +321,9 @@ class FullDuplexPeer(EqualNode):
         """Return the next symbol up to ``end``, or up to the next tick."""
         self._expire()
         left = self._left(end)
-        return (yield Step(b'', min(left, _TICK))) if left > 0 else Silence()
+        if left <= 0:
+            return Silence()
+        return (yield Step(b'', min(left, _TICK), reflex=_REFLEX))
 
     def _answer(self, symbol: Symbol) -> Procedure:
         """Send the response to a symbol, and make use of the message that it brings."""

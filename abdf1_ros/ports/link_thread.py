@@ -331,7 +331,11 @@ class LinkThread(threading.Thread):
                 self._pause(spare_time)
             deadline = machine.next_call
             timeout = None if deadline is None else max(0.0, deadline - clock())
-            data = left or self._read(port, timeout)
+            try:
+                data = left or port.read(timeout, self._wake_reader)
+            except OSError:
+                machine.counters.read_errors += 1
+                raise
             now = clock()
             if deadline is not None and now >= deadline:
                 # The deadline first: after a pause of this process nobody can tell whether an
@@ -345,13 +349,6 @@ class LinkThread(threading.Thread):
                 machine.receive_data(data, now)
             elif self._take_wake() and not self._stopping:
                 machine.wake(now)
-
-    def _read(self, port: Port, timeout: float | None) -> bytes:
-        try:
-            return port.read(timeout, self._wake_reader)
-        except OSError:
-            self._machine.counters.read_errors += 1
-            raise
 
     def _take_wake(self) -> bool:
         try:

@@ -15,6 +15,7 @@
 """The engine: deadlines, delays, deafness and rests, on a clock that the test moves."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 import math
 
 from abdf1_ros.counters import Counters
@@ -181,6 +182,80 @@ def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on()
     bench.machine.start(0.0)
     assert sent == [(ACK, 0), (EOT, 1)]
     assert bench.machine.data_to_send() == FRAME
+
+
+def eot_on_ack(symbol: Symbol) -> bytes:
+    """Answer an ACK."""
+    return EOT if symbol is SAID_ACK else b''
+
+
+def sends_of(bench: Bench) -> list[tuple[bytes, int]]:
+    """Start a machine; return a list that gets what it sends at once, after so many symbols."""
+    sent: list[tuple[bytes, int]] = []
+    bench.machine.send_at_once = lambda data: sent.append((data, len(bench.got)))
+    bench.machine.start(0.0)
+    bench.machine.data_to_send()
+    return sent
+
+
+@pytest.mark.parametrize('frame', [FRAME, None])
+def test_reflex_is_on_the_line_before_the_procedure_hears_of_the_symbol(
+        frame: bytes | None) -> None:
+    bench = Bench(Step(frame, 1.0, reflex=eot_on_ack), Step(EOT, 1.0), timing=LineTiming(0.25))
+    sent = sends_of(bench)
+    machine = bench.machine
+    machine.receive_data(ACK, 9.0)
+    assert (sent, bench.got, machine.data_to_send()) == ([(EOT, 0)], [SAID_ACK], b'')
+    assert machine.deadline == 9.0 + 2 * 0.25 + 1.0
+    assert machine.counters.chars_sent == machine.position == len((frame or b'') + EOT)
+    machine.receive_data(ACK, 9.5)
+    assert sent == [(EOT, 0)]
+
+
+@pytest.mark.parametrize(('tx_delay', 'heard'), [(0.0, EOT), (0.0, EOT + ACK), (0.5, ACK)])
+def test_reflex_is_for_its_symbol_if_that_is_the_next_and_has_no_delay(
+        tx_delay: float, heard: bytes) -> None:
+    bench = Bench(Step(b'', 1.0, reflex=eot_on_ack), LISTEN_ON,
+                  timing=LineTiming(tx_delay=tx_delay))
+    sent = sends_of(bench)
+    bench.machine.receive_data(heard, 0.5)
+    assert (sent, bench.machine.data_to_send()) == ([], b'')
+
+
+def test_reflex_does_not_overtake_what_still_has_to_go_out() -> None:
+    bench = Bench(Step(b'', 1.0), Step(FRAME, 1.0, reflex=eot_on_ack), Step(EOT, 0),
+                  duplex=Duplex.FULL)
+    sent = sends_of(bench)
+    bench.machine.receive_data(ACK + ACK, 0.5)
+    assert sent == [(FRAME + EOT, 2)]
+
+
+def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
+    def run(machine: Machine) -> Procedure:
+        machine.embeds = True
+        yield Step(MESSAGE, 1.0, reflex=eot_on_ack)
+        yield Step(EOT, 1.0)
+
+    machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
+    machine.start(0.0)
+    sent = machine.data_to_send()
+    assert sent != MESSAGE
+    machine.receive_data(ACK, 0.1)
+    sent += machine.data_to_send()
+    machine.handle_timeout(9.0)
+    assert sent + machine.data_to_send() == MESSAGE + EOT
+
+
+def test_procedure_that_does_not_send_its_reflex_is_a_bug_until_the_next_start() -> None:
+    for step, error in ((Step(NAK, 1.0), pytest.raises(AssertionError)),
+                        (Step(None, 1.0), nullcontext())):
+        bench = Bench(Step(FRAME, 1.0, reflex=eot_on_ack), step)
+        bench.machine.start(0.0)
+        bench.machine.data_to_send()
+        with error:
+            bench.machine.receive_data(ACK, 0.5)
+        bench.machine.start(1.0)
+        assert bench.machine.data_to_send() == FRAME
 
 
 def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:

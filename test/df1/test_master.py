@@ -104,6 +104,29 @@ def test_command_is_acknowledged_and_its_reply_polled_for() -> None:
     assert (station.replies, station.last_tns, station.last_heard) == (1, 0x0102, 100.0)
 
 
+def test_poll_and_ack_of_the_reply_leave_before_anything_else_is_done() -> None:
+    script = MasterScript(SETTINGS)
+    counters, left = script.machine.counters, []
+    script.machine.send_at_once = lambda data: left.append(
+        (data, counters.acks_received, counters.messages_received))
+    script.begin(COMMAND, SENT, SAYS_ACK, SAYS_REPLY)
+    assert left == [(POLLED.data, 0, 0), (ACK, 1, 0)]
+
+
+@pytest.mark.parametrize('heard', [
+    frame(REPLY._replace(dst=SLAVE)), frame(REPLY._replace(src=SLAVE + 1)),
+    frame(REPLY._replace(cmd=0x0F)), damaged(REPLY),
+    master_frame(MASTER, REPLY.encode(), Checksum.CRC)])
+def test_only_a_reply_of_the_polled_slave_has_its_ack_before_it_is_looked_at(heard: bytes) -> None:
+    script = MasterScript(SETTINGS)
+    looked_at: list[int] = []
+    script.begin(COMMAND, SENT, SAYS_ACK, POLLED)
+    script.machine.send_at_once = lambda data: looked_at.append(
+        script.machine.counters.messages_received)
+    script.machine.receive_data(heard, script.now)
+    assert 0 not in looked_at
+
+
 def test_normal_with_bcc() -> None:
     script = MasterScript(replace(SETTINGS, checksum=Checksum.BCC))
     reply = script.run(

@@ -18,7 +18,7 @@ from collections import Counter
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.polling import PollingSettings
@@ -170,6 +170,20 @@ def assert_recovers(rig: Rig) -> None:
                 assert isinstance(task.result, Packet), (src, dst)
                 assert task.result == rig.replies[dst, src, task.command.tns]
     rig.line.run(rig.is_done, 60.0)
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_reflexes_change_nothing_on_the_line(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    for change in lambda step: step, lambda step: step._replace(reflex=None):
+        take = Machine._take_step
+        with monkeypatch.context() as patch:
+            patch.setattr(Machine, '_take_step', lambda machine, step, take=take, change=change:
+                          take(machine, change(step)))
+            rig = Rig(mode, noise=noise_of(0.004), seed=3, chunk=8)
+            rig.run(25)
+            seen.append((rig.master.machine.sent, rig.master.counts(), rig.line.now))
+    assert seen[0] == seen[1]
 
 
 @pytest.mark.parametrize('chunk', [1, 14])

@@ -117,6 +117,17 @@ def test_command_is_acknowledged_and_answered_by_its_reply(checksum: Checksum) -
     assert (station.replies, station.last_tns, station.last_heard) == (1, REPLY.tns, 100.3)
 
 
+@pytest.mark.parametrize('heard', [[REPLY], [THEIRS], [REPLY, REPLY]])
+def test_ack_of_a_reply_leaves_before_the_reply_is_looked_at(heard: list[Packet]) -> None:
+    peer = bench()
+    left: list[tuple[bytes, int]] = []
+    peer.machine.send_at_once = lambda data: left.append(
+        (data, peer.machine.counters.messages_received))
+    for packet in heard:
+        peer.hear_packet(packet)
+    assert left == [(ACK, number + (packet is THEIRS)) for number, packet in enumerate(heard)]
+
+
 def test_next_command_follows_at_once() -> None:
     peer = bench()
     peer.begin(COMMAND)

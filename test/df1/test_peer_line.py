@@ -21,7 +21,7 @@ from dataclasses import replace
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import PeerSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive
@@ -172,6 +172,20 @@ def assert_recovers(rig: Rig) -> None:
         data = dialect_of(serving.table.plc_type).read_data(serving.place(0), 20, task.result.data)
         assert data == serving.table.read(serving.place(0), 20)
         assert asking.stations[serving.number].active
+
+
+def test_reflexes_change_nothing_on_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    take, send, seen = Machine._take_step, Machine.data_to_send, []
+    for change in lambda step: step, lambda step: step._replace(reflex=None):
+        sent: list[bytes] = []
+        monkeypatch.setattr(Machine, '_take_step', lambda machine, step, change=change:
+                            take(machine, change(step)))
+        monkeypatch.setattr(Machine, 'data_to_send', lambda machine, sent=sent:
+                            sent.append(send(machine)) or sent[-1])
+        rig = Rig(SETTINGS, noise=Noise(*[0.001] * 4), chunk=8)
+        rig.run(40)
+        seen.append((list(filter(None, sent)), rig.line.now))
+    assert seen[0] == seen[1]
 
 
 @pytest.mark.parametrize('chunk', [1, 14])
