@@ -134,14 +134,14 @@ def _line(options: argparse.Namespace) -> Network:
     station is ourselves.
     """
     network = network_of(options)
-    is_half = network.mode != MODES['full']
-    options.is_assumed = is_half and options.station is None
+    has_several = network.mode != MODES['full']
+    options.is_assumed = has_several and options.station is None
     if options.is_assumed and (options.command == 'write' or getattr(options, 'set', False)):
         raise ConfigurationError([Problem(
-            '--station', 'say which station to write to: a half-duplex line may have several')])
+            '--station', 'say which station to write to: this line may have several')])
     if options.station is None:
         options.station = DEFAULT_STATION
-    if not is_half or options.station != network.station:
+    if not has_several or options.station != network.station:
         return network
     if options.is_assumed:
         raise ConfigurationError([Problem(
@@ -366,7 +366,7 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
     progress = Progress()
     bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
         else detect.BAUD_RATES
-    modes = [MODES[options.duplex]] if options.duplex else list(reversed(MODES.values()))
+    modes = [MODES[options.duplex]] if options.duplex else [MODES['full'], MODES['half']]
     checks = [network.error_code] if options.check else detect.CHECKS
     search = detect.Search(network, options.stations, progress.show)
     found = search.run(bauds, modes, checks)

@@ -31,7 +31,7 @@ DEFAULTS = Network(timeout=300)
 # PLCs mostly have small numbers, and 1 is asked where nobody says which.
 _FIRST_SPARE = 10
 
-MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer'}
+MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer', 'radio': 'Radio'}
 
 # Options that stand for a column of the net CSV.
 _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
@@ -58,5 +58,9 @@ def network_of(options: argparse.Namespace) -> Network:
     if mode == 'Slave':
         raise ConfigurationError([Problem(
             options.net, 'Mode Slave: another node is the master of this line; plc can only '
-            'be a master (--duplex half) or have the PLC for itself (--duplex full)')])
-    return replace(network, mode=mode, polling=DEFAULTS.polling)
+            'be a master (--duplex half), have the PLC for itself (--duplex full), or be a node '
+            'of radio modems (--radio)')])
+    network = replace(network, mode=mode, polling=DEFAULTS.polling)
+    # By radio only the reply is waited for.
+    is_told = mode == 'Radio' and options.timeout is not None
+    return replace(network, cmd_timeout=network.timeout) if is_told else network

@@ -230,10 +230,12 @@ def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
 def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
     either = group.add_mutually_exclusive_group()
     either.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
-                        help='half: several stations on a line; full: one PLC '
-                             f'(default: {defaults.duplex})')
+                        help='half: several stations on a line; full: one PLC; radio: DF1 radio '
+                             f'modem (default: {defaults.duplex})')
     either.add_argument('--peer', action='store_const', const='full', dest='duplex',
                         help='the same as --duplex full')
+    either.add_argument('--radio', action='store_const', const='radio', dest='duplex',
+                        help='the same as --duplex radio')
 
 
 def _add_data_options(parser: argparse.ArgumentParser,

@@ -84,9 +84,9 @@ def scan(network: Network, stations: Sequence[int],
     """
     Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost.
 
-    On a half-duplex line we take an address that is none of theirs.
+    Where each has a number, we take one that is none of theirs.
     """
-    if network.mode == 'Master':
+    if network.mode != 'Peer':
         network = replace(network, station=free_station(network.station, stations))
     with Session(network, absent=stations, via=via) as session:
         for station in stations:
@@ -152,7 +152,7 @@ def hint(session: Session, error: Abdf1Error) -> str:
     received, network = session.counters.chars_received, session.network
     if session.counters.messages_received + session.counters.acks_received:
         return ''
-    kinds = {MODES['full']: 'full duplex', 'Radio': 'radio modem'}
+    kinds = {MODES['full']: 'full duplex', MODES['radio']: 'radio modem'}
     duplex = kinds.get(network.mode, 'half duplex')
     cause = SILENCE if not received else (
         f'{received} characters came, but no answer that makes sense: baud rate, parity, check, '

@@ -21,14 +21,22 @@ import pty
 import signal
 import subprocess
 import sys
+import time
 
 from abdf1_ros.cli.check import examine
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.plan.report import make_report
+from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
 from support.commands import call, running_simulator, Said
+from support.driver_bench import Recorder
+from support.mappings import make_mapping
 from support.ptys import Pty
 from support.ros import Process, write_csv
 from support.simulator_process import Files, make_files
@@ -376,8 +384,8 @@ def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
 def test_write_names_its_station_where_there_may_be_several(plc: Plc) -> None:
     said = plc('write', 'N7:21', '5', '--yes')
     assert (said.status, said.lines) == (2, [])
-    assert said.err == ('plc: --station: say which station to write to: a half-duplex line may '
-                        'have several\n')
+    assert said.err == (
+        'plc: --station: say which station to write to: this line may have several\n')
     assert plc('write', 'N7:21', '5', '--yes', '--station', '2').lines == [
         'N7:21 of station 2: written; now:', 'N7:21 5']
 
@@ -525,17 +533,44 @@ def test_plcs_behind_a_radio_modem(
         tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / 'line')
     net = write_csv(tmp_path / 'net.csv', 'Mode,Cmd_Timeout', ['Radio,1000'])
-    line = ('--net', str(net), '--port', port)
-    with running_simulator('--pty', port, '--data', str(files.simulator), '--radio',
-                           '--at', '0 silent 2') as process:
-        process.wait_for('station 2: silent')
-        assert call(main, capsys, 'read', 'N7:0', *line).good_lines == ['N7:0 1200']
+    line = '--radio', '--port', port
+    with running_simulator('--pty', port, '--data', str(files.simulator), '--radio') as process:
+        assert call(main, capsys, 'read', 'N7:0', '--net', str(net),
+                    '--port', port).good_lines == ['N7:0 1200']
+        assert call(main, capsys, 'write', 'N7:0', '7', '--yes', *line).err == (
+            'plc: --station: say which station to write to: this line may have several\n')
         write = 'write', 'N7:0', '7', '--yes', '--station', '1'
         assert call(main, capsys, *write, *line).status == 0
-        assert call(main, capsys, 'read', 'N7:0', *line).good_lines == ['N7:0 7']
-        silent = call(main, capsys, 'status', '2', *line)
+        watched = call(main, capsys, 'watch', 'N7:0', '--count', '2', '--period', '0.1', *line)
+        assert (watched.status, watched.lines[-1].split()[1:]) == (0, ['N7:0', '7'])
+        assert call(main, capsys, 'status', '2', *line).lines[0].startswith('station 2: SLC 5/03')
+        found = call(main, capsys, 'scan', '1-2,5', '--timeout', '500', *line)  # 5 is ours usually
+        assert found.lines[-1] == '2 of 3 stations answer'
+        process.say('silent 2')
+        process.wait_for('station 2: silent')
+        silent = call(main, capsys, 'status', '2', '--timeout', '500', *line)
         assert silent.status == 1
         assert 'Slave Station (2) Inactive' in silent.err and 'radio modem, CRC' in silent.err
+
+
+def test_words_of_a_node_on_a_radio_modem(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = PtyEndpoint(str(tmp_path / 'line'))
+    network = Network(mode='Radio', plc_type='SLC', station=9)
+    words = make_mapping('N7:0', 'Serve', station=9, length=2, plc='SLC')
+    driver = Driver(network, [words], DriverSettings(), Recorder(time.monotonic))
+    thread = LinkThread(driver.machine, line.open)
+    thread.start()
+    options = '--radio', '--port', line.name
+    try:
+        write = call(main, capsys, 'write', 'N7:1', '5', '--yes', '--station', '9', *options)
+        assert write.good_lines[-1] == 'N7:1 5'
+        read = call(main, capsys, 'read', 'N7:0', '--length', '2', '--station', '9', *options)
+        assert read.good_lines == ['N7:0 0 5']
+        assert call(main, capsys, 'ping', '9', '--count', '1', *options).status == 0
+    finally:
+        thread.stop()
+        line.close()
 
 
 def test_commands_work_over_a_tcp_connection(
