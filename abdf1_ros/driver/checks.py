@@ -159,14 +159,17 @@ class Checks:
         for number in {*self._requests.close(), *tuple(self.counters_wanted)}:
             self._take_counters(number, {}, reason)
 
-    def came_back(self, station: int, now: float) -> None:
-        """Ask a station that has been away; it may be another one by now."""
-        self._ask_status(station, now)
+    def ask_status(self, station: int, due: float) -> None:
+        """Ask a station at a clock value (s): it may be another one, or in another mode."""
+        for check in self._checks:
+            if check.kind is CheckKind.STATUS and check.station == station:
+                check.due = due
+        self._plan()
 
     def went_away(self, station: int) -> None:
         """Forget what a station has told that does not answer any more."""
         self._forget(station, 'the station does not answer')
-        self._ask_status(station, math.inf)
+        self.ask_status(station, math.inf)
 
     def next_due(self) -> float | None:
         """Return when the next check is due (clock value in s), None for never."""
@@ -284,12 +287,6 @@ class Checks:
                       and check.kind is CheckKind.COUNTERS and not math.isinf(check.due)]:
             self._take_counters(station, {}, reason)
             self._checks.remove(check)
-        self._plan()
-
-    def _ask_status(self, station: int, due: float) -> None:
-        for check in self._checks:
-            if check.kind is CheckKind.STATUS and check.station == station:
-                check.due = due
         self._plan()
 
     def _plan(self) -> None:

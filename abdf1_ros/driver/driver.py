@@ -129,7 +129,7 @@ class Driver:
             () if settings.read_only else self.mappings, self.stations, self._writes, writing,
             network.cmd_timeout / 1000,
             lambda write: self._served.store(write.mapping, write.raw), report,
-            self._listener.unreadable, self._listener.foreign_value,
+            self._listener.unreadable, self._foreign_value,
             1 + settings.first_tns % LARGEST)
         self._readings.read_back = self.interlocks.read_back
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
@@ -261,7 +261,7 @@ class Driver:
         if station.active:
             self._reads.release(station.number, self.machine.now)
             self.interlocks.contact(station.number, self.machine.now)
-            self.checks.came_back(station.number, self.machine.now)
+            self.checks.ask_status(station.number, self.machine.now)
         else:
             self.checks.went_away(station.number)
         self._listener.station_changed(station)
@@ -324,6 +324,11 @@ class Driver:
             self._end_write(write, Outcome.NOT_SENT, str(error))
         self._writes.drop(str(error), self.machine.now)
         self._read_backs.end(self.machine.now)
+
+    def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
+        """Tell it, and ask for the mode at once: that of a PLC with a download is not RUN."""
+        self.checks.ask_status(mapping.station, self.machine.now)
+        self._listener.foreign_value(mapping, text, is_conflict)
 
     def _station_told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Use what a station has answered: its mode, and which packets it takes."""

@@ -36,8 +36,10 @@ _LEAST_ZERO = 0.5
 # A stopped executor does not wake the link, so the link looks by itself every so many seconds.
 _GLANCE = 0.1
 
-# A second value that is not ours within so many seconds is another writer, not a download.
+# A second value that is not ours within so many seconds, or Periods where that is longer, is
+# another writer, not a download.
 _CONFLICT_TIME = 60.0
+_CONFLICT_PERIODS = 20
 
 _SHIFTS = 7
 _GOLDEN = 0.618  # its multiples lie evenly between whole numbers
@@ -57,6 +59,7 @@ class BeatEvent(Enum):
     """What changes the state."""
 
     OPENED = auto()
+    RUN = auto()
     CONTACT = auto()
     OTHER_WRITER = auto()
     ZERO_CONFIRMED = auto()
@@ -65,8 +68,8 @@ class BeatEvent(Enum):
     RELEASE = auto()
 
 
-_ALWAYS = {BeatEvent.OPENED: BeatState.CONTACT, BeatEvent.CONTACT: BeatState.CONTACT,
-           BeatEvent.OTHER_WRITER: BeatState.CONFLICT}
+_ALWAYS = {BeatEvent.OPENED: BeatState.CONTACT, BeatEvent.RUN: BeatState.CONTACT,
+           BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.OTHER_WRITER: BeatState.CONFLICT}
 _NEXT = {
     BeatState.CONTACT: {**_ALWAYS, BeatEvent.ZERO_CONFIRMED: BeatState.SHOWN},
     BeatState.SHOWN: {**_ALWAYS, BeatEvent.SEEN: BeatState.COUNTS},
@@ -130,6 +133,8 @@ class HeartbeatRow:
     def begin(self, now: float, event: BeatEvent = BeatEvent.CONTACT) -> None:
         """Start again with 0: the PLC may be another one by now (rule 2)."""
         self._go(event)
+        if event is BeatEvent.RUN:  # whatever was foreign before came with a download
+            self._foreign_at = -math.inf
         self._is_confirmed, self.is_first_try = False, True
         self._next = self.due = now
 
@@ -185,13 +190,14 @@ class HeartbeatRow:
         Compare a value that was read from ``started`` on; return what is told of another's.
 
         Only between the confirmation of ours and the next count one knows what it has to be. The
-        first is taken for a download, a second one for another writer: 0 then stays (rule 19).
+        first is taken for a download, a second one for another writer: 0 then stays, unless a
+        change to RUN shows that it was a download as well (rule 19).
         """
         is_known = self._is_confirmed and not self.is_under_way
         if not is_known or started < (self.confirmed or 0.0) or value == self.value:
             return ''
         text = f'{value} was read where {self.value} was written'
-        is_again = now - self._foreign_at < _CONFLICT_TIME
+        is_again = now - self._foreign_at < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
         was_known, self._foreign_at = self.state is BeatState.CONFLICT, now
         self.begin(now, BeatEvent.OTHER_WRITER if is_again else BeatEvent.CONTACT)
         if was_known:
@@ -201,10 +207,11 @@ class HeartbeatRow:
             self._next = self.due = now + self._period * (0.5 + self._zeros * _GOLDEN % 1)
             return ''
         if is_again:
-            return f'another program writes this word: {text}'
+            return (f'another program writes this word: {text}; 0 stays until the PLC goes from '
+                    'PROGRAM to RUN, ~/reload, or the port is opened again')
         # If two bridges counted from 1 at the same time, neither would see the other any more.
         self._extra_zero = self._period * (1 + int(1000 * now) % _SHIFTS)
-        return text
+        return f'{text}: taken for a download'
 
     @property
     def wants_zero(self) -> bool:

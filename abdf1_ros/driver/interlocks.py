@@ -202,12 +202,11 @@ class Interlocks:
         if station in self._plcs:
             self._contact(self._plcs[station], now)
 
-    def _contact(self, plc: _Plc, now: float, event: BeatEvent = BeatEvent.CONTACT, *,
-                 always: bool = False) -> None:
+    def _contact(self, plc: _Plc, now: float, event: BeatEvent = BeatEvent.CONTACT) -> None:
         for beat in plc.heartbeats:
             beat.begin(now, event)
         for row in plc.fallbacks if self._has_begun else ():
-            if always:
+            if event is BeatEvent.RUN:
                 row.make_due(FallbackCause.RUN, now)
             elif not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
@@ -219,7 +218,7 @@ class Interlocks:
         if plc is not None:
             was_running, plc.is_running = plc.is_running, is_running
             if is_running and was_running is False:
-                self._contact(plc, now, always=True)
+                self._contact(plc, now, BeatEvent.RUN)
 
     def read_back(self, mapping: Mapping, words: bytes, started: float) -> None:
         """Compare a heartbeat that was read from ``started`` on (clock value, s) (rule 19)."""

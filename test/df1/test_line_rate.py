@@ -30,7 +30,7 @@ def seen(real: int | None, *, words: int = 50, chunk: int = 1) -> float | None:
     rig = MasterBench(7, settings=SETTINGS, baud=BAUD)
     setattr(rig[7], '_execute', lambda command: command.reply(bytes(2 * words)))
     rig.line.char_time = char_time(real) if real else 0.0
-    rig.line.chunk = chunk
+    rig.line.chunks = [chunk] * len(rig.line.chunks)
     rig.start()
     for _ in range(EXCHANGES):
         task = rig.ask(7)

@@ -153,7 +153,7 @@ def assert_exact(rig: Rig) -> None:
 def assert_recovers(rig: Rig) -> None:
     """Check that everybody reaches everybody when the line is quiet."""
     rig.line.noise = QUIET
-    rig.line.chunk = 14  # takes a third of the steps
+    rig.line.chunks = [14] * len(rig.line.chunks)  # takes a third of the steps
     rig.line.run_for(4.0)  # what was under way comes to its end
     for number in SLAVES:  # message-based polling brings a station back by a command
         rig.ask(MASTER, number)

@@ -22,9 +22,10 @@ from __future__ import annotations
 
 import math
 
-from abdf1_ros.driver.heartbeat_rows import HeartbeatRow
+from abdf1_ros.driver.heartbeat_rows import BeatState, HeartbeatRow
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.plan.interlocks import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Lamp
@@ -54,7 +55,7 @@ class Bridge:
                                  start=False)
         self.plc = SimulatedPlc(1, cell.table, NETWORK.checksum, lambda: cell.now)
         self.plc.advance = cell.plc.advance  # type: ignore[method-assign]
-        self.plc.processor = cell.plc.processor
+        self.plc._server = cell.plc._server  # which tells the mode
         self.bench.connect(self.plc)
         self.has_command = has_command
         self.is_alive = self.publishes = True
@@ -105,6 +106,12 @@ class Cell:
             for bridge in self.bridges:
                 bridge.step(self.now, 800 if self.is_in_control else 0)
         self.plc.advance()
+
+    def download(self, seconds: float) -> None:
+        """Load the program, which takes so long."""
+        self.plc.download()
+        self.run(seconds)
+        self.plc.set_mode(Setting.REMOTE)
 
     @property
     def is_in_control(self) -> bool:
@@ -166,22 +173,33 @@ def test_rule_19_command_of_a_dead_bridge_is_not_kept_alive_by_another(
 
 
 @pytest.mark.parametrize('stop', [0.6, 1.5, 4.0])
-def test_rule_19_a_download_is_a_first_contact_and_no_other_writer(stop: float) -> None:
+@pytest.mark.parametrize('times', [1, 3])
+def test_rule_19_downloads_are_first_contacts_and_no_other_writer(
+        stop: float, times: int) -> None:
     cell = Cell()
-    bridge = cell.add(200, has_command=True)
+    cell.add(200, has_command=True)
     cell.take_control()
     cell.plc.run_ladder(cell.ladder)  # what it holds now is what a download brings back
     cell.run(20.0)
-    cell.plc.download()
-    cell.run(stop)
-    cell.plc.set_mode(Setting.REMOTE)
-    cell.run(10.0)
-    assert [is_conflict for *_, is_conflict in bridge.bench.listener.foreign] in ([False], [])
-    assert not cell.is_in_control
-    count = cell.word('N10:0')
-    cell.run(1.0)
-    assert cell.word('N10:0') > count > 0
+    for _ in range(times):  # all within a minute
+        cell.download(stop)
+        cell.run(10.0)
+        assert not cell.is_in_control
+        count = cell.word('N10:0')
+        cell.run(1.0)
+        assert cell.word('N10:0') > count > 0
     cell.take_control()
+
+
+def test_rule_19_two_bridges_find_each_other_again_after_a_change_to_run() -> None:
+    cell = Cell()
+    bridges = [cell.add(200, has_command=True), cell.add(300)]
+    for _ in range(3):
+        cell.run(20 * 0.3)
+        assert [bridge.beat.state for bridge in bridges] == 2 * [BeatState.CONFLICT]
+        assert (cell.word('N10:0'), cell.is_in_control, cell.word('N11:2')) == (0, False, 0)
+        cell.download(5.0)
+        cell.run(2 * MODE_PERIOD)
 
 
 def test_rule_19_bridge_that_takes_the_port_again_finds_out_too() -> None:

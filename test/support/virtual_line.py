@@ -81,7 +81,7 @@ class VirtualLine:
 
     ``baud`` is bits per second, ``propagation`` seconds that a byte travels. ``chunk`` bytes are
     handed over together, when the last of them is here (1: as a bare UART does; more: as its FIFO
-    or an adapter does). ``noise`` may be changed at any time and acts on what is sent
+    or an adapter does); ``chunks`` has that for each machine. ``noise`` may be changed at any time and acts on what is sent
     from then on; so does ``echoes``, with which a sender hears itself.
     """
 
@@ -93,7 +93,7 @@ class VirtualLine:
         self.char_time = char_time(baud)
         self._machines = list(machines)
         self.propagation = propagation
-        self.chunk = chunk
+        self.chunks = [chunk] * len(machines)
         self._random = Random(seed)
         self._free = [0.0] * len(machines)  # when each sender's last byte has left
         self._away = [0.0] * len(machines)  # until when
@@ -206,8 +206,9 @@ class VirtualLine:
 
     def _send(self, data: bytes, start: float, receiver: int) -> None:
         noise = None if self.noise is QUIET else self.noise
-        for at in range(0, len(data), self.chunk):
-            part = data[at:at + self.chunk]
+        chunk = self.chunks[receiver]
+        for at in range(0, len(data), chunk):
+            part = data[at:at + chunk]
             here = start + (at + len(part)) * self.char_time + self.propagation
             if noise is not None:
                 part = noise.damage(part, self._random)
