@@ -16,9 +16,9 @@
 The PLC's side of heartbeats, as a small program on the words of a simulated PLC.
 
 It is the ladder of docs/tutorials/heartbeats.md, rung by rung, with the numbers of its rungs. N10
-is written by the bridge: word 0 its heartbeat, word 1 a command. The rest is the program's own:
-N11 (0 the snapshot, 1 the one before it, 2 the command that the machine may use, 3 the heartbeat
-of the program), T13 (0 watchdog, 1 stable, 2 the program's clock) and the lamps in B12:0.
+is written by the bridge: word 0 its heartbeat, words 1 and 2 commands. The rest is the program's
+own: N11 (0 the snapshot, 1 the one before it, 2 and 4 the commands that the machine may use, 3 the
+heartbeat of the program), T13 (0 watchdog, 1 stable, 2 the program's clock) and the lamps in B12:0.
 
 Nothing moves between two scans, so what stands for less than a scan may never be seen. The timers
 have a time base of 10 ms, and count from the scan on that starts them.
@@ -45,6 +45,7 @@ _TIME_BASE = 0.01  # s
 _SCAN_TIME = 0.01  # s
 _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
+_COMMANDS = {1: 2, 2: 4}  # what the machine uses of N10: words of N11
 
 # After a pause of the simulator only so many seconds of scans are made up for: earlier ones would
 # not change the result.
@@ -119,7 +120,7 @@ class Ladder:
         self._button_before = True  # OSR: a button that stays pressed gives no edge
         self._is_first_pass = True
         self._next_scan: float | None = None
-        for kind, file, words in ((FileType.INTEGER, 10, 2), (FileType.INTEGER, 11, 4),
+        for kind, file, words in ((FileType.INTEGER, 10, 3), (FileType.INTEGER, 11, 5),
                                   (FileType.BINARY, 12, 2), (FileType.TIMER, 13, 9)):
             table.create(Address(self._addressing, kind, file, 0), words)
 
@@ -155,8 +156,8 @@ class Ladder:
 
     def _scan(self, now: float) -> None:
         self._show_first_pass()
-        before, command = self._get(11, 1), self._get(10, 1)
-        heartbeat = self._get(10, 0)
+        before, heartbeat = self._get(11, 1), self._get(10, 0)
+        commands = {used: self._get(10, word) for word, used in _COMMANDS.items()}
         self._put(11, 0, heartbeat)  # 0
         is_changed = heartbeat != before  # 1
         self._put(11, 1, heartbeat)  # 2
@@ -166,9 +167,10 @@ class Ladder:
         self._stable.scan(is_alive, self.scan_time)  # 5
         is_reset = self._button and not self._button_before  # 6
         in_control = is_alive and (
-            is_reset and self._stable.is_done and command == 0
+            is_reset and self._stable.is_done and not any(commands.values())
             or self.is_on(Lamp.IN_CONTROL))  # 7
-        self._put(11, 2, command if in_control else 0)  # 8, 9
+        for used, command in commands.items():
+            self._put(11, used, command if in_control else 0)  # 8, 9
         lamps = {Lamp.CHANGED: is_changed, Lamp.ALIVE: is_alive, Lamp.IN_CONTROL: in_control,
                  Lamp.RESET: is_reset, Lamp.STOPPED: heartbeat == 0,  # 10
                  Lamp.LOST: self._watchdog.is_done}  # 11

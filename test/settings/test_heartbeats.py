@@ -225,11 +225,11 @@ def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
     root = Path(__file__).resolve().parents[2]
     mappings, problems = load_mappings(str(root / 'config' / 'heartbeat_map.csv'))
     assert problems == []
-    assert [mapping.tag for mapping in mappings][-6:] == [
-        'ros_alive', 'speed', 'used_speed', 'in_control', 'plc_alive', 'doors']
+    assert [mapping.tag for mapping in mappings][-7:] == [
+        'ros_alive', 'speed', 'gripper', 'used_speed', 'in_control', 'plc_alive', 'doors']
     head, *rows = (root / 'config' / 'heartbeat_map.csv').read_text(
         encoding='utf-8').splitlines()[2:]
-    told = '\n'.join([head, *rows[-6:]])
+    told = '\n'.join([head, *rows[-7:]])
     assert told in (root / 'docs/tutorials/heartbeats.md').read_text(encoding='utf-8')
 
 

@@ -24,6 +24,8 @@ import pytest
 from support.rungs import PageLadder, parse
 
 BOTH = pytest.mark.parametrize('kind', [Ladder, PageLadder])
+COMMANDS = {'N10:1': 'N11:2', 'N10:2': 'N11:4'}  # what the machine uses of each
+EACH = pytest.mark.parametrize('command', COMMANDS)
 
 
 class Program:
@@ -82,23 +84,28 @@ def test_nothing_is_in_control_before_a_person_has_reset(kind: type[Ladder]) -> 
 
 
 @BOTH
-def test_command_reaches_the_machine_only_while_ros_is_in_control(kind: type[Ladder]) -> None:
+@EACH
+def test_command_reaches_the_machine_only_while_ros_is_in_control(
+        kind: type[Ladder], command: str) -> None:
     program = Program(kind)
     program.take_control()
-    program.put('N10:1', 42)
+    program.put(command, 42)
     program.run(1.0)
-    assert program.get('N11:2') == 42
+    assert {used: program.get(used) for used in COMMANDS.values()} == {
+        used: 42 * (used == COMMANDS[command]) for used in COMMANDS.values()}
     program.put('N10:0', 0)
     program.is_counting = False
     program.run(0.05)
-    assert program.get('N11:2') == 0
+    assert program.get(COMMANDS[command]) == 0
     assert program.ladder.is_on(Lamp.STOPPED)
 
 
 @BOTH
-def test_reset_is_refused_while_a_command_is_there_or_too_early(kind: type[Ladder]) -> None:
+@EACH
+def test_reset_is_refused_while_a_command_is_there_or_too_early(
+        kind: type[Ladder], command: str) -> None:
     program = Program(kind)
-    program.put('N10:1', 7)
+    program.put(command, 7)
     program.run(5.0)
     program.ladder.press_reset()
     program.run(1.0)
@@ -223,23 +230,24 @@ def test_page_and_simulator_are_the_same_program() -> None:
             now += dice.choice([0.01, 0.1, 0.3])
             is_counting ^= dice.random() < 0.02
             beat = beat % 32767 + 1 if is_counting else dice.choice([beat, beat, beat, 0, -3])
-            command = dice.choice([0, 0, 7]) if dice.random() < 0.3 else None
+            commands = {word: dice.choice([0, 0, 7]) for word in COMMANDS
+                        if dice.random() < 0.2}
             is_pressed = dice.random() < 0.2
             is_begin = dice.random() < 0.005
             for program in pair:
                 program.put('N10:0', beat & 0xFFFF)
-                if command is not None:
-                    program.put('N10:1', command)
+                for word, value in commands.items():
+                    program.put(word, value)
                 if is_pressed:
                     program.ladder.press_reset()
                 if is_begin:
                     program.ladder.enter_run(now)
                 program.ladder.advance(now)
             words = [[program.get(text) for text in (
-                'N11:0', 'N11:1', 'N11:2', 'N11:3', 'B12:0', 'T13:0', 'T13:0.PRE', 'T13:0.ACC',
-                'T13:1', 'T13:1.PRE', 'T13:1.ACC', 'T13:2', 'T13:2.ACC')] for program in pair]
+                'N11:0', 'N11:1', 'N11:2', 'N11:3', 'N11:4', 'B12:0', 'T13:0', 'T13:0.PRE',
+                'T13:0.ACC', 'T13:1', 'T13:1.PRE', 'T13:1.ACC', 'T13:2', 'T13:2.ACC')] for program in pair]
             assert words[0] == words[1], (seed, now)
-            seen |= {number for number in range(6) if words[0][4] >> number & 1}
+            seen |= {number for number in range(6) if words[0][5] >> number & 1}
         assert pair[0].lamps == pair[1].lamps
         assert seen == set(range(6))
 
