@@ -112,8 +112,9 @@ def parts(work: Path) -> dict[str, Part]:
             'soak/long_run.py', f'--seed={seed}', f'--minutes={max(3.0, left / 60):.1f}'),
             {'writes': r'(?m)^writes +(\d+)', 'values': r'(?m)^values of one topic +(\d+)'},
             least=180.0),
-        'kills': Part(0.1, lambda seed, left: script('soak/kills.py', '--rounds=1'),
-                      {'deaths': r'(?m)^\w[\w ]+\w +(\d+) +[\d.]+ +[\d.]+ +[\d.]+ '}),
+        'kills': Part(0.1, lambda seed, left: script(
+            'soak/kills.py', '--rounds=1', f'--seed={seed}'),
+            {'deaths': r'(?m)^\w[\w ]+\w +(\d+) +[\d.]+ +[\d.]+ +[\d.]+ '}),
     }
 
 

@@ -64,7 +64,7 @@ class Plant:
     there. Frames get lost from ``early`` seconds before the last message on. ``mute`` PLCs execute
     and do not reply, ``silent`` ones do neither; the last ``behind`` stand behind a gateway. A row
     has ``length`` words. The publishers of the stations ``alive`` do not die. The driver hears
-    ``chunk`` bytes at a time: if it were whole frames, long ones would come after Timeout.
+    ``chunk`` bytes at a time: of whole frames a long one may come after Timeout.
     """
 
     mode: str
@@ -93,8 +93,9 @@ class Plant:
 
     @property
     def network(self) -> Network:
-        return Network(station=200, baud=self.baud, timeout=self.timeout, cmd_timeout=500,
-                       nak_retries=self.nak_retries, enq_retries=self.enq_retries,
+        return Network(station=200, baud=self.baud, timeout=self.timeout,
+                       cmd_timeout=500, nak_retries=self.nak_retries,
+                       enq_retries=self.enq_retries,
                        **MODES[self.mode])  # type: ignore[arg-type]
 
     def mappings(self) -> list[Mapping]:
@@ -298,9 +299,10 @@ def plants(draw: st.DrawFn, mode: str, mute_share: float) -> Plant:
     behind = draw(st.integers(0, min(stations, 3))) if mode == 'Message' else 0
     alive_share = draw(st.sampled_from([0.0, 0.5, 0.9])) if stations * rows < 20 else 0.0
     alive = frozenset(number for number in numbers[:-1] if dice.random() < alive_share)
+    timeout = draw(st.sampled_from([50, 100, 200]))
     return Plant(
         mode, stations, rows, baud=draw(st.sampled_from([19200, 115200])),
-        timeout=draw(st.sampled_from([50, 100, 200])),
+        timeout=timeout, travel=draw(st.sampled_from([0.0, 0.0, 0.35 * timeout / 1000])),
         nak_retries=draw(st.integers(0, 3)), enq_retries=draw(st.integers(0, 3)),
         has_beats=draw(st.booleans()), has_reads=draw(st.booleans()),
         lost=draw(st.sampled_from([0.0, 0.5, 0.75, 1.0])),
@@ -352,15 +354,24 @@ def test_rule_7_message_after_a_fallback_that_is_not_confirmed_counts_once() -> 
 # and what comes comes late.
 WORST = Plant('Message', 8, 1, timeout=200, lost=1.0, delay=0.34, travel=0.09)
 
+# Handed over as whole frames the values come after Timeout, so reads take all the time there is.
+# They fail, which is more than the retries allow: another seed may break the bound.
+TOO_LATE = replace(WORST, chunk=1000, seed=20)
+
 
 def worst_time(plant: Plant) -> float:
     """Return the longest time that a fallback took, in a few tries."""
     return max(took for number in range(4) for _, took in
-               World(replace(plant, phase=number / 4, seed=20)).run().values())
+               World(replace(plant, phase=number / 4)).run().values())
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_rule_16_bound_holds_where_nearly_all_tries_take_their_whole_time(seed: int) -> None:
+    assert World(replace(WORST, seed=seed, phase=seed / 4)).late() == {}
 
 
 def test_rule_16_nothing_can_be_left_out_of_the_bound() -> None:
-    took, rows = worst_time(WORST), WORST.mappings()
+    took, rows = worst_time(TOO_LATE), WORST.mappings()
     blocks = make_report(WORST.network, rows, 0.1).blocks
 
     def limit(network: Network, rows: Sequence[Mapping] = rows) -> float:

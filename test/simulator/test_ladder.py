@@ -245,7 +245,8 @@ def test_page_and_simulator_are_the_same_program() -> None:
                 program.ladder.advance(now)
             words = [[program.get(text) for text in (
                 'N11:0', 'N11:1', 'N11:2', 'N11:3', 'N11:4', 'B12:0', 'T13:0', 'T13:0.PRE',
-                'T13:0.ACC', 'T13:1', 'T13:1.PRE', 'T13:1.ACC', 'T13:2', 'T13:2.ACC')] for program in pair]
+                'T13:0.ACC', 'T13:1', 'T13:1.PRE', 'T13:1.ACC', 'T13:2', 'T13:2.ACC')]
+                for program in pair]
             assert words[0] == words[1], (seed, now)
             seen |= {number for number in range(6) if words[0][5] >> number & 1}
         assert pair[0].lamps == pair[1].lamps

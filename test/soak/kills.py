@@ -17,13 +17,16 @@ Kill bridge, publisher and PLC program, as processes, and measure until the outp
 
 The PLC is a simulated SLC in this process that runs the rungs of the tutorial from its text, with
 the presets that ``check`` prints and a scan of 20, 60, 100 and 250 ms in turns; its own clock
-tells when the machine's command (N11:2) is 0. Bridge and publisher are processes. Each kind of
-death is repeated; a histogram of the times stands beside the bound: that of rule 16 of
+tells when the machine's commands (N11:2, N11:4) are 0. Bridge and publisher are processes. Each
+kind of death is repeated; a histogram of the times stands beside the bound: that of rule 16 of
 docs/heartbeats.md for a publisher, a Period and the preset of the watchdog for a bridge. Where the
-bridge lives on or ends in order, the time counts until the fallback value is in the PLC as well
-(N10:1). After each death whoever can comes back, and must not get control without a reset.
+bridge lives on or ends in order, the time counts until the fallback values are in the PLC as well
+(N10:1, N10:2). After each death whoever can comes back, and must not get control without a reset.
 
-    .venv/bin/python test/soak/kills.py --rounds 20
+    .venv/bin/python test/soak/kills.py --rounds 7 --processes 3
+
+has three cells side by side, each with a seed and a ROS domain of its own, and adds up what they
+have seen in the table of docs/measured/robustness.md. A process alone ends with a line of JSON.
 """
 
 from __future__ import annotations
@@ -32,14 +35,18 @@ import argparse
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+import json
 import os
 from pathlib import Path
+from random import Random
+import secrets
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from typing import Any
 
 _HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(_HERE.parent.parent), str(_HERE.parent)]
@@ -66,20 +73,24 @@ NET = 'Station,Mode,Error_Code,Timeout,Cmd_Timeout,NAK_Retries,ENQ_Retries,Baud,
 MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Requires,'
        'Requires_Timeout\n'
        f'beat,Heartbeat,N10:0,1,SLC,{PERIOD * 1000:.0f},,,speed,1500\n'
-       f'speed,Write,N10:1,1,SLC,,0,{FALLBACK_AFTER * 1000:.0f},,\n')
-# It publishes 0 until it reads another value, and ends in order at SIGINT, with its last one.
+       f'speed,Write,N10:1,1,SLC,,0,{FALLBACK_AFTER * 1000:.0f},,\n'
+       f'gripper,Write,N10:2,1,SLC,,0,{FALLBACK_AFTER * 1000:.0f},,\n')
+# It publishes 0 to both until it reads another value, and ends in order at SIGINT, with its last
+# one.
 PUBLISHER = """
 import rclpy, select, signal, sys, time
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Int16MultiArray
 rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
 node = rclpy.create_node('kills_publisher')
-out = node.create_publisher(Int16MultiArray, '/abdf1/write/speed', 1)
+outs = [node.create_publisher(Int16MultiArray, f'/abdf1/write/{name}', 1)
+        for name in ('speed', 'gripper')]
 is_over = []
 signal.signal(signal.SIGINT, lambda *_: is_over.append(True))
 value = 0
 while not is_over:
-    out.publish(Int16MultiArray(data=[value]))
+    for out in outs:
+        out.publish(Int16MultiArray(data=[value]))
     if select.select([sys.stdin], [], [], 0.1)[0]:
         value = int(sys.stdin.readline())
 node.destroy_node()
@@ -88,27 +99,32 @@ rclpy.shutdown()
 
 
 def _planned() -> tuple[int, float]:
-    """Return the preset of the watchdog (10 ms) and the bound of the fallback (s)."""
+    """Return the preset of the watchdog (10 ms) and the bound of the fallbacks (s)."""
     with tempfile.TemporaryDirectory() as folder:
         net, rows = Path(folder, 'net.csv'), Path(folder, 'map.csv')
         net.write_text(NET.format(port='1'), encoding='utf-8')
         rows.write_text(MAP, encoding='utf-8')
         found = examine(str(net), str(rows))
     assert found.network is not None
-    beat, fallback = make_report(found.network, found.mappings, 0.1).bounds
+    beat, *fallbacks = make_report(found.network, found.mappings, 0.1).bounds
     assert beat.presets is not None
-    assert fallback.seconds is not None
-    return beat.presets[0], fallback.seconds
+    return beat.presets[0], max(fallback.seconds or 0.0 for fallback in fallbacks)
 
 
 PRESET, BOUND = _planned()
 
 
 class Cell:
-    """A PLC with its program, a bridge and a publisher."""
+    """
+    A PLC with its program, a bridge and a publisher.
 
-    def __init__(self, folder: Path) -> None:
+    ``died`` is when (clock, s) the last death was.
+    """
+
+    def __init__(self, folder: Path, dice: Random) -> None:
         self._folder = folder
+        self.dice = dice
+        self.died = 0.0
         self.in_control: list[tuple[float, bool]] = []
         self.plc = simulated_plc(1, 'SLC', time.monotonic, ('S:0', 8), ('N7:0', 8))
         self.plc.lock = threading.RLock()  # the link's thread lets its program run as well
@@ -151,13 +167,13 @@ class Cell:
         end = time.monotonic() + seconds
         self.wait(lambda: time.monotonic() >= end, 'time', seconds + 5)
 
-    def used(self) -> int:
-        """Return the command that the machine uses, N11:2."""
-        return self.ladder._get(11, 2)
+    def used(self) -> set[int]:
+        """Return the commands that the machine uses, N11:2 and N11:4."""
+        return {self.ladder._get(11, 2), self.ladder._get(11, 4)}
 
-    def written(self) -> int:
-        """Return the command that the bridge has written, N10:1."""
-        return self.ladder._get(10, 1)
+    def written(self) -> set[int]:
+        """Return the commands that the bridge has written, N10:1 and N10:2."""
+        return {self.ladder._get(10, 1), self.ladder._get(10, 2)}
 
     def start_bridge(self) -> None:
         self.bridge = subprocess.Popen(
@@ -206,19 +222,19 @@ class Cell:
             self.ladder.press_reset()
             self.rest(0.3)
         self.publish(800)
-        self.wait(lambda: self.used() == 800, 'the speed')
+        self.wait(lambda: self.used() == {800}, 'the commands')
 
     def until_fallen(self, is_written: bool) -> float:
         """
-        Return when the machine's command became 0.
+        Return when the machine's commands became 0.
 
-        ``is_written``: not before the bridge has written the fallback value.
+        ``is_written``: not before the bridge has written the fallback values.
         """
-        self.wait(lambda: self.used() == 0, 'the output to fall back')
+        self.wait(lambda: self.used() == {0}, 'the outputs to fall back')
         fallen = next(at for at, is_on in reversed(self.in_control) if not is_on)
-        if not is_written or self.written() == 0:
+        if not is_written or self.written() == {0}:
             return fallen
-        self.wait(lambda: self.written() == 0, 'the fallback value')
+        self.wait(lambda: self.written() == {0}, 'the fallback values')
         return time.monotonic()
 
     def recover(self) -> None:
@@ -287,14 +303,24 @@ def _program(cell: Cell) -> None:
 
 
 def _download(cell: Cell) -> None:
+    """Load the program; it dies when it runs again. The bridge sees that it did not (rule 19)."""
     cell.plc.download()
+    cell.rest(3.0)
+    cell.died = time.monotonic()
     cell.plc.set_mode(Setting.REMOTE)
 
 
-def _wait_after_download(cell: Cell) -> None:
-    """Recover; a second download within a minute looks like another writer (rule 19)."""
-    cell.recover()
-    cell.rest(60.0)
+def _download_commands(cell: Cell) -> None:
+    """While fallbacks stand load a program with commands, too soon for the bridge to see it."""
+    cell.signal_publisher(signal.SIGKILL)
+    cell.wait(lambda: cell.written() == {0}, 'the fallback values')
+    cell.rest(cell.dice.uniform(0.5, 5.5))
+    cell.plc.download()
+    for word in (1, 2):
+        cell.ladder._put(10, word, 888)
+    cell.rest(cell.dice.choice([0.6, 0.9]))
+    cell.died = time.monotonic()
+    cell.plc.set_mode(Setting.REMOTE)
 
 
 def _plug_in(cell: Cell) -> None:
@@ -311,6 +337,7 @@ SCANS = 2 * max(SCAN_TIMES)
 BY_PLC = PRESET / 100 + PERIOD + SCANS + SLACK
 BY_BRIDGE = BOUND + SCANS + SLACK
 IN_ORDER = 2.0 + SCANS + SLACK
+AGAIN = 5.0 + BOUND - FALLBACK_AFTER + SLACK  # a fallback that stands is written every 5 s
 DEATHS = {
     'bridge SIGKILL': _bridge(signal.SIGKILL, BY_PLC),
     'bridge SIGSTOP': _bridge(signal.SIGSTOP, BY_PLC),
@@ -324,61 +351,118 @@ DEATHS = {
     'port pulled': Death(Cell.pull, BY_PLC, after=_plug_in),
     'station silent': Death(_fall_silent, BY_PLC),
     'PROGRAM and RUN': Death(_program, SCANS + SLACK),
-    'download': Death(_download, SCANS + SLACK, after=_wait_after_download),
+    'download': Death(_download, SCANS + SLACK),
+    'download of 888': Death(_download_commands, AGAIN, is_written=True),
     'power cycle': Death(lambda cell: cell.plc.cycle_power(), SCANS + SLACK),
 }
 
 
-def run(cell: Cell, name: str, scan_time: float) -> float:
-    """Kill once and return the seconds until the output was 0."""
+@dataclass(slots=True)
+class Seen:
+    """What was seen of one death: times (s), and controls regained without a reset."""
+
+    times: list[float]
+    regained: int = 0
+
+    def row(self, name: str) -> str:
+        """Return it as a row of a table, with how many times lie in each tenth of the bound."""
+        times, bound = sorted(self.times), DEATHS[name].bound
+        counts = [0] * 11
+        for value in times:
+            counts[min(10, int(10 * value / bound))] += 1
+        tenths = ' '.join(f'{count or ".":>2}' for count in counts)
+        return f'{name:20} {len(times):6} {times[len(times) // 2]:6.2f} {times[-1]:7.2f} ' \
+            f'{bound:5.2f}   {tenths}'
+
+
+def run(cell: Cell, name: str, scan_time: float, seen: Seen) -> None:
+    """Kill once and keep the seconds until the outputs were 0."""
     death = DEATHS[name]
     cell.ladder.scan_time = scan_time
     cell.take_control()
-    died = time.monotonic()
+    cell.rest(cell.dice.uniform(0.0, PERIOD))
+    cell.died = time.monotonic()
     death.kill(cell)
-    fallen = cell.until_fallen(death.is_written) - died
+    seen.times.append(round(max(0.0, cell.until_fallen(death.is_written) - cell.died), 3))
     changes = len(cell.in_control)
     death.after(cell)
-    if len(cell.in_control) != changes:
-        raise SystemExit(f'kills: after {name} ROS had control again without a reset')
+    seen.regained += len(cell.in_control) != changes
     cell.stop_publisher()
-    return fallen
 
 
-def histogram(times: list[float], bound: float) -> str:
-    """Return how many times lie in each tenth of the bound, and how many beyond."""
-    counts = [0] * 11
-    for value in times:
-        counts[min(10, int(10 * value / bound))] += 1
-    return ' '.join(f'{count or ".":>2}' for count in counts)
+def run_all(names: list[str], rounds: int, seed: int) -> tuple[dict[str, Seen], str]:
+    """Run deaths in a cell; return what was seen, and what went wrong, empty for nothing."""
+    found = {name: Seen([]) for name in names}
+    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
+        cell = Cell(Path(folder), Random(seed))
+        try:
+            for name, seen in found.items():
+                for number in range(rounds):
+                    run(cell, name, SCAN_TIMES[(seed + number) % len(SCAN_TIMES)], seen)
+                print(seen.row(name), file=sys.stderr, flush=True)
+        except SystemExit as error:
+            return found, f'seed {seed}, {name}: {error}'
+        finally:
+            cell.close()
+    return found, ''
+
+
+def run_side_by_side(arguments: list[str], processes: int, seed: int
+                     ) -> tuple[dict[str, Seen], str]:
+    """Run this program several times at once; return what all have seen."""
+    children = [subprocess.Popen([sys.executable, __file__, *arguments, f'--seed={seed + number}'],
+                                 stdout=subprocess.PIPE, text=True) for number in range(processes)]
+    found: dict[str, Seen] = {}
+    wrong: list[str] = []
+    for child in children:
+        said = child.communicate()[0].splitlines()
+        told: dict[str, Any] = json.loads(said[-1]) if said else {
+            'wrong': f'a process ended with status {child.returncode}', 'seen': {}}
+        wrong += [told['wrong']] if told['wrong'] else []
+        for name, (times, regained) in told['seen'].items():
+            seen = found.setdefault(name, Seen([]))
+            seen.times += times
+            seen.regained += regained
+    return found, '; '.join(wrong)
 
 
 def main() -> int:
-    """Run all deaths; return 1 where one took longer than its bound."""
+    """Run all deaths; return 1 where one took longer than its bound, or something went wrong."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--rounds', type=int, default=20, help='of each death (default: 20)')
-    parser.add_argument('--only', choices=tuple(DEATHS), action='append')
+    parser.add_argument('--rounds', type=int, default=20,
+                        help='of each death, in each process (default: 20)')
+    parser.add_argument('--only', choices=tuple(DEATHS), action='append', default=[])
+    parser.add_argument('--processes', type=int, default=1, help='side by side (default: 1)')
+    parser.add_argument('--seed', type=int, default=secrets.randbelow(1 << 31),
+                        help='of the moments, the first scan time and the ROS domain (by chance); '
+                             'each process has the next one')
     options = parser.parse_args()
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ['ROS_DOMAIN_ID'] = str(1 + options.seed % 100)
     os.environ['PYTHONPATH'] = str(_HERE.parent.parent)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # or, under nohup, the bridge ignores it as well
-    print(f'{"death":20} rounds median longest bound   in each tenth of the bound, and beyond')
-    is_late = False
-    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
-        cell = Cell(Path(folder))
-        try:
-            for name in options.only or DEATHS:
-                times = sorted(run(cell, name, SCAN_TIMES[number % len(SCAN_TIMES)])
-                               for number in range(options.rounds))
-                bound = DEATHS[name].bound
-                is_late |= times[-1] > bound
-                print(f'{name:20} {len(times):6} {times[len(times) // 2]:6.2f} {times[-1]:7.2f} '
-                      f'{bound:5.2f}   {histogram(times, bound)}', flush=True)
-        finally:
-            cell.close()
-    return int(is_late)
+    head = f'{"death":20} rounds median longest bound   in each tenth of the bound, and beyond'
+    print(head, file=sys.stderr, flush=True)
+    if options.processes == 1:
+        found, wrong = run_all(options.only or [*DEATHS], options.rounds, options.seed)
+        print(json.dumps({'wrong': wrong, 'seen': {
+            name: (seen.times, seen.regained) for name, seen in found.items()}}))
+    else:
+        arguments = [f'--rounds={options.rounds}', *(f'--only={name}' for name in options.only)]
+        found, wrong = run_side_by_side(arguments, options.processes, options.seed)
+        print('| what dies | rounds | median | longest | bound |\n|---|---|---|---|---|')
+        for name, seen in found.items():
+            times, bound = sorted(seen.times), DEATHS[name].bound
+            if times:
+                print(f'| {name} | {len(times)} | {times[len(times) // 2]:.2f} | {times[-1]:.2f} '
+                      f'| {bound:.2f} |')
+    late = sum(value > DEATHS[name].bound for name, seen in found.items() for value in seen.times)
+    regained = sum(seen.regained for seen in found.values())
+    print(f'seed {options.seed}: {sum(len(seen.times) for seen in found.values())} deaths, '
+          f'{late} later than their bound, {regained} controls regained without a reset'
+          + (f'; WRONG: {wrong}' if wrong else ''), file=sys.stderr)
+    return int(bool(late or regained or wrong))
 
 
 if __name__ == '__main__':

@@ -81,8 +81,8 @@ class VirtualLine:
 
     ``baud`` is bits per second, ``propagation`` seconds that a byte travels. ``chunk`` bytes are
     handed over together, when the last of them is here (1: as a bare UART does; more: as its FIFO
-    or an adapter does); ``chunks`` has that for each machine. ``noise`` may be changed at any time and acts on what is sent
-    from then on; so does ``echoes``, with which a sender hears itself.
+    or an adapter does); ``chunks`` has that for each machine. ``noise`` may be changed at any time
+    and acts on what is sent from then on; so does ``echoes``, with which a sender hears itself.
     """
 
     def __init__(self, *machines: Machine, baud: float = 19200, propagation: float = 0.0,
