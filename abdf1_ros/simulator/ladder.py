@@ -18,7 +18,7 @@ The PLC's side of heartbeats, as a small program on the words of a simulated PLC
 It is the ladder of docs/tutorials/heartbeats.md, rung by rung, with the numbers of its rungs. N10
 is written by the bridge: word 0 its heartbeat, words 1 and 2 commands. The rest is the program's
 own: N11 (0 the snapshot, 1 the one before it, 2 and 4 the commands that the machine may use, 3 the
-heartbeat of the program), T13 (0 watchdog, 1 stable, 2 the program's clock) and the lamps in B12:0.
+heartbeat of the program), T13 (0 watchdog, 1 stable, 2 the program's clock), the lamps in B12:0.
 
 Nothing moves between two scans, so what stands for less than a scan may never be seen. The timers
 have a time base of 10 ms, and count from the scan on that starts them.

@@ -23,6 +23,7 @@ from collections.abc import Callable
 from random import Random
 
 from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Lamp
@@ -42,9 +43,12 @@ class Cell:
     def __init__(self, mode: str, scan_time: float, period: int = 200) -> None:
         self.speed = make_mapping('N10:1', 'Write', tag='speed', plc='SLC',
                                   fallback=Fallback((0,), 1000))
+        self.gripper = make_mapping('N10:2', 'Write', tag='gripper', plc='SLC',
+                                    fallback=Fallback((0,), 1000))
+        self.publishes = True
         self.beat = make_mapping('N10:0', 'Heartbeat', tag='beat', plc='SLC', period=period,
                                  heartbeat=Heartbeat())
-        self.bench = DriverBench([self.beat, self.speed], network=Network(
+        self.bench = DriverBench([self.beat, self.speed, self.gripper], network=Network(
             baud=19200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
             **MODES[mode]), settings=DriverSettings(), start=False)
         self.plc = self.bench.plc(1, 'SLC', ('S:0', 4), ('N7:0', 4))
@@ -58,7 +62,8 @@ class Cell:
 
     def _live(self) -> None:
         self.bench.driver.interlocks.executor_ran(self.bench.clock())
-        self.bench.write(self.speed, [self.ladder.is_on(Lamp.IN_CONTROL) and 7])
+        if self.publishes:
+            self.bench.write(self.speed, [self.ladder.is_on(Lamp.IN_CONTROL) and 7])
         self.bench.at(self.bench.clock() + 0.1, self._live)
 
     def _look(self) -> None:
@@ -109,3 +114,26 @@ def test_rule_2_every_plc_sees_a_restart_that_is_quicker_than_its_timer(
         if cell.ladder.is_on(Lamp.IN_CONTROL):
             kept.append((number, cell.zeros))
     assert kept == []
+
+
+@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('stop', [0.6, 0.9])
+def test_rule_8_commands_of_a_short_download_do_not_stay_where_fallbacks_stand(
+        mode: str, stop: float) -> None:
+    cell, seen = Cell(mode, 0.06), []
+    for number in range(6):
+        cell.publishes = True
+        cell.take_control()
+        cell.publishes = False
+        cell.bench.run(2.5 + 0.4 * number)
+        cell.plc.download()
+        for word in ('N10:1', 'N10:2'):
+            cell.ladder._store(word, 888)
+        cell.bench.run(stop)
+        cell.plc.set_mode(Setting.REMOTE)
+        for _ in range(60):  # somebody presses reset all the time
+            cell.ladder.press_reset()
+            cell.bench.run(0.1)
+            assert {cell.ladder._word(word) for word in ('N11:2', 'N11:4')} == {0}
+        seen.append([cell.ladder._word(word) for word in ('N10:1', 'N10:2')])
+    assert seen == 6 * [[0, 0]]
