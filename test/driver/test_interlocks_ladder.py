@@ -75,7 +75,7 @@ class Cell:
         elif not is_zero and self._zero_since is not None:
             self.zeros.append((self._zero_since, now))
             self._zero_since = None
-        self.bench.at(now + 0.001, self._look)
+        self.bench.at(now + 0.005, self._look)
 
     def take_control(self) -> None:
         """Press reset as soon as it is accepted."""
