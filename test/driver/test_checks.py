@@ -72,8 +72,9 @@ class Ears:
 
 
 def make_bench(*mappings: Mapping, network: Network | None = None, period: float = PERIOD,
-               plc: str = 'SLC') -> tuple[DriverBench, list[SimulatedPlc], list[Ears]]:
-    """Return the driver and its stations."""
+               plc: str = 'SLC', run: float = 0.0,
+               ) -> tuple[DriverBench, list[SimulatedPlc], list[Ears]]:
+    """Return the driver and its stations, after so many seconds."""
     bench = DriverBench(mappings, network=network,
                         settings=DriverSettings(processor_period=period, write_timeout=10.0))
     plcs, ears = [], []
@@ -81,6 +82,8 @@ def make_bench(*mappings: Mapping, network: Network | None = None, period: float
         plcs.append(simulated_plc(station, plc, bench.clock, *FILES))
         ears.append(Ears(bench, plcs[-1]))
         bench.connect(ears[-1])
+    if run:
+        bench.run(run)
     return bench, plcs, ears
 
 
@@ -109,15 +112,13 @@ def test_status_at_the_start_and_every_period(network: Network, plc: str, proces
 
 
 def test_period_0_is_never() -> None:
-    bench, _, (ears,) = make_bench(word(), period=0)
-    bench.run(20.0)
+    bench, _, (ears,) = make_bench(word(), period=0, run=20.0)
     assert {cmd for _, cmd, _ in ears.heard} == {0x0F}
 
 
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_program_mode_and_fault_are_seen(network: Network) -> None:
-    bench, (plc,), _ = make_bench(word(), network=network)
-    bench.run(1.0)
+    bench, (plc,), _ = make_bench(word(), network=network, run=1.0)
     plc.processor.setting = Setting.PROGRAM
     bench.run(PERIOD)
     identity = bench.driver.checks.known(1).identity
@@ -150,13 +151,11 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
 
 
 def test_all_are_asked_anew_when_the_port_comes_back() -> None:
-    bench, _, (ears,) = make_bench(word(), period=1000.0)
-    bench.run(1.0)
+    bench, _, (ears,) = make_bench(word(), period=1000.0, run=1.0)
     bench.lose_port()
     assert bench.driver.checks.known(1).identity is None
     bench.run(1.0)
-    bench.open()
-    bench.run(0.2)
+    bench.open(run=0.2)
     assert len(ears.times(STATUS)) == 2
     assert bench.driver.checks.known(1).identity is not None
 
@@ -223,8 +222,7 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
 
 def test_after_a_check_come_all_reads_that_were_due() -> None:
     mappings = [word(text=f'N{file}:0', period=0) for file in (7, 9)] + [word(2, period=0)]
-    bench, _, all_ears = make_bench(*mappings, period=0.01)
-    bench.run(2.0)
+    bench, _, all_ears = make_bench(*mappings, period=0.01, run=2.0)
     order = [(cmd, number) for _, cmd, number in sorted(
         (when, cmd, number) for number, ears in enumerate(all_ears)
         for when, cmd, _ in ears.heard)]
@@ -251,8 +249,7 @@ def test_writes_leave_a_read_its_turn_also_when_a_check_is_due() -> None:
 
 def test_checks_of_a_busy_line_are_not_starved_by_long_reads() -> None:
     long = make_mapping('N7:0', plc='SLC', length=300, period=0)
-    bench, _, (ears,) = make_bench(long, period=1.0)
-    bench.run(10.0)
+    bench, _, (ears,) = make_bench(long, period=1.0, run=10.0)
     assert len(ears.times(STATUS)) in (9, 10)
 
 
@@ -286,8 +283,7 @@ def test_station_that_is_heard_needs_no_echo() -> None:
 
 
 def test_standard_polling_needs_no_echo() -> None:
-    bench, _, (ears,) = make_bench(word(1, 'Write'), network=NETWORKS[1], period=0)
-    bench.run(10.0)
+    bench, _, (ears,) = make_bench(word(1, 'Write'), network=NETWORKS[1], period=0, run=10.0)
     assert len(ears.times(ECHO)) <= 1
     assert bench.driver.stations[1].last_heard == pytest.approx(bench.clock(), abs=0.1)
 
@@ -309,8 +305,7 @@ def test_dead_stations_take_turns_and_no_more_than_an_eighth_of_the_line() -> No
     reads = len(bench.listener.times(alive))
     bench.run(20.0)
     cost = 20.0 / (len(bench.listener.times(alive)) - reads)
-    other, _, _ = make_bench(alive, network=SLOW, period=0)
-    other.run(20.0)
+    other, _, _ = make_bench(alive, network=SLOW, period=0, run=20.0)
     assert cost < 1.18 * 20.0 / len(other.listener.times(alive))
     for plc in plcs[1:]:
         plc.faults = InjectedFaults()
@@ -388,8 +383,7 @@ def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
 
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_counters_on_request(network: Network) -> None:
-    bench, (plc,), (ears,) = make_bench(word(), network=network)
-    bench.run(2.0)
+    bench, (plc,), (ears,) = make_bench(word(), network=network, run=2.0)
     assert ears.times(COUNTERS) == []
     bench.driver.request_counters(1)
     assert bench.driver.checks.counters_wanted == {1}
@@ -406,8 +400,7 @@ def test_counters_on_request(network: Network) -> None:
 
 
 def test_two_requests_at_once_are_one() -> None:
-    bench, _, (ears,) = make_bench(word())
-    bench.run(1.0)
+    bench, _, (ears,) = make_bench(word(), run=1.0)
     for _ in range(3):
         bench.driver.request_counters(1)
     bench.run(1.0)
@@ -436,8 +429,7 @@ def test_absent_station_is_not_asked_for_counters() -> None:
 
 
 def test_station_that_falls_silent_ends_the_request() -> None:
-    bench, (plc,), _ = make_bench(word())
-    bench.run(1.0)
+    bench, (plc,), _ = make_bench(word(), run=1.0)
     plc.faults = InjectedFaults(silent=True)
     bench.driver.request_counters(1)
     bench.run(5.0)
@@ -446,8 +438,7 @@ def test_station_that_falls_silent_ends_the_request() -> None:
 
 
 def test_lost_port_ends_the_request() -> None:
-    bench, _, _ = make_bench(word())
-    bench.run(1.0)
+    bench, _, _ = make_bench(word(), run=1.0)
     bench.driver.request_counters(1)
     bench.lose_port()
     assert bench.driver.checks.known(1).no_counters == 'port lost: unplugged'
@@ -457,14 +448,12 @@ def test_lost_port_ends_the_request() -> None:
 
 
 def test_lost_port_ends_a_request_that_waits_for_its_turn() -> None:
-    bench, _, (ears,) = make_bench(word())
-    bench.run(1.0)
+    bench, _, (ears,) = make_bench(word(), run=1.0)
     health = bench.driver.checks
     bench.driver.request_counters(1)
     assert health.is_due(bench.clock())  # it is among the checks now, and not on the line yet
     bench.lose_port()
     assert health.known(1).no_counters == 'port lost: unplugged'
     assert health.counters_wanted == set()
-    bench.open()
-    bench.run(2.0)
+    bench.open(run=2.0)
     assert ears.times(COUNTERS) == []  # nobody waits for them any more

@@ -68,11 +68,13 @@ class RecordingPlc:
 
 
 def make_bench(*mappings: Mapping, network: Network | None = None, start: bool = True,
-               **settings: float) -> tuple[DriverBench, SimulatedPlc]:
-    """Return a bench with one PLC-5, station 1, of all files, as ``mappings`` expect it."""
+               run: float = 0.0, **settings: float) -> tuple[DriverBench, SimulatedPlc]:
+    """Return a bench with one PLC-5, station 1, of all files, after so many seconds."""
     bench = DriverBench(mappings, network=network,
                         settings=DriverSettings(**settings), start=start)  # type: ignore
     plc = bench.plc(1, 'PLC5', *PLC5_FILES)
+    if run:
+        bench.run(run)
     return bench, plc
 
 
@@ -132,8 +134,7 @@ def test_long_mapping_comes_in_several_packets_and_is_published_once_a_period() 
 
 def test_values_are_published_again_each_period() -> None:
     fast, slow = make_mapping('N7:0', period=100), make_mapping('F8:0', period=500)
-    bench, _ = make_bench(fast, slow)
-    bench.run(1.95)
+    bench, _ = make_bench(fast, slow, run=1.95)
     assert len(bench.listener.values(fast)) == 20
     assert len(bench.listener.values(slow)) == 4
 
@@ -153,8 +154,7 @@ def test_read_soon_after_a_late_one_is_published_too() -> None:
 
 def test_value_that_publishes_changes_only() -> None:
     mapping = make_mapping('N7:0', publish='Change')
-    bench, plc = make_bench(mapping)
-    bench.run(1.0)
+    bench, plc = make_bench(mapping, run=1.0)
     store(plc, 'N7:0', [4])
     bench.run(1.0)
     assert bench.listener.values(mapping) == [[0], [4]]
@@ -168,8 +168,7 @@ def test_write_reaches_the_plc_and_is_confirmed(
     bench = DriverBench([mapping])
     bench.plc(1, plc, *(PLC5_FILES if plc == 'PLC5' else SLC_FILES))
     bench.run(0.05)
-    bench.write(mapping, values)
-    bench.run(0.5)
+    bench.write(mapping, values, run=0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(mapping)[LAST] == values
 
@@ -177,10 +176,8 @@ def test_write_reaches_the_plc_and_is_confirmed(
 def test_block_that_shows_a_write_is_read_at_once() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite', period=60_000)
     other = make_mapping('F8:0', period=60_000)
-    bench, _ = make_bench(mapping, other)
-    bench.run(1.0)
-    bench.write(mapping, [42])
-    bench.run(0.2)
+    bench, _ = make_bench(mapping, other, run=1.0)
+    bench.write(mapping, [42], run=0.2)
     assert bench.listener.values(mapping) == [[0], [42]]
     assert len(bench.listener.values(other)) == 1
     result, = bench.listener.results
@@ -268,8 +265,7 @@ def test_refused_while_the_port_is_closed() -> None:
     bench.lose_port()
     assert not bench.driver.is_online
     bench.write(mapping, [1])
-    bench.open()
-    bench.run(1.0)
+    bench.open(run=1.0)
     assert bench.listener.outcomes() == [Outcome.REFUSED] * 2
     assert stored(plc, 'N7:0') == b'\0\0'
 
@@ -300,8 +296,7 @@ def test_failed_after_some_packets_of_a_long_write() -> None:
     mapping = make_mapping('N7:0', 'Write', length=250)
     bench = DriverBench([mapping])
     bench.plc(1, 'PLC5', ('N7:0', 150))  # the second packet does not fit
-    bench.write(mapping, [1] * 250)
-    bench.run(2.0)
+    bench.write(mapping, [1] * 250, run=2.0)
     result, = write_results(bench)
     assert result.startswith('only partly written: STS F0 EXT STS 07')
     assert result.endswith('(after 1 of 3 packets were written)')
@@ -337,8 +332,7 @@ def test_not_sent_because_the_port_was_lost_while_it_waited() -> None:
     assert write_results(bench) == ['not written: not sent: port lost: unplugged'] * 2
     plc.faults.silent = False
     bench.run(30.0)
-    bench.open()
-    bench.run(5.0)
+    bench.open(run=5.0)
     assert len(bench.listener.results) == 2
     assert (stored(plc, 'N7:0'), stored(plc, 'B3:0')) == (b'\0\0', b'\0\0')
 
@@ -365,32 +359,27 @@ def test_unknown_when_the_reply_does_not_come_in_time() -> None:
 
 def test_unknown_when_no_acknowledgement_comes() -> None:
     mapping = make_mapping('N7:0', 'Write')
-    bench, plc = make_bench(mapping)
-    bench.run(0.5)
+    bench, plc = make_bench(mapping, run=0.5)
     bench.far.say = lambda data: b''
-    bench.write(mapping, [1])
-    bench.run(5.0)
+    bench.write(mapping, [1], run=5.0)
     assert bench.listener.outcomes() == [Outcome.UNKNOWN]
     assert stored(plc, 'N7:0') == b'\1\0'
 
 
 def test_unknown_when_the_port_is_lost_on_the_way() -> None:
     mapping = make_mapping('N7:0', 'Write')
-    bench, plc = make_bench(mapping)
-    bench.run(0.5)
+    bench, plc = make_bench(mapping, run=0.5)
     bench.write(mapping, [1])
     bench.lose_port('unplugged')
     assert write_results(bench) == ['unknown whether written: port lost: unplugged; not read '
                                     'back: no row reads all of these words']
-    bench.open()
-    bench.run(5.0)
+    bench.open(run=5.0)
     assert len(bench.listener.results) == 1
 
 
 def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
     mapping, waiting = make_mapping('N7:0', 'Write'), make_mapping('N7:1', 'Write')
-    bench, _ = make_bench(mapping, waiting)
-    bench.run(0.5)
+    bench, _ = make_bench(mapping, waiting, run=0.5)
     bench.write(mapping, [1])
     bench.write(waiting, [1])
 
@@ -419,8 +408,7 @@ def test_read_goes_on_after_the_driver_itself_has_failed() -> None:
     bench.lose_port('internal error, see the log')  # as the thread of the link does
     assert bench.driver.points[mapping].freshness(bench.clock()) is Freshness.FAILED
     bench.listener.read = take  # type: ignore[method-assign]
-    bench.open()
-    bench.run(1.0)
+    bench.open(run=1.0)
     assert len(bench.listener.values(mapping)) >= 9
     assert len(bench.listener.values(other)) >= 9
 
@@ -429,26 +417,22 @@ def test_reads_go_on_after_the_port_was_lost_in_the_middle_of_one() -> None:
     mappings = [make_mapping(f'{text}:0') for text in ('N7', 'F8', 'B3')]
     bench, _ = make_bench(*mappings, start=False)
     for _ in range(10):
-        bench.open()
-        bench.run(0.253)
+        bench.open(run=0.253)
         bench.lose_port()
         bench.run(0.5)
     bench.listener.reads.clear()
-    bench.open()
-    bench.run(1.0)
+    bench.open(run=1.0)
     assert all(len(bench.listener.values(mapping)) >= 10 for mapping in mappings)
 
 
 def test_points_have_failed_when_the_port_is_lost_and_the_first_read_is_published() -> None:
     mapping = make_mapping('N7:0', publish='Change')
-    bench, _ = make_bench(mapping)
-    bench.run(1.0)
+    bench, _ = make_bench(mapping, run=1.0)
     bench.lose_port('unplugged')
     point = bench.driver.points[mapping]
     assert (point.freshness(bench.clock()), point.error) == (
         Freshness.FAILED, 'port lost: unplugged')
-    bench.open()
-    bench.run(1.0)
+    bench.open(run=1.0)
     assert bench.listener.values(mapping) == [[0], [0]]
 
 
@@ -486,8 +470,7 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     bad = make_mapping('N9:12')  # the file has ten words
     bench, _ = make_bench(*good[:3], bad, *good[3:], start=False)
     assert len(bench.driver.blocks) == 1
-    bench.open()
-    bench.run(2.0)
+    bench.open(run=2.0)
     assert all(len(bench.listener.values(mapping)) >= 15 for mapping in good)
     assert bench.listener.values(bad) == []
     point = bench.driver.points[bad]
@@ -513,13 +496,11 @@ def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> No
 
 def test_slow_mapping_that_is_read_with_fast_ones_is_published_at_its_own_pace() -> None:
     fast, slow = make_mapping('N7:0', period=100), make_mapping('N7:1', 'ReadWrite', period=1000)
-    bench, _ = make_bench(fast, slow)
-    bench.run(5.05)
+    bench, _ = make_bench(fast, slow, run=5.05)
     assert len(bench.driver.blocks) == 1
     assert len(bench.listener.values(fast)) == 51
     assert len(bench.listener.values(slow)) == 6
-    bench.write(slow, [5])
-    bench.run(0.1)
+    bench.write(slow, [5], run=0.1)
     assert bench.listener.values(slow)[6:] == [[5]]
 
 
@@ -617,8 +598,7 @@ def test_write_brings_a_station_back() -> None:
     bench.run(0.4)
     plc.faults.silent = False
     plc.faults.status = (0x70,)
-    bench.write(mapping, [5])
-    bench.run(0.2)
+    bench.write(mapping, [5], run=0.2)
     assert bench.listener.outcomes() == [Outcome.FAILED]
     assert bench.listener.changes == [(2, False), (2, True)]
     assert bench.driver.points[mapping].error == 'STS 70: processor is in program mode'
@@ -632,8 +612,7 @@ def test_writes_to_an_inactive_station_do_not_hold_up_the_others() -> None:
     best = _rates(bench, living, 5.0)
     before = len(bench.listener.values(living))
     for number in range(100):
-        bench.write(dead, [number])
-        bench.run(0.05)
+        bench.write(dead, [number], run=0.05)
     rate = (len(bench.listener.values(living)) - before) / 5.0
     assert rate > 0.8 * best
     bench.run(5.0)
@@ -648,8 +627,7 @@ def test_writes_to_a_station_that_replies_late_do_not_hold_up_the_others() -> No
     best = _rates(bench, living, 5.0)
     before = len(bench.listener.values(living))
     for number in range(100):
-        bench.write(late, [number])
-        bench.run(0.1)
+        bench.write(late, [number], run=0.1)
     rate = (len(bench.listener.values(living)) - before) / 10.0
     assert rate > 0.7 * best  # two that nobody knew to be late, and then an eighth
     assert bench.listener.changes == []
@@ -664,8 +642,7 @@ def test_transaction_number_never_repeats_the_last_of_a_station() -> None:
     mappings = [make_mapping('N7:0', station=1), make_mapping('N7:0', station=2)]
     bench = DriverBench(mappings, settings=DriverSettings(first_tns=0xFFFD), start=False)
     plcs = [RecordingPlc(bench, bench.plc(number, 'PLC5', ('N7:0', 4))) for number in (1, 2)]
-    bench.open()
-    bench.run(1.0)
+    bench.open(run=1.0)
     numbers = [packet.tns for _, packet in sorted(
         plcs[0].commands + plcs[1].commands, key=lambda entry: entry[0])]
     assert numbers[:4] == [0xFFFE, 0xFFFF, 0, 1]
@@ -772,8 +749,7 @@ def test_write_does_not_wait_for_all_packets_of_a_long_read() -> None:
     bench = DriverBench([long, mapping], network=Network(baud=9600), start=False)
     plc = bench.plc(1, 'SLC', *SLC_FILES)
     recording = RecordingPlc(bench, plc)
-    bench.open()
-    bench.run(0.05)
+    bench.open(run=0.05)
     bench.write(mapping, [1])
     bench.run_until(lambda: bool(bench.listener.reads))
     assert recording.functions() == [0xA2, 0xAB, 0xA2, 0xA2]
@@ -869,8 +845,7 @@ def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     bench.lose_port()
     store(plc, 'N7:0', [1] * 250)
     bench.run(60.0)
-    bench.open()
-    bench.run(0.5)
+    bench.open(run=0.5)
     values = bench.listener.values(long)
     assert values and all(entry == [1] * 250 for entry in values)
     assert (bench.driver.longest_poll_cycle or 0) < 1
@@ -891,8 +866,7 @@ def test_long_block_lets_others_go_between_its_packets() -> None:
 
 def test_default_period_is_a_setting() -> None:
     mapping = make_mapping('N7:0')
-    bench, _ = make_bench(mapping, default_period=0.5)
-    bench.run(2.4)
+    bench, _ = make_bench(mapping, default_period=0.5, run=2.4)
     assert len(bench.listener.values(mapping)) == 5
     assert bench.driver.points[mapping].period == 0.5
 
@@ -901,8 +875,7 @@ def test_default_period_is_a_setting() -> None:
 def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) -> None:
     mappings = [make_mapping(f'{text}', length=length, period=0) for text, length in (
         ('N7:0', 40), ('F8:0', 10), ('B3:0', 4), ('T4:0', 9))]
-    bench, _ = make_bench(*mappings, network=Network(baud=baud))
-    bench.run(20.0)
+    bench, _ = make_bench(*mappings, network=Network(baud=baud), run=20.0)
     assert bench.driver.poll_cycle is not None
     expected = bench.driver.expected_poll_cycle - 4 * 0.02  # our PLC answers at once
     assert bench.driver.poll_cycle == pytest.approx(expected, rel=0.03, abs=0.002)
@@ -914,14 +887,12 @@ def test_driver_without_stations_rests_until_a_write_comes() -> None:
     assert bench.driver.machine.deadline is None
     bench.run(100.0)
     assert bench.driver.counters.chars_sent == 0
-    bench.write(mapping, [3])
-    bench.run(0.1)
+    bench.write(mapping, [3], run=0.1)
     assert stored(plc, 'N7:0') == b'\3\0'
 
 
 def test_counters_of_the_driver() -> None:
-    bench, _ = make_bench(make_mapping('N7:0'))
-    bench.run(0.95)
+    bench, _ = make_bench(make_mapping('N7:0'), run=0.95)
     counters = bench.driver.counters
     assert bench.driver.transactions == counters.commands_sent == counters.replies_received == 10
     assert bench.driver.stations[1].replies == 10

@@ -60,8 +60,7 @@ def test_value_is_written_and_read_back(
     bench = DriverBench([mapping], network=Network(baud=115200, error_code=check))
     station = bench.plc(1, plc, *FILES[plc])
     bench.run(0.3)
-    bench.write(mapping, values)
-    bench.run(1.0)
+    bench.write(mapping, values, run=1.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(mapping)[-1] == values
     assert decoded(station, mapping) == values
@@ -80,8 +79,7 @@ def test_bits_beside_those_written_stay() -> None:
     station = bench.plc(1, 'PLC2', *PLC2_WORDS)
     store(station, '020', [0xFFFF, 0xFFFF])
     bench.run(0.1)
-    bench.write(mapping, [0, 1, 0, 1])
-    bench.run(0.3)
+    bench.write(mapping, [0, 1, 0, 1], run=0.3)
     assert stored(station, '020', 2) == bytes.fromhex('7F FD FF FF')
 
 
@@ -91,8 +89,7 @@ def test_common_interface_file_of_an_slc() -> None:
     bench = DriverBench([words, bits])
     station = bench.plc(1, 'SLC', ('N9:0', 100))
     bench.run(0.3)
-    bench.write(words, [0, 0x8000, *range(58)])
-    bench.run(1.0)
+    bench.write(words, [0, 0x8000, *range(58)], run=1.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(words)[-1] == [0, 0x8000, *range(58)]
     assert bench.listener.values(bits)[-1] == [1]
@@ -139,8 +136,7 @@ def test_write_to_an_address_that_is_not_there_is_refused(plc: str, text: str) -
     mapping = make_mapping(text, 'Write', plc=plc)
     bench = DriverBench([mapping])
     bench.plc(1, plc, *FILES[plc])
-    bench.write(mapping, [1])
-    bench.run(0.5)
+    bench.write(mapping, [1], run=0.5)
     result, = bench.listener.results
     assert (result.outcome, result.detail) == (Outcome.FAILED, REFUSALS[plc])
 

@@ -68,8 +68,7 @@ def test_value_is_written_and_nothing_else(plc: str, text: str, length: int,
     expected = simulated_plc(1, plc, bench.clock, *FILES[plc])
     store(expected, text, values)
     bench.run(0.05)
-    bench.write(mapping, values)
-    bench.run(0.5)
+    bench.write(mapping, values, run=0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(mapping)[-1] == values
     for area, words in FILES[plc]:
@@ -126,8 +125,7 @@ def test_old_slc_is_read_and_written_in_packets_of_82_bytes() -> None:
     values = list(range(200))
     bench = DriverBench([mapping])
     plc = old_plc(bench)
-    bench.write(mapping, values)
-    bench.run(2.0)
+    bench.write(mapping, values, run=2.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(mapping)[-1] == values
     assert stored(plc, 'N7:199') == (199).to_bytes(2, 'little')
@@ -148,13 +146,11 @@ def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:
     bench = DriverBench([mapping])
     plc = old_plc(bench)
     store(plc, 'B3:1', [0x8001])
-    bench.write(mapping, [1])
-    bench.run(0.5)
+    bench.write(mapping, [1], run=0.5)
     result, = bench.listener.results
     assert str(result) == f'written: {REWRITTEN}'
     assert stored(plc, 'B3:1') == bytes.fromhex('11 80')
-    bench.write(mapping, [0])
-    bench.run(0.5)
+    bench.write(mapping, [0], run=0.5)
     assert stored(plc, 'B3:1') == bytes.fromhex('01 80')
     assert bench.listener.values(mapping)[-1] == [0]
 
@@ -169,8 +165,7 @@ def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() ->
             store(plc, 'B3:1', [0x0002])
 
     plc.meanwhile = interfere
-    bench.write(mapping, [1])
-    bench.run(0.5)
+    bench.write(mapping, [1], run=0.5)
     assert str(bench.listener.results[0]).endswith('a change that the PLC made in between is lost')
     assert stored(plc, 'B3:1') == bytes.fromhex('10 00')
 
@@ -184,8 +179,7 @@ def test_writing_back_without_a_reply_leaves_it_unknown() -> None:
         plc.faults.silent = function == slc.LOGICAL_WRITE
 
     plc.meanwhile = fall_silent
-    bench.write(mapping, [1])
-    bench.run(5.0)
+    bench.write(mapping, [1], run=5.0)
     assert bench.listener.outcomes() == [Outcome.UNKNOWN]
     assert stored(plc, 'B3:1') == bytes.fromhex('10 00')  # it was, in this case
 
@@ -199,8 +193,7 @@ def test_reading_for_it_without_a_reply_means_not_written() -> None:
         plc.faults.silent = function == slc.LOGICAL_READ
 
     plc.meanwhile = fall_silent
-    bench.write(mapping, [1])
-    bench.run(5.0)
+    bench.write(mapping, [1], run=5.0)
     assert bench.listener.outcomes() == [Outcome.NOT_SENT]
     assert stored(plc, 'B3:1') == bytes(2)
 
@@ -209,8 +202,7 @@ def test_bit_refused_by_a_processor_that_has_masked_writes_is_a_failure() -> Non
     mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/03')
     bench = DriverBench([mapping])
     plc = old_plc(bench)
-    bench.write(mapping, [1])
-    bench.run(0.5)
+    bench.write(mapping, [1], run=0.5)
     assert bench.listener.outcomes() == [Outcome.FAILED]
     assert stored(plc, 'B3:1') == bytes(2)
 
@@ -224,8 +216,7 @@ def test_flat_io_is_read_and_written_through_the_slots() -> None:
     store(plc, 'I:1.0', [10, 11])
     store(plc, 'I:3.0', [12, 13])
     bench.run(0.3)
-    bench.write(output, [1])
-    bench.run(0.5)
+    bench.write(output, [1], run=0.5)
     assert bench.listener.values(inputs)[-1] == [11, 12, 13]
     assert bench.listener.values(slot)[-1] == [12]
     assert bench.listener.values(output)[-1] == [1]

@@ -119,8 +119,7 @@ def test_repetition_of_a_lost_command_is_too_old_after_a_pause() -> None:
     bench, plc = bench_of(write, polling='Message')
     bench.run(1.0)
     bench.far.hear = lambda data: b''
-    bench.write(write, [1])
-    bench.run(0.05)
+    bench.write(write, [1], run=0.05)
     bench.line.pause(bench.driver.machine, 6.0)
     bench.far.hear = bytes
     bench.run(10.0)
@@ -139,8 +138,7 @@ def test_write_that_waits_too_long_has_its_result_while_a_transaction_runs(polli
     ClockPlc(bench)
     bench.run(0.05)  # station 2 is being asked for its reply, in vain, for 12 s
     bench.write(slow, [1])
-    bench.write(other, [1])
-    bench.run(2.001)
+    bench.write(other, [1], run=2.001)
     assert {str(result): result.latency for result in bench.listener.results} == {
         'not written: not sent: waited longer than 2 s for the line': pytest.approx(2.0)}
     assert len(bench.listener.results) == 2

@@ -73,18 +73,22 @@ class Bench:
         """Return the time."""
         return self.line.now
 
-    def start(self) -> None:
-        """Connect both ends."""
+    def start(self, run: float = 0.0) -> None:
+        """Connect both ends; let so many seconds pass."""
         self.line.start()
+        if run:
+            self.run(run)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
         self.line.run_for(seconds)
 
-    def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
-        """Ask for a write, as the node does."""
+    def write(self, mapping: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
+        """Ask for a write, as the node does; let so many seconds pass."""
         self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
+        if run:
+            self.run(run)
 
     def message(self, text: str, *values: float) -> None:
         """Let the PLC's own program write to us."""
@@ -127,8 +131,7 @@ def test_reads_of_a_peer_come_in_time_and_true(
     store(bench.plc, 'F8:2', [1.5, -0.25])
     store(bench.plc, 'B3:1/4', [1, 0, 0, 1, 1, 1])
     store(bench.plc, 'N7:10', list(range(200)))
-    bench.start()
-    bench.run(3.0)
+    bench.start(run=3.0)
     assert bench.listener.values(integers)[-1] == [0x1003, -2, 16]
     assert bench.listener.values(floats)[-1] == [1.5, -0.25]
     assert bench.listener.values(bits)[-1] == [1, 0, 0, 1, 1, 1]
@@ -148,12 +151,10 @@ def test_writes_to_a_peer_are_confirmed_and_stored(family: str, outstanding: int
     bits = make_mapping('B3:2/3', 'Write', plc=family, length=3)
     bench = Bench([words, floats, bits], family=family, outstanding=outstanding)
     store(bench.plc, 'B3:2', [0xFFFF])
-    bench.start()
-    bench.run(0.5)
+    bench.start(run=0.5)
     bench.write(words, [1, -2, 16, 0x1010])
     bench.write(floats, [2.5])
-    bench.write(bits, [0, 1, 0])
-    bench.run(1.0)
+    bench.write(bits, [0, 1, 0], run=1.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN] * 3
     assert stored(bench.plc, 'N7:10', 4) == b'\1\0\xfe\xff\x10\0\x10\x10'
     assert stored(bench.plc, 'F8:0', 2) == b'\0\0\x20\x40'
@@ -165,8 +166,7 @@ def test_write_that_the_plc_refuses() -> None:
     mapping = make_mapping('N20:0', 'Write')
     bench = Bench([mapping])
     bench.start()
-    bench.write(mapping, [1])
-    bench.run(1.0)
+    bench.write(mapping, [1], run=1.0)
     assert bench.listener.outcomes() == [Outcome.FAILED]
     assert bench.driver.counters.error_messages_received == 1
 
@@ -177,8 +177,7 @@ def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
     pushed = serve_row('N7:50', family, 4)
     bits = serve_row('B3:5/0', family, 8)
     bench = Bench([pushed, bits, make_mapping(plc=family)], family=family, check=check)
-    bench.start()
-    bench.run(1.0)
+    bench.start(run=1.0)
     began = bench.clock()
     bench.message('N7:50', 11, 22)
     bench.run(0.5)
@@ -212,12 +211,10 @@ def test_message_to_what_is_not_served_is_refused() -> None:
 def test_what_ros_writes_is_read_by_the_plc(family: str) -> None:
     words, bits = serve_row('N7:50', family, 4), serve_row('B3:5/4', family, 4)
     bench = Bench([words, bits, make_mapping(plc=family)], family=family)
-    bench.start()
-    bench.run(0.3)
+    bench.start(run=0.3)
     assert bench.plc_reads('N7:50', 4) == (0, bytes(8))
     bench.write(words, [-1, 0x1010, 3, 4])
-    bench.write(bits, [1, 0, 1, 1])
-    bench.run(0.3)
+    bench.write(bits, [1, 0, 1, 1], run=0.3)
     assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.WRITTEN]
     assert bench.plc_reads('N7:50', 4) == (0, b'\xff\xff\x10\x10\3\0\4\0')
     assert bench.plc_reads('B3:5', 1) == (0, b'\xd0\0')
@@ -232,8 +229,7 @@ def test_values_for_served_words_are_checked() -> None:
     for values in ([1], [1, 10], [-1, 1], [1, 2, 3]):
         bench.write(mapping, values)
     assert bench.listener.outcomes() == [Outcome.REFUSED] * 4
-    bench.write(mapping, [0, 9])
-    bench.run(0.1)
+    bench.write(mapping, [0, 9], run=0.1)
     assert bench.listener.outcomes()[-1] is Outcome.WRITTEN
     assert bench.plc_reads('N7:50', 2) == (0, b'\0\0\x09\0')
 
@@ -290,8 +286,7 @@ def test_more_outstanding_commands_do_not_mix_up_blocks() -> None:
     bench = Bench(rows, outstanding=3, first_tns=0xFFF0)
     for number in range(12):
         store(bench.plc, f'N7:{20 * number}', [number, 100 + number])
-    bench.start()
-    bench.run(5.0)
+    bench.start(run=5.0)
     for number, mapping in enumerate(rows):
         values = bench.listener.values(mapping)
         assert len(values) > 5
@@ -302,11 +297,9 @@ def test_dead_line_and_recovery() -> None:
     read, write = make_mapping(), make_mapping('N7:5', 'Write')
     pushed = serve_row('N7:50')
     bench = Bench([read, write, pushed])
-    bench.start()
-    bench.run(0.5)
+    bench.start(run=0.5)
     bench.line.noise = Noise(lost=1.0)
-    bench.write(write, [5])
-    bench.run(10.0)
+    bench.write(write, [5], run=10.0)
     assert bench.listener.changes == [(PLC, False)]
     assert bench.listener.outcomes() == [Outcome.UNKNOWN]
     assert bench.driver.points[read].freshness(bench.clock()) is Freshness.FAILED
@@ -326,13 +319,11 @@ def test_served_words_survive_a_lost_port() -> None:
     words = serve_row('N7:50', length=2)
     bench = Bench([words])
     bench.start()
-    bench.write(words, [1, 2])
-    bench.run(0.1)
+    bench.write(words, [1, 2], run=0.1)
     bench.driver.machine.stop()
     bench.write(words, [3, 4])
     assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.REFUSED]
-    bench.start()
-    bench.run(0.1)
+    bench.start(run=0.1)
     assert bench.plc_reads('N7:50', 2) == (0, b'\1\0\2\0')
 
 
@@ -345,8 +336,7 @@ def test_our_own_station_is_no_station_of_the_line() -> None:
 def test_served_word_that_nobody_has_to_write_is_not_late() -> None:
     free, expected = serve_row('N7:50'), serve_row('N7:60', period=200)
     bench = Bench([free, expected])
-    bench.start()
-    bench.run(5.0)
+    bench.start(run=5.0)
     now = bench.clock()
     assert bench.driver.points[free].freshness(now) is Freshness.FRESH
     assert bench.driver.points[expected].freshness(now) is Freshness.WAITING
@@ -385,8 +375,7 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
 def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     word, lamp = make_mapping('N7:0', plc='SLC'), make_mapping('N7:1', 'Write', plc='SLC')
     bench = Bench([word, lamp], family='SLC', outstanding=outstanding, processor_period=2.0)
-    bench.start()
-    bench.run(1.0)
+    bench.start(run=1.0)
     health = bench.driver.checks
     assert health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
     bench.plc.processor.setting = Setting.PROGRAM
@@ -401,8 +390,7 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
 
 def test_peer_that_is_only_written_to_is_watched() -> None:
     bench = Bench([make_mapping('N7:1', 'Write')])
-    bench.start()
-    bench.run(9.0)
+    bench.start(run=9.0)
     assert bench.driver.counters.commands_sent == 5
     bench.line.noise = Noise(lost=1.0)
     bench.run(6.0)

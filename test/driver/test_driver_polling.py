@@ -94,8 +94,7 @@ def test_write_is_confirmed_in_standard_polling() -> None:
     bench = DriverBench([words], network=STANDARD)
     plc = bench.plc(1, 'PLC5', ('N7:0', 2))
     bench.run(0.5)
-    bench.write(words, [7, 8])
-    bench.run(0.5)
+    bench.write(words, [7, 8], run=0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert stored(plc, 'N7:0', 2) == b'\7\0\x08\0'
     assert bench.listener.values(words)[-1] == [7, 8]
@@ -125,8 +124,7 @@ def test_write_to_a_dead_station_is_not_sent() -> None:
     words = make_mapping('N7:0', 'ReadWrite')
     bench = DriverBench([words], network=STANDARD)
     bench.run(2.0)
-    bench.write(words, [7])
-    bench.run(1.0)
+    bench.write(words, [7], run=1.0)
     assert bench.listener.outcomes() == [Outcome.NOT_SENT]
 
 
@@ -147,13 +145,11 @@ def test_lost_port_leaves_nothing_without_a_result(polling: str) -> None:
     plc = bench.plc(1, 'PLC5', *FILES)
     plc.faults.delay = 0.3
     bench.run(0.5)
-    bench.write(words, [7])
-    bench.run(0.2)
+    bench.write(words, [7], run=0.2)
     bench.lose_port()
     assert len(bench.listener.results) == 1
     plc.faults = InjectedFaults()
-    bench.open()
-    bench.run(1.0)
+    bench.open(run=1.0)
     assert bench.driver.points[words].error is None
 
 
@@ -164,8 +160,7 @@ def test_broadcast_row_is_written_to_every_station(polling: str) -> None:
     bench = DriverBench([everybody, read], network=network(polling))
     plcs = [bench.plc(station, 'PLC5', *FILES) for station in (1, 2)]
     bench.run(0.5)
-    bench.write(everybody, [7])
-    bench.run(0.5)
+    bench.write(everybody, [7], run=0.5)
     result, = bench.listener.results
     assert result.outcome is Outcome.BROADCAST
     assert str(result) == 'sent to all stations; nobody confirms a broadcast'
@@ -181,8 +176,7 @@ def test_broadcast_row_alone(polling: str) -> None:
     bench = DriverBench([everybody], network=network(polling))
     plc = bench.plc(1, 'PLC5', *FILES)
     bench.run(0.5)
-    bench.write(everybody, [7])
-    bench.run(0.5)
+    bench.write(everybody, [7], run=0.5)
     assert bench.listener.outcomes() == [Outcome.BROADCAST]
     assert stored(plc, 'N7:0') == b'\7\0'
 

@@ -205,8 +205,7 @@ def test_station_that_dies_on_a_write_is_probed_where_another_is_gone_already() 
     bench.plc(2, 'PLC5', ('N7:0', 4)).faults.silent = True
     bench.run(2.0)
     first.faults.silent = True
-    bench.write(rows[0], [1])
-    bench.run(20.0)
+    bench.write(rows[0], [1], run=20.0)
     assert not bench.driver.stations[1].active
     first.faults.silent = False
     bench.listener.reads.clear()

@@ -70,10 +70,12 @@ class Bench:
         """Let time pass."""
         self.line.run_for(seconds)
 
-    def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
-        """Ask for a write, as the node does."""
+    def write(self, mapping: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
+        """Ask for a write, as the node does; let so many seconds pass."""
         self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
+        if run:
+            self.run(run)
 
     def ask(self, request: Request, station: int = US) -> CommandTask:
         """Let the master send a command."""
@@ -100,8 +102,7 @@ def serve_row(text: str, length: int = 1) -> Mapping:
 def test_words_are_served_in_both_directions(check: str) -> None:
     words = serve_row('N7:50', 3)
     bench = Bench([words], check=check)
-    bench.write(words, [1, -2, 0x1010])
-    bench.run(0.1)
+    bench.write(words, [1, -2, 0x1010], run=0.1)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.master_reads('N7:50', 3) == b'\1\0\xfe\xff\x10\x10'
     bench.ask(DIALECT.write(parse_address('N7:51', SLC), b'\7\0'))
@@ -129,8 +130,7 @@ def test_reads_and_writes_go_by_way_of_the_master() -> None:
     bench.run(1.0)
     assert bench.listener.values(read)[-1] == [1, -2, 3, 0x1010]
     assert len(bench.listener.values(read)) > 4
-    bench.write(write, [7, 8])
-    bench.run(0.5)
+    bench.write(write, [7, 8], run=0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert stored(bench.plc, 'N7:10', 2) == b'\7\0\x08\0'
     assert bench.listener.numbers() == {2523}
@@ -143,8 +143,7 @@ def test_reads_and_writes_go_by_way_of_the_master() -> None:
 def test_word_written_to_the_master_itself() -> None:
     write = make_mapping('N7:10', 'Write', station=MASTER, plc='SLC')
     bench = Bench([write])
-    bench.write(write, [7])
-    bench.run(0.5)
+    bench.write(write, [7], run=0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert [packet.src for packet in bench.master.served] == [US]
 
@@ -153,8 +152,7 @@ def test_broadcast_of_ours() -> None:
     write = make_mapping('N7:10', 'Write', station=BROADCAST, plc='SLC')
     words = serve_row('N7:10')
     bench = Bench([write, words])
-    bench.write(write, [7])
-    bench.run(0.5)
+    bench.write(write, [7], run=0.5)
     assert bench.listener.outcomes() == [Outcome.BROADCAST]
     assert stored(bench.plc, 'N7:10') == b'\7\0'
     assert bench.listener.values(words) == [[7]]  # we hear it like everybody else
@@ -163,8 +161,7 @@ def test_broadcast_of_ours() -> None:
 def test_write_that_is_never_polled_for_expires() -> None:
     write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC')
     bench = Bench([write], DriverSettings(write_timeout=1.0), polled=(PLC,))
-    bench.write(write, [7])
-    bench.run(0.9)
+    bench.write(write, [7], run=0.9)
     assert bench.listener.outcomes() == []
     bench.run(0.5)
     assert bench.listener.outcomes() == [Outcome.NOT_SENT]
@@ -181,8 +178,7 @@ def test_reads_fail_when_the_polls_stay_away_and_come_back_with_them(period: int
     assert before > 5
     bench.line.noise = Noise(lost=1.0)
     bench.run(0.1)
-    bench.write(write, [7])
-    bench.run(3.0)
+    bench.write(write, [7], run=3.0)
     assert bench.driver.points[read].error is not None
     assert bench.listener.outcomes() == [Outcome.NOT_SENT]
     bench.line.noise = QUIET
@@ -195,8 +191,7 @@ def test_command_to_a_dead_station_is_known_by_the_masters_error_reply() -> None
     write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC')
     bench = Bench([write])
     bench.plc.faults.silent = True
-    bench.write(write, [7])
-    bench.run(2.0)
+    bench.write(write, [7], run=2.0)
     result, = bench.listener.results
     assert result.outcome is not Outcome.WRITTEN
     assert bench.driver.stations[PLC].remote_errors == 1
@@ -248,8 +243,7 @@ def test_served_value_is_stored_before_a_command_that_came_after_it() -> None:
 def test_served_value_that_has_become_too_old_is_not_stored() -> None:
     words = serve_row('N7:50')
     bench = Bench([words])
-    bench.write(words, [5])
-    bench.run(0.1)
+    bench.write(words, [5], run=0.1)
     bench.driver.write([words], [6], bench.clock() - 2.1)
     assert bench.master_reads('N7:50', 1) == b'\5\0'
     assert [str(result) for result in bench.listener.results] == [

@@ -80,8 +80,7 @@ def test_repeated_write_is_executed_once_by_a_slave_that_detects_duplicates(
     bench, plc = bench_of(mapping)
     executed = Executed(plc, is_watchful)
     bench.far.say = FirstAckLost()
-    bench.write(mapping, [7])
-    bench.run(2.0)
+    bench.write(mapping, [7], run=2.0)
     assert [result.outcome for result in bench.listener.results] == [Outcome.WRITTEN]
     assert len(executed.writes) == times
     assert len(set(executed.writes)) == 1  # the same TNS and the same values
@@ -112,8 +111,7 @@ def test_packets_of_two_long_writes_do_not_mix() -> None:
     bench.run(1.0)
     executed = Executed(plc)
     bench.write(mapping, [1] * 250)
-    bench.write(mapping, [2] * 250)
-    bench.run(2.0)
+    bench.write(mapping, [2] * 250, run=2.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN] * 2
     assert [packet.data[-2] for packet in executed.writes] == [1, 1, 1, 2, 2, 2]
     assert stored(plc, 'N10:0', 250) == b'\2\0' * 250
@@ -123,8 +121,7 @@ def test_two_rows_that_write_the_same_words_both_write() -> None:
     one, other = make_mapping('N7:0', 'Write', tag='a'), make_mapping('N7:0', 'Write', tag='b')
     bench, plc = bench_of(one, other)
     bench.write(one, [1])
-    bench.write(other, [2])
-    bench.run(2.0)
+    bench.write(other, [2], run=2.0)
     assert [(result.mapping.tag, result.outcome) for result in bench.listener.results] == [
         ('a', Outcome.WRITTEN), ('b', Outcome.WRITTEN)]
     assert stored(plc, 'N7:0') == b'\2\0'
@@ -144,8 +141,7 @@ def test_refused_before_the_line(text: str, values: list[float], reason: str) ->
     mapping = make_mapping(text, 'Write', minimum=-limit, maximum=limit)
     bench, plc = bench_of(mapping)
     executed = Executed(plc)
-    bench.write(mapping, values)
-    bench.run(2.0)
+    bench.write(mapping, values, run=2.0)
     result, = bench.listener.results
     assert result.outcome is Outcome.REFUSED
     assert reason.lower() in result.detail.lower()
@@ -211,8 +207,7 @@ def test_read_only_refuses_before_the_line() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     bench, plc = bench_of(mapping, read_only=True)
     executed = Executed(plc)
-    bench.write(mapping, [1])
-    bench.run(2.0)
+    bench.write(mapping, [1], run=2.0)
     assert [str(result) for result in bench.listener.results] == [
         'not written: refused: this node is read_only']
     assert executed.writes == []

@@ -91,8 +91,7 @@ def test_both_are_read_and_told_apart(polling: str) -> None:
 def test_write_reaches_the_one_it_is_for(polling: str) -> None:
     bench = Bench(polling)
     bench.run(0.2)
-    bench.write(bench.second, [77])
-    bench.run(0.5)
+    bench.write(bench.second, [77], run=0.5)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert stored(bench.plcs[1], 'N7:0') == b'\x4D\0'
     assert stored(bench.plcs[0], 'N7:0') == b'\x0B\0'
@@ -180,8 +179,7 @@ def test_gateway_that_says_no_to_every_second_command_loses_half_of_them(
     bench.run(2.0)
     bench.listener.reads.clear()
     for number in range(100):
-        bench.write(bench.second, [number])
-        bench.run(0.3)
+        bench.write(bench.second, [number], run=0.3)
     assert len(bench.listener.values(bench.first)) > 0.4 * 300
     assert len(bench.listener.values(bench.second)) > 0.4 * 300
     assert len(bench.listener.values(bench.third)) > 0.95 * 300

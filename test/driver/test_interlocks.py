@@ -145,10 +145,13 @@ class Cell:
         """Let time pass."""
         self.bench.run(seconds)
 
-    def publish(self, row: Mapping, value: int, times: int = 1, gap: float = 0.1) -> None:
-        """Publish a value, so many times."""
+    def publish(self, row: Mapping, value: int, times: int = 1, gap: float = 0.1,
+                run: float = 0.0) -> None:
+        """Publish a value, so many times, while so many seconds pass."""
         for number in range(times):
             self.bench.at(self.now + number * gap, lambda: self.bench.write(row, [value]))
+        if run:
+            self.run(run)
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)
@@ -217,8 +220,7 @@ def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
     speed = speed_row()
     elsewhere = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)  # it never answers
     cell = Cell(beat_row(), speed, elsewhere, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(0.2)
+    cell.publish(speed, 3, run=0.2)
     cell.refused = {'N7:0'}
     cell.run(AFTER)
     since = cell.now
@@ -255,8 +257,7 @@ def test_rule_3d_required_topic_that_falls_silent_is_0_at_once(polling: str) -> 
     cell = Cell(beat_row(period=1000, requires=['speed'], timeout=300), speed, polling=polling)
     cell.run(1.0)
     assert cell.written('N10:0') == [0]
-    cell.publish(speed, 5, times=40)
-    cell.run(4.0)
+    cell.publish(speed, 5, times=40, run=4.0)
     assert cell.word('N10:0') >= 3
     begun = cell.now
     cell.run(1.0)
@@ -269,8 +270,7 @@ def test_rule_3d_required_topic_that_falls_silent_is_0_at_once(polling: str) -> 
 def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     speed = speed_row(Fallback((7,), 3000))
     cell = Cell(beat_row(2000, requires=['speed'], timeout=5000), speed)
-    cell.publish(speed, 3, times=100)
-    cell.run(5.0)
+    cell.publish(speed, 3, times=100, run=5.0)
     interlocks, now = cell.bench.driver.interlocks, cell.now
     beat = interlocks.heartbeats[0]
 
@@ -321,8 +321,7 @@ def test_rule_4_heartbeats_give_no_results() -> None:
 def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     speed = speed_row()
     cell = Cell(beat_row(), speed)
-    cell.publish(speed, 3, times=20)
-    cell.run(1.95)
+    cell.publish(speed, 3, times=20, run=1.95)
     since = cell.now
     driver = cell.bench.driver
     assert not driver.interlocks.is_over
@@ -375,10 +374,8 @@ def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> No
 def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, maximum=10.0)
     cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(0.1)
-    cell.publish(speed, 99, times=20)
-    cell.run(2.0)
+    cell.publish(speed, 3, run=0.1)
+    cell.publish(speed, 99, times=20, run=2.0)
     assert cell.word('N7:0') == 7
     assert TIMEOUT in cell.results()
 
@@ -387,8 +384,7 @@ def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
 def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
     speed = speed_row()
     cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(0.1)
+    cell.publish(speed, 3, run=0.1)
     cell.refused, cell.spared = {'N7:0'}, 7
     cell.publish(speed, 99, times=round(2.0 / gap), gap=gap)
     cell.run(AFTER + 0.1)
@@ -412,8 +408,7 @@ def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
 def test_rule_8_living_output_does_not_dip_in_a_short_outage() -> None:
     speed = speed_row(Fallback((7,), 60_000))
     cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(1.0)
+    cell.publish(speed, 3, run=1.0)
     cell.bench.lose_port()
     cell.run(0.5)
     cell.bench.open()
@@ -424,8 +419,7 @@ def test_rule_8_living_output_does_not_dip_in_a_short_outage() -> None:
 def test_rule_8_change_to_run_is_a_first_contact() -> None:
     speed = speed_row(Fallback((7,), 60_000))
     cell = Cell(beat_row(), speed, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(1.0)
+    cell.publish(speed, 3, run=1.0)
     cell.plc.processor.setting = Setting.PROGRAM
     cell.run(2 * MODE_PERIOD)
     since = cell.now
@@ -440,8 +434,7 @@ def test_rule_8_change_to_run_is_a_first_contact() -> None:
 def test_rule_8_cleared_fault_is_a_change_to_run() -> None:
     speed = speed_row(Fallback((7,), 60_000))
     cell = Cell(beat_row(), speed, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(1.0)
+    cell.publish(speed, 3, run=1.0)
     running = Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
     for identity in (running, replace(running, faults=('bad RAM',)), running):
         cell.bench.driver._station_told(1, identity, cell.now)
@@ -477,8 +470,7 @@ def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None
 def test_rule_8_message_that_stands_is_not_written_over() -> None:
     speed = speed_row()
     cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3, times=200)
-    cell.run(19.0)
+    cell.publish(speed, 3, times=200, run=19.0)
     assert cell.written('N7:0').count(7) == 1
     cell.run(2.0)
     cell.refused = {'N7:0'}
@@ -526,8 +518,7 @@ def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
     speed = speed_row()
     cell = Cell(speed, run=1.0)
     say, cell.bench.far.say = cell.bench.far.say, lambda data: b''
-    cell.publish(speed, 3)
-    cell.run(0.05)
+    cell.publish(speed, 3, run=0.05)
     cell.run(1.0)
     cell.bench.far.say = say
     cell.run(15.0)
@@ -649,8 +640,7 @@ def test_rule_11_every_eighth_turn_is_a_reads() -> None:
 def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs() -> None:
     speed = speed_row(Fallback((7,), 3000))
     cell = Cell(beat_row(), speed, run=2.0)
-    cell.publish(speed, 3)
-    cell.run(0.1)
+    cell.publish(speed, 3, run=0.1)
     cell.is_late, begun = True, cell.now
     cell.run(6.0)
     assert not cell.bench.driver.stations[1].replies_in_time
@@ -663,8 +653,7 @@ def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
     cell = Cell(served, run=0.1)
     words = cell.bench.driver._served.words_of
     assert words(served) == b'\7\0'
-    cell.publish(served, 3)
-    cell.run(0.3)
+    cell.publish(served, 3, run=0.3)
     assert words(served) == b'\3\0'
     cell.run(0.3)
     assert words(served) == b'\7\0'
@@ -928,8 +917,7 @@ def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
     speed = speed_row()
     cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3)
-    cell.run(0.1)
+    cell.publish(speed, 3, run=0.1)
     cell.refused = {'N7:0'}
     cell.run(4.0)
     cell.refused = set()

@@ -193,8 +193,7 @@ def test_late_answer_of_a_station_that_is_still_there() -> None:
 def test_station_that_stays_away_is_not_waited_for_longer_than_a_write_waits() -> None:
     bench, mapping = bench_of()
     bench.far.say = nothing
-    bench.write(mapping, [7])
-    bench.run(0.9)
+    bench.write(mapping, [7], run=0.9)
     assert bench.listener.results == []
     bench.run(2.2)
     result, = bench.listener.results
@@ -205,14 +204,12 @@ def test_station_that_stays_away_is_not_waited_for_longer_than_a_write_waits() -
 def test_lost_port_leaves_no_write_without_a_result() -> None:
     bench, mapping = bench_of()
     bench.far.say = nothing
-    bench.write(mapping, [7])
-    bench.run(1.0)
+    bench.write(mapping, [7], run=1.0)
     bench.lose_port()
     result, = bench.listener.results
     assert result.detail.endswith('; not read back before the line went down')
     bench.far.say = bytes
-    bench.open()
-    bench.run(5.0)
+    bench.open(run=5.0)
     assert len(bench.listener.results) == 1
 
 

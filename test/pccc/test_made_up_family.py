@@ -171,8 +171,7 @@ def main() -> None:
     bench.run(1.0)
     bench.driver.checks.request_counters(1)
     bench.write(words, [*range(50)])
-    bench.write(bit, [1])
-    bench.run(2.0)
+    bench.write(bit, [1], run=2.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN] * 2, bench.listener.outcomes()
     assert bench.listener.values(words)[-1] == [*range(50)]
     assert stored(plc, 'W3') == b'\x00\x04'

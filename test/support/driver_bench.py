@@ -204,10 +204,12 @@ class DriverBench:
         if self.network.duplex is Duplex.FULL:
             self.far.start(self.line.now)
 
-    def open(self) -> None:  # noqa: A003
-        """Open the port."""
+    def open(self, run: float = 0.0) -> None:  # noqa: A003
+        """Open the port; let so many seconds pass."""
         self.driver.machine.start(self.line.now)
         self.line.wake(self.driver.machine)
+        if run:
+            self.run(run)
 
     def restart(self) -> None:
         """Kill the driver, and put a fresh one in its place."""
@@ -224,10 +226,12 @@ class DriverBench:
         """Do something at a moment of the clock, while ``run`` lets time pass."""
         heapq.heappush(self._actions, (when, next(self._count), action))
 
-    def write(self, mapping: Mapping, values: Sequence[float] | str) -> None:
-        """Ask for a write, as the node does."""
+    def write(self, mapping: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
+        """Ask for a write, as the node does; let so many seconds pass."""
         self.driver.write([mapping], values, self.line.now)
         self.line.wake(self.driver.machine)
+        if run:
+            self.run(run)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
