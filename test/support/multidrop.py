@@ -16,7 +16,6 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterable
-from dataclasses import asdict
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, Poll, Symbol
@@ -29,17 +28,17 @@ from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandTimeout, LinkError
-from abdf1_ros.messages import Event
-from support.peers import CommandTask
+from support.peers import CommandTask, Recorded
 from support.virtual_line import char_time, VirtualLine
 
 Serve = Callable[[Packet], Packet]
 
 
-class CommandTasks:
+class CommandTasks(Recorded):
     """Commands that wait for a link; after ``patience`` s of waiting they fail."""
 
     def __init__(self, clock: Callable[[], float], patience: float = float('inf')) -> None:
+        super().__init__()
         self.clock = clock
         self.waiting: deque[CommandTask] = deque()
         self.all: list[CommandTask] = []
@@ -109,11 +108,8 @@ class MasterNode(CommandTasks):
                  polling: PollingSettings | None = None, *, numbers: Iterable[int] = (),
                  timing: LineTiming | None = None, serve: Serve | None = Packet.reply) -> None:
         super().__init__(clock)
-        self.events: list[Event] = []
-        self.changes: list[tuple[int, bool]] = []
         self.served: list[Packet] = []
-        self.stations = ActiveStationList(
-            numbers, lambda station: self.changes.append((station.number, station.active)))
+        self.stations = ActiveStationList(numbers, self.change)
         self.machine = Told(lambda machine: self.link.run(self), settings, timing)
         served = None if serve is None else self._serve
         self._execute = serve
@@ -129,15 +125,6 @@ class MasterNode(CommandTasks):
         self.served.append(command)
         assert self._execute is not None
         return self._execute(command)
-
-    def numbers(self) -> list[tuple[int, ...]]:
-        """Return number and arguments of every event so far."""
-        return [(event.message.number, *event.args) for event in self.events]
-
-    def counts(self) -> dict[str, int]:
-        """Return the counters that are not zero, without the characters."""
-        return {name: count for name, count in asdict(self.machine.counters).items()
-                if count and not name.startswith('chars_')}
 
     @property
     def said(self) -> str:
@@ -275,7 +262,6 @@ class SlaveNode(CommandTasks):
         super().__init__(clock, patience)
         self.number = settings.station
         self.settings = settings
-        self.events: list[Event] = []
         self.served: list[Packet] = []
         self.executed: Counter[tuple[int, int]] = Counter()
         self.replies: dict[tuple[int, int], Packet] = {}
@@ -293,15 +279,6 @@ class SlaveNode(CommandTasks):
         self.executed[command.src, command.tns] += 1
         self.replies[command.src, command.tns] = reply
         return reply
-
-    def numbers(self) -> list[tuple[int, ...]]:
-        """Return number and arguments of every event so far."""
-        return [(event.message.number, *event.args) for event in self.events]
-
-    def counts(self) -> dict[str, int]:
-        """Return the counters that are not zero, without the characters."""
-        return {name: count for name, count in asdict(self.machine.counters).items()
-                if count and not name.startswith('chars_')}
 
 
 class SlaveBench(SlaveNode):

@@ -25,7 +25,7 @@ from abdf1_ros.df1.frames import Duplex, message_frame
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.errors import LinkError
 from abdf1_ros.messages import Event
 
@@ -65,20 +65,41 @@ class CommandTask:
         return self.ended - self.begun
 
 
-class PeerNode:
+class Recorded:
+    """What a link under test has told: events, changes of stations, and its counters."""
+
+    machine: Machine
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self.changes: list[tuple[int, bool]] = []
+
+    def change(self, station: Station) -> None:
+        """Take note that a station has come or gone."""
+        self.changes.append((station.number, station.active))
+
+    def numbers(self) -> list[tuple[int, ...]]:
+        """Return number and arguments of every event so far."""
+        return [(event.message.number, *event.args) for event in self.events]
+
+    def counts(self) -> dict[str, int]:
+        """Return the counters that are not zero, without the characters."""
+        return {name: count for name, count in asdict(self.machine.counters).items()
+                if count and not name.startswith('chars_')}
+
+
+class PeerNode(Recorded):
     """A peer with its machine, its tasks, and all that it has done."""
 
     def __init__(self, settings: PeerSettings, clock: Callable[[], float], *,
                  timing: LineTiming | None = None,
                  serve: Callable[[Packet], Packet] = Packet.reply) -> None:
+        super().__init__()
         self.settings = settings
-        self.events: list[Event] = []
-        self.changes: list[tuple[int, bool]] = []
         self.served: list[Packet] = []
         self.under_way: list[CommandTask] = []
         self.tasks: deque[CommandTask] = deque()
-        self.stations = ActiveStationList(
-            on_change=lambda station: self.changes.append((station.number, station.active)))
+        self.stations = ActiveStationList(on_change=self.change)
         self.machine = Machine(
             self._run, checksum=settings.checksum, duplex=Duplex.FULL, timing=timing)
         self.peer = FullDuplexPeer(
@@ -118,15 +139,6 @@ class PeerNode:
 
     def expire(self, now: float) -> None:
         """Do nothing: a command waits for the line as long as it takes."""
-
-    def numbers(self) -> list[tuple[int, ...]]:
-        """Return number and arguments of every event so far."""
-        return [(event.message.number, *event.args) for event in self.events]
-
-    def counts(self) -> dict[str, int]:
-        """Return the counters that are not zero, without the characters."""
-        return {name: count for name, count in asdict(self.machine.counters).items()
-                if count and not name.startswith('chars_')}
 
 
 class PeerBench(PeerNode):

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
 from abdf1_ros.df1.master import HalfDuplexMaster
@@ -24,8 +24,7 @@ from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import LinkError
-from abdf1_ros.messages import Event
-from support.peers import CommandTask
+from support.peers import CommandTask, Recorded
 
 _JUST_BEFORE = 1e-6
 
@@ -58,19 +57,16 @@ class Silence:
     seconds: float
 
 
-class MasterScript:
+class MasterScript(Recorded):
     """A master whose line says what a script tells it; ``task`` is the last one."""
 
     task: CommandTask
 
     def __init__(self, settings: MasterSettings, timing: LineTiming | None = None,
                  routes: dict[int, int] | None = None) -> None:
+        super().__init__()
         self.now = 100.0
-        self.events: list[Event] = []
-        self.changes: list[tuple[int, bool]] = []
-        self.stations = ActiveStationList(
-            on_change=lambda station: self.changes.append((station.number, station.active)),
-            routes=routes)
+        self.stations = ActiveStationList(on_change=self.change, routes=routes)
         self.machine = Machine(self._procedure, checksum=settings.checksum, timing=timing,
                                forget_on_send=True)
         self.master = HalfDuplexMaster(
@@ -145,12 +141,3 @@ class MasterScript:
         for counter in fields(self.machine.counters):
             setattr(self.machine.counters, counter.name, 0)
         self._sent = self._received = 0
-
-    def numbers(self) -> list[tuple[int, ...]]:
-        """Return number and arguments of every event so far."""
-        return [(event.message.number, *event.args) for event in self.events]
-
-    def counts(self) -> dict[str, int]:
-        """Return the counters that are not zero, without the characters."""
-        return {name: count for name, count in asdict(self.machine.counters).items()
-                if count and not name.startswith('chars_')}
