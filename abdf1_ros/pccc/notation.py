@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 import struct
 from typing import Any
 
@@ -78,11 +79,6 @@ def integers_text(data: bytes) -> str:
     return _listed(data, 'h')
 
 
-def longs_text(data: bytes) -> str:
-    """Return pairs of words as signed numbers."""
-    return _listed(data, 'i')
-
-
 def floats_text(data: bytes) -> str:
     """Return pairs of words as float32."""
     return _listed(data, 'f', value_text)
@@ -98,5 +94,5 @@ def _listed(data: bytes, code: str, show: Callable[[Any], str] = str) -> str:
 # Types whose values are numbers; all others are shown as words.
 NUMBERS: dict[FileType, Callable[[bytes], str]] = {
     FileType.INTEGER: integers_text, FileType.TIMER: integers_text,
-    FileType.COUNTER: integers_text, FileType.CONTROL: integers_text, FileType.LONG: longs_text,
-    FileType.FLOAT: floats_text}
+    FileType.COUNTER: integers_text, FileType.CONTROL: integers_text,
+    FileType.LONG: partial(_listed, code='i'), FileType.FLOAT: floats_text}

@@ -27,6 +27,7 @@ import math
 
 from abdf1_ros.df1.frames import MAX_LINK_DATA
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
+from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.planner import Block, Planner
@@ -258,17 +259,10 @@ def write_time(network: Network, mapping: Mapping,
 
 def _packets(network: Network, mapping: Mapping) -> list[float]:
     """Return the line time (s) of each transaction of a write of a row."""
-    model, dialect = forecast.line_model(network), mapping.dialect
-    address, words = mapping.address, mapping.codec.words
-    if mapping.type is ValueType.BOOL:
-        bodies = [dialect.write_bits(address.at_offset(address.offset + number), 0, 0)[1]
-                  for number in range(words)]
-    else:
-        step = dialect.max_write(address.file_type)
-        bodies = [dialect.write(address.at_offset(address.offset + first),
-                                bytes(2 * min(step, words - first)))[1]
-                  for first in range(0, words, step)]
-    return [model.transaction_time(len(body), 0) for body in bodies]
+    model = forecast.line_model(network)
+    zeros = '' if mapping.type is ValueType.STRING else [0] * mapping.length
+    return [model.transaction_time(len(body), 0) for _, body in write_requests(
+        mapping.address, mapping.codec, zeros, mapping.dialect)]
 
 
 def own_load(network: Network, mappings: Iterable[Mapping], default_period: float,

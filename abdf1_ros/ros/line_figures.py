@@ -63,11 +63,6 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
     return f'{wanted}, reads every {milliseconds(fmean(intervals))}'
 
 
-def _rounded(rate: float) -> int:
-    """Return a rate rounded to two digits."""
-    return int(float(f'{rate:.1e}'))
-
-
 def speed_seen(driver: Driver, has_speed: bool) -> str:
     """Return the measured speed of the line."""
     if not has_speed:
@@ -75,7 +70,8 @@ def speed_seen(driver: Driver, has_speed: bool) -> str:
     seen = driver.machine.rate.seen
     if seen is None:
         return 'nothing speaks against the set one'
-    return f'{"at least" if seen > 1 else "about"} {_rounded(driver.network.baud * seen)} baud'
+    rounded = float(f'{driver.network.baud * seen:.1e}')
+    return f'{"at least" if seen > 1 else "about"} {rounded:.0f} baud'
 
 
 def unnumbered_counts(driver: Driver) -> dict[str, str]:

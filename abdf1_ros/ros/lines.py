@@ -26,7 +26,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-import difflib
 import itertools
 import resource
 import threading
@@ -39,7 +38,7 @@ from abdf1_ros.ros.interlocks import END_LIMIT
 from abdf1_ros.ros.log import bug_text
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
 from abdf1_ros.ros.parameter_files import parameter_files, parameter_tree
-from abdf1_ros.ros.parameter_store import overrides
+from abdf1_ros.ros.parameters import unknown_overrides
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
@@ -265,12 +264,7 @@ def _telling(node: BridgeNode) -> Iterator[None]:
 
 def _options(node: Node) -> tuple[list[str], bool]:
     """Return which lines are wanted, and whether all have to run; raises ConfigurationError."""
-    problems = []
-    for name in overrides(node):
-        close = difflib.get_close_matches(name, OPTIONS, 1, 0.75)
-        if close and name not in OPTIONS:
-            problems.append(Problem(
-                f'parameter {name}', f'there is no such parameter; did you mean {close[0]}?'))
+    problems = unknown_overrides(node, OPTIONS)
     anything = ParameterDescriptor(dynamic_typing=True)
     wanted, is_strict = (node.declare_parameter(name, default, anything).value
                          for name, default in OPTIONS.items())

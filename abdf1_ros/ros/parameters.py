@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, fields, replace
 import difflib
 import os
@@ -165,7 +165,9 @@ def configure(node: Node) -> Configuration:
 
     Raises ConfigurationError with every fault that keeps the node from running.
     """
-    problems = _unknown_overrides(node)
+    known = [entry.name for entry in fields(Parameters)]
+    known += [entry.parameter for entry in FIELDS.values()]
+    problems = unknown_overrides(node, known, 'net.')
     parameters = _declare_own(node, problems)
     configuration = _from_files(
         node, parameters, problems, _declare_network, is_strict=parameters.strict_map)
@@ -229,12 +231,16 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
 
 def _overridden_network(node: Node, network: Network) -> Network:
     """Return the network with what overrides it; nothing is declared."""
-    given = {}
-    for name, entry in FIELDS.items():
-        override = overrides(node).get(entry.parameter)
-        if override is not None and _text(override.value) != str(getattr(network, name)):
-            given[name] = _text(override.value), f'parameter {entry.parameter}'
-    return make_network(given, network)
+    given = overrides(node)
+    return _overriding({name: given[entry.parameter].value for name, entry in FIELDS.items()
+                        if entry.parameter in given}, network)
+
+
+def _overriding(values: dict[str, Any], network: Network) -> Network:
+    """Return the network with ``values`` by the names of its fields."""
+    return make_network({  # as text: 5.0 equals 5, but is not a station
+        name: (_text(value), f'parameter {FIELDS[name].parameter}')
+        for name, value in values.items() if _text(value) != str(getattr(network, name))}, network)
 
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:
@@ -253,21 +259,19 @@ def _resolved(path: str) -> str:
     return str(Path(path).resolve()) if path else ''
 
 
-def _unknown_overrides(node: Node) -> list[Problem]:
+def unknown_overrides(node: Node, known: Collection[str], begins: str = ' ') -> list[Problem]:
     """
     Return the parameters of ours that a user has given and that do not exist.
 
     rclpy drops them silently. Others may belong to other nodes of a shared parameter file, so
-    only those are found whose names begin or look like ours. ``map.*`` may come back from a
+    only those are found whose names look like ours, or begin so. ``map.*`` may come back from a
     dump of our parameters, see ``_ignored_overrides``.
     """
-    known = [entry.name for entry in fields(Parameters)]
-    known += [entry.parameter for entry in FIELDS.values()]
     problems = []
     for name in overrides(node):
         close = difflib.get_close_matches(name, known, 1, 0.75)
-        if name not in known and (close or name.startswith('net.')):
-            hint = f'did you mean {close[0]}?' if close else 'net.* are its columns'
+        if name not in known and (close or name.startswith(begins)):
+            hint = f'did you mean {close[0]}?' if close else f'{begins}* are its columns'
             problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     return problems
 
@@ -355,16 +359,12 @@ def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
 
 def _declare_network(node: Node, network: Network) -> Network:
     """Declare net.*, defaults from the file; return the network with what overrides it."""
-    given = {}
+    values = {}
     for name, entry in FIELDS.items():
-        default = getattr(network, name)
-        description = entry.description
-        if entry.choices:
-            description += f' ({", ".join(map(str, entry.choices))})'
-        value = _declare(node, entry.parameter, default, description, entry.low, entry.high)
-        if _text(value) != str(default):  # 5.0 equals 5, but is not a station
-            given[name] = _text(value), f'parameter {entry.parameter}'
-    return make_network(given, network)
+        choices = f' ({", ".join(map(str, entry.choices))})' if entry.choices else ''
+        values[name] = _declare(node, entry.parameter, getattr(network, name),
+                                entry.description + choices, entry.low, entry.high)
+    return _overriding(values, network)
 
 
 def _text(value: Any) -> str:

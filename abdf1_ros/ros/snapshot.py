@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Mapping as MappingType
 from datetime import datetime, UTC
 import time
@@ -114,16 +114,5 @@ def _keys(mapping: Mapping, names: MappingType[tuple[int, str], str]) -> Sequenc
         return ()
     if mapping.length == 1:
         return ('value',)
-    return [f'value {names.get((mapping.station, place), place)}' for place in _places(mapping)]
-
-
-def _places(mapping: Mapping) -> Iterator[str]:
-    """Yield the address of each value of a row."""
-    address = mapping.address
-    for number in range(mapping.length):
-        if address.bit is None:
-            words = number * mapping.codec.element_words
-            yield str(address.at_offset(address.offset + words))
-        else:
-            word, bit = divmod(address.bit + number, 16)
-            yield str(address.at_offset(address.offset + word).with_bit(bit))
+    places = map(str, map(mapping.place_of, range(mapping.length)))
+    return [f'value {names.get((mapping.station, place), place)}' for place in places]

@@ -23,7 +23,7 @@ import math
 from typing import Any
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address import Address, BITS
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import dialect_of
@@ -160,6 +160,14 @@ class Mapping:
     @property
     def _first_bit(self) -> int:
         return self.address.offset * 16 + (self.address.bit or 0)
+
+    def place_of(self, number: int) -> Address:
+        """Return the address of a value of the row, counted from 0."""
+        address = self.address
+        if address.bit is None:
+            return address.at_offset(address.offset + number * self.codec.element_words)
+        words, bit = divmod(address.bit + number, BITS)
+        return address.at_offset(address.offset + words).with_bit(bit)
 
     def cell(self, column: str) -> str:
         """Return a column's value as text, defaults filled in."""

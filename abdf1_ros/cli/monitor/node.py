@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import time
 from typing import Any, Self
 
-from abdf1_ros.cli.monitor.view import Reading, ShownResult, Snapshot, Status, Style
+from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.messages import latched_qos, MESSAGES
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -124,7 +124,7 @@ class NodeWatch(Listening):
         self._statuses: list[Status] = []
         self._told: float | None = None
         self._active: list[int] | None = None
-        self._results: deque[ShownResult] = deque(maxlen=_RESULTS_KEPT)
+        self._results: deque[Status] = deque(maxlen=_RESULTS_KEPT)
         self._next_discovery = 0.0
         self.is_there = False
         for message_type, topic, callback, qos in (
@@ -248,9 +248,8 @@ class NodeWatch(Listening):
             self._statuses, self._told = statuses, time.monotonic()
 
     def _take_result(self, status: DiagnosticStatus) -> None:
-        self._results.appendleft(ShownResult(
-            status.name, _style(status.level), status.message,
-            {pair.key: pair.value for pair in status.values}, time.monotonic()))
+        self._results.appendleft(
+            replace(shown_status(status, self.name), received=time.monotonic()))
 
     def _take_active(self, message: UInt16MultiArray) -> None:
         self._active = [16 * word + bit for word, bits in enumerate(message.data)
@@ -259,9 +258,5 @@ class NodeWatch(Listening):
 
 def shown_status(status: DiagnosticStatus, node: str) -> Status:
     """Return a status of a node as it is shown."""
-    return Status(status.name.removeprefix(f'{node}: '), _style(status.level), status.message,
-                  {pair.key: pair.value for pair in status.values})
-
-
-def _style(level: bytes) -> Style:
-    return _STYLES.get(level, Style.BAD)
+    return Status(status.name.removeprefix(f'{node}: '), _STYLES.get(status.level, Style.BAD),
+                  status.message, {pair.key: pair.value for pair in status.values})

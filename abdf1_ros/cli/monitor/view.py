@@ -93,23 +93,18 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One status of the diagnostics; ``section`` is its name without that of the node."""
+    """
+    One status of the diagnostics, or the result of one write.
+
+    ``section`` is its name without that of the node, of a result the tag. ``received`` is a clock
+    value (s), for results.
+    """
 
     section: str
     style: Style
     message: str
     values: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class ShownResult:
-    """The result of one write; ``received`` is a clock value (s)."""
-
-    tag: str
-    style: Style
-    message: str
-    values: Mapping[str, str]
-    received: float
+    received: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +122,7 @@ class Snapshot:
     statuses: Sequence[Status]
     readings: Sequence[Reading]
     active: Sequence[int] | None
-    results: Sequence[ShownResult]
+    results: Sequence[Status]
 
 
 def render(snapshot: Snapshot, now: float, width: int) -> list[TextLine]:
@@ -227,7 +222,7 @@ def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
             yield _summary(name, status)
     for result in snapshot.results:
         value, latency = (result.values.get(key, '?') for key in ('value', 'latency_ms'))
-        yield from _wrapped(f'{now - result.received:.1f} s ago: {result.tag} {value} '
+        yield from _wrapped(f'{now - result.received:.1f} s ago: {result.section} {value} '
                             f'{result.message} ({latency} ms)', width, result.style)
 
 

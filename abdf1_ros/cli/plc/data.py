@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
 from concurrent.futures import Future
-from dataclasses import replace
 from enum import Enum
 import re
 import time
@@ -30,7 +29,6 @@ from abdf1_ros.driver.transactions import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc import steps
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
@@ -216,7 +214,7 @@ def rows(mapping: Mapping, values: Values, radix: Radix = Radix.DECIMAL,
         step = min(step, max(1, (room + len(_BETWEEN)) // (width + len(_BETWEEN))))
     for first in range(0, len(texts), step):
         shown = (text.rjust(width) for text in texts[first:first + step])
-        yield str(element(mapping, first)), _BETWEEN.join(shown)
+        yield str(mapping.place_of(first)), _BETWEEN.join(shown)
 
 
 def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list[str]:
@@ -231,12 +229,3 @@ def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list
     bits = _BITS[mapping.type]
     digits = len(f'{(1 << bits) - 1:{radix.value}}')
     return [f'{int(value) & (1 << bits) - 1:0{digits}{radix.value}}' for value in values]
-
-
-def element(mapping: Mapping, number: int) -> Address:
-    """Return the address of an element of a mapping, counted from 0."""
-    address = mapping.address
-    if address.bit is None:
-        return address.at_offset(address.offset + number * mapping.codec.element_words)
-    words, bit = divmod(address.bit + number, 16)
-    return replace(address.at_offset(address.offset + words), bit=bit)

@@ -18,7 +18,6 @@ from abdf1_ros.cli.monitor.view import (
     Reading,
     render,
     show,
-    ShownResult,
     Snapshot,
     Status,
     Style,
@@ -101,7 +100,7 @@ def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
                   Status('counters', Style.GOOD, '', {'A\n': '\x00'}),
                   Status('mappings', Style.GOOD, '', {'tag\n': 'x\u202e'}),
                   Status('station 1\n', Style.GOOD, '', {'mode': '\x7f'})],
-        results=[ShownResult('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
+        results=[Status('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
     assert all(line.isprintable() for line in lines(picture))
     assert r'"Tank\x1b[31m\n4"' in line_with('na\\nme', picture).text
 
@@ -135,7 +134,7 @@ def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> No
 
 
 def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
-    picture = snapshot(results=[ShownResult(
+    picture = snapshot(results=[Status(
         'recipe', Style.BAD, 'not written: refused', {'value': '[1, 2]', 'latency_ms': '0.3'},
         NOW - 2)])
     line = line_with('recipe', picture)

@@ -19,7 +19,6 @@ from concurrent.futures import Future
 from typing import cast
 
 from abdf1_ros.cli.plc.data import (
-    element,
     length_of,
     mapping_of,
     parse_values,
@@ -80,7 +79,7 @@ def test_faults_name_the_argument(address: str, cells: dict[str, str], text: str
     ('B3:0/5', '', 3, 'B3:0/8'), ('B3:0/5', '', 11, 'B3:1/0'), ('I:1.0/15', '', 1, 'I:1.1/0'),
     ('T4:0.PRE', '', 1, 'T4:0.ACC')])
 def test_address_of_an_element(address: str, kind: str, number: int, expected: str) -> None:
-    assert str(element(make(address, Type=kind, Command='Read'), number)) == expected
+    assert str(make(address, Type=kind, Command='Read').place_of(number)) == expected
 
 
 def test_rows_of_values() -> None:
