@@ -33,14 +33,12 @@ from abdf1_ros.problems import Problem
 from abdf1_ros.ros.interlock_status import InterlockStatus
 from abdf1_ros.ros.line_figures import LoadMeter, paces, poll_scans, speed_seen, unnumbered_counts
 from abdf1_ros.ros.station_health import health_values, processor_fault, wrong_type
-from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age
+from abdf1_ros.ros.status import ERROR, Judgement, milliseconds, Moment, OK, WARN, with_age, WORDS
 from abdf1_ros.ros.write_log import WriteLog
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.share.guest_line import GuestLine
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-
-_WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR'}
 
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
@@ -157,7 +155,7 @@ class Diagnostics:
         level, text = section.judge(now)
         return DiagnosticStatus(
             level=level, name=f'{self._node_name}: {section.name}',
-            message=f'{_WORDS[level]}: {printable(text)}',
+            message=f'{WORDS[level]}: {printable(text)}',
             hardware_id=printable(section.hardware_id),
             values=[KeyValue(key=printable(key), value=printable(value))
                     for key, value in section.values(now).items()])

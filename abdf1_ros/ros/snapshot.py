@@ -23,6 +23,7 @@ import time
 
 from abdf1_ros.driver.points import Freshness, ReadPoint, show
 from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.ros.status import WORDS
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable, value_text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -34,8 +35,6 @@ _LEVELS = {
     Freshness.FRESH: DiagnosticStatus.OK, Freshness.LATE: DiagnosticStatus.OK,
     Freshness.WAITING: DiagnosticStatus.STALE, Freshness.STALE: DiagnosticStatus.STALE,
     Freshness.FAILED: DiagnosticStatus.ERROR, Freshness.WITHHELD: DiagnosticStatus.ERROR}
-_WORDS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.STALE: 'STALE',
-          DiagnosticStatus.ERROR: 'ERROR'}
 
 
 class Snapshot:
@@ -89,7 +88,7 @@ class _ValueRow:
                      ('age_ms', f'{(now - read) * 1000:.0f}')]
         return DiagnosticStatus(
             level=level, name=self._tag, hardware_id=self._place,
-            message=f'{_WORDS[level]}: {printable("; ".join(texts))}',
+            message=f'{WORDS[level]}: {printable("; ".join(texts))}',
             values=[*(KeyValue(key=key, value=value) for key, value in pairs), *self._facts])
 
     def _values(self, values: Values) -> Iterable[tuple[str, str]]:

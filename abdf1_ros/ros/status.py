@@ -20,6 +20,7 @@ from abdf1_ros.messages import Event
 from diagnostic_msgs.msg import DiagnosticStatus
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
 
 Judgement = tuple[bytes, str]
 """Level and text of a status."""

@@ -47,6 +47,7 @@ from abdf1_ros.pccc.families import (
 )
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
+from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import Codec, types_of, ValueType
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import read_rows, Row
@@ -253,13 +254,7 @@ class SimulatedPlc:
         """
         codec = _natural_codec(address, len(values))
         codec.check(values)
-        dialect = dialect_of(address.plc_type)
-        if codec.type is ValueType.BOOL:
-            requests = [dialect.write_bits(*change)
-                        for change in codec.bit_changes(address, values)]
-        else:
-            requests = [dialect.write(address, codec.encode(values))]
-        for cmd, body in requests:
+        for cmd, body in write_requests(address, codec, values, dialect_of(address.plc_type)):
             self._tns = self._tns + 1 & 0xFFFF
             command = Packet(station, self.station, cmd, 0, self._tns, body)
             self.outbox.append(Sending(command, report))

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 import signal
 from typing import Any
@@ -29,7 +28,6 @@ from support.clock import Stopwatch
 from support.fault_box import FaultBox
 from support.ros import (
     EVERYTHING,
-    Inbox,
     Observer,
     OK,
     Process,
@@ -57,21 +55,61 @@ def is_unanswered(result: str) -> bool:
     return result.startswith((UNKNOWN + NO_ANSWER, NOT_SENT + NO_ANSWER))
 
 
-@dataclass(slots=True)
-class Rig:
+class HeardNode:
+    """
+    A node that is to be started, as ``node``, and what is heard of it.
+
+    ``topics`` are those that it reads, with the types of their messages; one is ``written`` too.
+    """
+
+    node: Process
+
+    def __init__(self, observer: Observer, name: str, port: Path | str, written: str,
+                 **topics: Any) -> None:
+        self.observer = observer
+        self.name = name
+        self.diagnostics = observer.diagnostics(port)
+        self.results = observer.results(f'/{name}')
+        self.values = {topic: observer.listen(kind, f'/{name}/read/{topic}', EVERYTHING)
+                       for topic, kind in topics.items()}
+        self._written, self._kind = f'/{name}/write/{written}', topics[written]
+        self._publisher: Any = None
+
+    def until_well(self) -> None:
+        """Wait until every mapping is read."""
+        until_status(self.diagnostics, 'mappings', OK)
+        until_status(self.diagnostics, 'link', OK)
+
+    def status(self, name: str, level: bytes, *words: str) -> DiagnosticStatus:
+        """Wait for a status with this level and these words."""
+        return until_status(self.diagnostics, name, level,
+                            lambda status: all(word in status.message for word in words))
+
+    def publish(self, value: float) -> None:
+        """Publish a value for the topic that is written."""
+        if self._publisher is None:
+            self._publisher = self.observer.publisher(self._kind, self._written)
+        self._publisher.publish(self._kind(data=[value]))
+
+    def forget(self) -> None:
+        """Listen no more."""
+        for inbox in (self.diagnostics, self.results, *self.values.values()):
+            self.observer.forget(inbox)
+        if self._publisher is not None:
+            self.observer.node.destroy_publisher(self._publisher)
+
+
+class Rig(HeardNode):
     """Processes, and what is heard of the node."""
 
-    observer: Observer
-    name: str  # of the node
-    files: Files
-    simulator: Process
-    node: Process
-    diagnostics: Inbox
-    results: Inbox
-    speeds: Inbox
-    setpoint: Inbox
-    publisher: Any = None
-    begun: int = 0  # so many lines the node had said when this test began
+    def __init__(self, observer: Observer, name: str, port: str, files: Files,
+                 simulator: Process) -> None:
+        super().__init__(observer, name, port, 'setpoint', speeds=Int16MultiArray,
+                         setpoint=Float32MultiArray)
+        self.files = files
+        self.simulator = simulator
+        self.speeds, self.setpoint = self.values.values()
+        self.begun = 0  # so many lines the node had said when this test began
 
     def begin(self) -> None:
         """Begin a test where another may have ended: all is well, and as at the start."""
@@ -93,16 +131,6 @@ class Rig:
         """Wait for a line of the node with these texts, said in this test; return it."""
         return self.node.wait_for(*texts, after=self.begun)
 
-    def until_well(self) -> None:
-        """Wait until every mapping is read."""
-        until_status(self.diagnostics, 'mappings', OK)
-        until_status(self.diagnostics, 'link', OK)
-
-    def status(self, name: str, level: bytes, *words: str) -> DiagnosticStatus:
-        """Wait for a status with this level and these words."""
-        return until_status(self.diagnostics, name, level,
-                            lambda status: all(word in status.message for word in words))
-
     def recovers(self, limit: float) -> None:
         """Wait for new values of both stations, ``limit`` s at most, and good diagnostics."""
         watch = Stopwatch(self.node.number, self.simulator.number)
@@ -118,11 +146,8 @@ class Rig:
 
     def write(self, value: float) -> str:
         """Write the set point of station 2; return the text of the result."""
-        if self.publisher is None:
-            self.publisher = self.observer.publisher(
-                Float32MultiArray, f'/{self.name}/write/setpoint')
         self.results.clear()
-        self.publisher.publish(Float32MultiArray(data=[value]))
+        self.publish(value)
         return str(self.results.first().message)
 
     def has_read_only(self, *setpoints: float) -> bool:
@@ -154,23 +179,16 @@ def rigged(observer: Observer, files: Files, port: str, simulator: Process,
 
     Two nodes at a time need different names.
     """
-    inboxes = {
-        'diagnostics': observer.diagnostics(port), 'results': observer.results(f'/{name}'),
-        'speeds': observer.listen(Int16MultiArray, f'/{name}/read/speeds', EVERYTHING),
-        'setpoint': observer.listen(Float32MultiArray, f'/{name}/read/setpoint', EVERYTHING)}
+    rig = Rig(observer, name, port, files, simulator)
     arguments = ros_args(f'net_file:={files.net}', f'map_file:={files.map}', f'port:={port}',
                          OFTEN, *assignments)
-    with Process(program, *arguments, '-r', f'__node:={name}') as node:
-        rig = Rig(observer, name, files, simulator, node, **inboxes)
+    with Process(program, *arguments, '-r', f'__node:={name}') as rig.node:
         try:
             yield rig
             rig.node.end()
         finally:
             rig.simulator.__exit__()  # the one that runs by now
-    for inbox in inboxes.values():
-        observer.forget(inbox)
-    if rig.publisher is not None:
-        observer.node.destroy_publisher(rig.publisher)
+    rig.forget()
 
 
 @contextmanager

@@ -21,22 +21,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 from abdf1_ros.ports.descriptor import DescriptorPort
-from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Int16MultiArray
 from support.clock import Stopwatch
 from support.fault_box import FaultBox
+from support.fault_rig import HeardNode
 from support.ptys import Pty
 from support.ros import (
-    EVERYTHING,
-    Inbox,
     Observer,
-    OK,
     Process,
     ros_args,
-    until_status,
     values_in,
     write_csv,
 )
@@ -72,40 +67,18 @@ class LineBox(FaultBox):
         self._far = DescriptorPort(pty.fileno(), pty.close)
 
 
-@dataclass(slots=True)
-class End:
-    """
-    A node, and what is heard of it.
+class End(HeardNode):
+    """A node that serves the word ``ours``, and reads and writes the other end's as ``theirs``."""
 
-    It serves the word ``ours``, and reads and writes that of the other end as ``theirs``.
-    """
-
-    observer: Observer
-    name: str
-    node: Process
-    diagnostics: Inbox
-    results: Inbox
-    ours: Inbox
-    theirs: Inbox
-    publisher: Any = None
-    writes: int = 0
-
-    def until_well(self) -> None:
-        """Wait until the other end is read."""
-        until_status(self.diagnostics, 'mappings', OK)
-        until_status(self.diagnostics, 'link', OK)
-
-    def status(self, name: str, level: bytes, *words: str) -> DiagnosticStatus:
-        """Wait for a status with this level and these words."""
-        return until_status(self.diagnostics, name, level,
-                            lambda status: all(word in status.message for word in words))
+    def __init__(self, observer: Observer, name: str, port: Path) -> None:
+        super().__init__(observer, name, port, 'theirs', ours=Int16MultiArray,
+                         theirs=Int16MultiArray)
+        self.ours, self.theirs = self.values.values()
+        self.writes = 0
 
     def ask(self, value: int) -> None:
         """Ask for a write to the other end."""
-        if self.publisher is None:
-            self.publisher = self.observer.publisher(
-                Int16MultiArray, f'/{self.name}/write/theirs')
-        self.publisher.publish(Int16MultiArray(data=[value]))
+        self.publish(value)
         self.writes += 1
 
     def result(self) -> str:
@@ -121,13 +94,6 @@ class End:
     def was_told(self, value: int) -> int:
         """Return how often the other end has written ``value`` here."""
         return [values_in(message) for message in self.ours].count([value])
-
-    def forget(self) -> None:
-        """Listen no more."""
-        for inbox in (self.diagnostics, self.results, self.ours, self.theirs):
-            self.observer.forget(inbox)
-        if self.publisher is not None:
-            self.observer.node.destroy_publisher(self.publisher)
 
 
 @dataclass(slots=True)
@@ -151,16 +117,13 @@ class Line:
                         [f'{mode},{us},SLC,{NET_ROW}'])
         rows = write_csv(self.folder / f'{mode}_map.csv', 'Tag,Command,Address,Station,PLC_Type', [
             f'ours,Serve,N7:0,{us},SLC', f'theirs,ReadWrite,N7:0,{other},SLC'])
-        inboxes = (
-            self.observer.diagnostics(port), self.observer.results(f'/{name}'),
-            self.observer.listen(Int16MultiArray, f'/{name}/read/ours', EVERYTHING),
-            self.observer.listen(Int16MultiArray, f'/{name}/read/theirs', EVERYTHING))
-        node = Process('node', *ros_args(
+        end = End(self.observer, name, port)
+        end.node = Process('node', *ros_args(
             f'net_file:={net}', f'map_file:={rows}', f'port:={port}', OFTEN,
             *assignments),
             '-r', f'__node:={name}')
-        self.ends.append(End(self.observer, name, node, *inboxes))
-        return self.ends[-1]
+        self.ends.append(end)
+        return end
 
     def until_well(self) -> None:
         """Wait until each end reads the other."""

@@ -125,8 +125,7 @@ class _Plc3Addressing(Addressing):
     def show(self, address: Address) -> str:
         kind, file = address.file_type, address.file
         number = f'{address.element:04o}' if kind.is_io else str(address.element)
-        place = f'{kind.value}{file or ""}:{number}' if kind in _NO_FILE_NEEDED \
-            else f'{kind.value}{file}:{number}'
+        place = f'{kind.value}{"" if not file and kind in _NO_FILE_NEEDED else file}:{number}'
         if kind.is_structure:
             names = (name for name, member in FILES[kind].members.items()
                      if (member.word, member.bit) == (address.word, None))
