@@ -176,7 +176,7 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
                 rig.diagnostics, name, WARN, lambda status, processor=processor: details(
                     status)['processor'].startswith(processor))
         assert rig.write(3.0) == REFUSED + NOT_UNDERSTOOD
-        rig.node.wait_for('[ERROR]', 'speeds (N7:0 at station 1): STS F0 EXT STS 06: ')
+        rig.node.wait_for('[ERROR]', ' at station 1 (speeds, ', ': STS F0 EXT STS 06: ')
         rig.diagnostics.clear()
         rig.status('link', OK)  # both answer
         rig.status('mappings', ERROR, '25 failed')
