@@ -190,10 +190,9 @@ def eot_on_ack(symbol: Symbol) -> bytes:
 
 
 def sends_of(bench: Bench) -> list[tuple[bytes, int]]:
-    """Start a machine; return a list that gets what it sends at once, after so many symbols."""
+    """Return a list that gets what is sent at once from now on, after so many symbols."""
     sent: list[tuple[bytes, int]] = []
     bench.machine.send_at_once = lambda data: sent.append((data, len(bench.got)))
-    bench.machine.start(0.0)
     bench.machine.data_to_send()
     return sent
 

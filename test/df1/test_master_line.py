@@ -46,8 +46,7 @@ def poll(rig: MasterBench, *numbers: int, times: int = 1) -> None:
     """Let the master poll stations, by commands of its own, so often."""
     for _ in range(times):
         for number in numbers:
-            rig.ask(number)
-            rig.run(0.1)
+            rig.ask(number, run=0.1)
 
 
 @BOTH
@@ -74,8 +73,7 @@ def test_repeated_command_for_us_is_acknowledged_and_served_once(standard: bool)
     rig[7].outbox.append(command)  # as when it has not heard our ACK
     rig[7].slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
     rig.start()
-    rig.ask(7)
-    rig.run(0.2)
+    rig.ask(7, run=0.2)
     del rig[7].slave._next_packet
     rig.run(0.4)
     assert rig.master.served == [command]
@@ -128,8 +126,7 @@ def test_message_for_another_station_is_passed_on_unchanged(standard: bool) -> N
     rig = bench(standard, 5, 7, settings=replace(SETTINGS, station=0))
     rig[5].outbox.append(passed_on.packet)
     rig.start()
-    rig.ask(5, master=0)
-    rig.run(0.3)
+    rig.ask(5, master=0, run=0.3)
     assert passed_on.frame in b''.join(rig.master.machine.sent)
     assert rig[7].served == [passed_on.packet]
     assert rig[5].heard == [passed_on.packet.reply()]
@@ -154,8 +151,7 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
     rig[8].delay = 1.0
     command = rig.message(7, 8)
     rig.start()
-    rig.ask(7)
-    rig.run(1.2)
+    rig.ask(7, run=1.2)
     assert 'NAK' not in rig.master.said
     assert rig[7].heard == []
     assert 'command_timeouts' not in rig.master.counts()
@@ -182,8 +178,7 @@ def test_originator_learns_that_the_destination_is_dead(standard: bool, known: b
     rig = bench(standard, 7, 8, dead=(8,))
     command = rig.message(7, 8)
     rig.start(*[8] * known)
-    rig.ask(7)
-    rig.run(1.0)
+    rig.ask(7, run=1.0)
     assert rig[7].heard == [Packet(7, 8, 0x4F, 2, command.tns)]
     # A station that the standard polling knows as dead is polled in its turn only.
     assert ((2509, 8) in rig.master.numbers()) is not (standard and known)
@@ -227,8 +222,7 @@ def test_broadcast_of_ours_goes_once_and_is_left_to_the_slaves(standard: bool) -
     rig = bench(standard, 7, 8)
     task = rig.ask(BROADCAST)
     other = rig.ask(8)
-    rig.start()
-    rig.run(0.2)
+    rig.start(run=0.2)
     assert task.result == task.command.reply()
     assert other.result == other.command.reply()
     assert [packet.dst for packet in rig[7].served] == [BROADCAST]
@@ -264,8 +258,7 @@ def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     slave = rig[7].slave
     # The reply to the master's own command comes last, by taking away the turn of replies.
     slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
-    task = rig.ask(7)
-    rig.run(0.49)
+    task = rig.ask(7, run=0.49)
     assert slave.counters.acks_received == MAX_FORWARDS
     assert slave.counters.nak_retries > 0
     assert slave._held is not None
@@ -285,12 +278,10 @@ def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
 def test_replies_to_two_nodes_with_one_number_are_no_repetition(standard: bool) -> None:
     rig = bench(standard, 7, 8)
     rig.start()
-    first = rig.ask(8)
-    rig.run(0.1)
+    first = rig.ask(8, run=0.1)
     command = Packet(8, 7, 0x0F, 0, first.command.tns, b'\x67')
     rig[7].outbox.append(command)
-    rig.ask(7)
-    rig.run(0.5)
+    rig.ask(7, run=0.5)
     assert isinstance(first.result, Packet)
     assert rig[7].heard == [command.reply()]
     assert 'duplicate_messages' not in rig.master.counts()
@@ -320,8 +311,7 @@ def test_messages_for_the_dead_do_not_slow_the_living(standard: bool, listed: bo
         rig.message(7, 8)
     rig.start(8)
     while rig.clock() < 20.0:
-        rig.ask(7)
-        rig.run(0.05)
+        rig.ask(7, run=0.05)
     wasted = len(rig.master.times('P8')) * SETTINGS.timeout / 20.0
     assert 0.02 < wasted <= 1 / 8 + 0.01
     assert len(rig[7].heard) > 200
@@ -357,8 +347,7 @@ def test_station_that_a_message_names_is_no_station_of_ours(
     elif not standard:  # which never polls a station outside of its lists for the reply
         outcomes.add((8, 0))
     while len(rig[7].heard) < len(outcomes) and rig.clock() < 200.0:
-        rig.ask(7)
-        rig.run(0.5)
+        rig.ask(7, run=0.5)
     assert {(reply.src, reply.sts) for reply in rig[7].heard} == outcomes
     assert [station.number for station in rig.master.stations] == [7]
     assert rig.master.stations.words() == [1 << 7, *[0] * 15]
@@ -386,8 +375,7 @@ def test_replies_to_nothing_are_not_kept_without_end() -> None:
     rig.start()
     # The reply that the master polls for never comes, by taking away the turn of replies.
     rig[7].slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
-    rig.ask(7)
-    rig.run(3.9)
+    rig.ask(7, run=3.9)
     received = rig.master.counts()['replies_received']
     assert received > MAX_KEPT
     assert len(rig.master.link._line.forwards) == MAX_KEPT

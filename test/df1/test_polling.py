@@ -128,8 +128,7 @@ def test_nobody_lives_and_each_list_has_its_turn() -> None:
 def test_inactive_stations_get_an_eighth_of_the_time_at_most(priority: tuple[int, ...]) -> None:
     dead = (2, 3, 4)
     rig = bench(PollingSettings((1, *dead), priority=priority), dead=(*dead, *priority))
-    rig.start(*dead, *priority)
-    rig.run(20.0)
+    rig.start(*dead, *priority, run=20.0)
     wasted = sum(len(rig.master.times(f'P{number}')) for number in (*dead, *priority))
     assert 0.1 <= wasted * SETTINGS.timeout / 20.0 <= 1 / 8 + 0.01
     each = [len(rig.master.times(f'P{number}')) for number in dead]
@@ -172,30 +171,26 @@ def test_station_that_answers_polls_and_takes_no_command_gets_an_eighth_at_most(
     rig[1].deaf = True
     rig.start(1)
     while rig.clock() < 8.0:
-        rig.ask(1)
-        rig.run(0.05)
+        rig.ask(1, run=0.05)
     assert share_of(rig, ['C1'], 3 * (SETTINGS.nak_retries + 1)) <= 1 / 8
 
 
 def test_dead_priority_station_does_not_keep_normal_ones_from_coming_back() -> None:
     rig = bench(PollingSettings((1, 2), priority=(9, 8)), dead=(8,))
-    rig.start(1, 2, 8)
-    rig.run(20.0)
+    rig.start(1, 2, 8, run=20.0)
     assert {(1, True), (2, True)} <= set(rig.master.changes)
     assert rig.master.times('P8')
 
 
 def test_dead_normal_station_does_not_keep_a_priority_one_from_coming_back() -> None:
     rig = bench(PollingSettings((1, 2), priority=(9,)), dead=(2,))
-    rig.start(2, 9)
-    rig.run(20.0)
+    rig.start(2, 9, run=20.0)
     assert rig.master.changes == [(9, True)]
 
 
 def test_two_kinds_of_dead_share_what_there_is() -> None:
     rig = bench(PollingSettings((1, 2), priority=(9,)), dead=(2, 9))
-    rig.start(2, 9)
-    rig.run(30.0)
+    rig.start(2, 9, run=30.0)
     assert abs(len(rig.master.times('P2')) - len(rig.master.times('P9'))) <= 1
 
 
@@ -218,8 +213,7 @@ def test_commands_leave_between_polls_and_complete_in_the_order_of_the_list() ->
         reply = task.reply
         task.reply = lambda packet, reply=reply: (  # type: ignore[method-assign]
             order.append(packet.src), reply(packet))[1]
-    rig.start()
-    rig.run(0.2)
+    rig.start(run=0.2)
     assert rig.master.said.startswith('C3 C2 C1 P1 P2 P3 P1')
     assert order == [1, 2, 3]
     assert [task.result for task in tasks] == [task.command.reply() for task in tasks]
@@ -293,8 +287,7 @@ def test_our_own_place_may_be_in_the_priority_list() -> None:
 
 def test_our_own_place_is_no_station_of_the_line() -> None:
     rig = bench(PollingSettings((1, 5), priority=(5,)), dead=(1,))
-    rig.start(1)
-    rig.run(2.0)
+    rig.start(1, run=2.0)
     assert [station.number for station in rig.master.stations] == [1]
     assert rig.master.stations.words() == [0] * 16
     # It is not among the living either, for whom the dead would have to wait.
@@ -360,8 +353,7 @@ def test_any_answer_makes_a_station_active(answer: str) -> None:
 
 def test_inactive_station_gets_no_second_poll_and_no_retry_counts() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(1,))
-    rig.start(1)
-    rig.run(0.5)
+    rig.start(1, run=0.5)
     assert len(rig.master.times('P1')) == 1
     assert not {'enq_retries', 'enq_limit_exceeded'} & set(rig.master.counts())
     assert rig.master.numbers() == []
@@ -421,8 +413,7 @@ def test_reply_that_comes_after_its_time_is_stale() -> None:
     rig = bench(PollingSettings((1,)))
     rig[1].delay = 0.7
     task = rig.ask(1)
-    rig.start()
-    rig.run(1.0)
+    rig.start(run=1.0)
     assert isinstance(task.result, CommandTimeout)
     assert rig.master.counts()['stale_messages'] == 1
     assert rig.master.numbers() == [(2508,), (2510, 1, 5, task.command.tns)]
@@ -447,8 +438,7 @@ def test_station_that_never_stops_sending_does_not_hold_off_the_command_timeout(
     task = rig.ask(1)
     for _ in range(3 * MOST_QUEUED):
         rig.message(1, 5)
-    rig.start()
-    rig.run(2.0)
+    rig.start(run=2.0)
     assert isinstance(task.result, CommandTimeout)
     polled = [when for when in rig.master.times('P1') if when <= (task.ended or 0.0)]
     assert len(polled) == MOST_QUEUED + 1
@@ -458,11 +448,9 @@ def test_next_command_may_leave_after_a_timeout() -> None:
     rig = bench(PollingSettings((1,)))
     rig[1].delay = 0.7
     rig.ask(1)
-    rig.start()
-    rig.run(0.6)
+    rig.start(run=0.6)
     rig[1].delay = 0.0
-    task = rig.ask(1)
-    rig.run(0.5)
+    task = rig.ask(1, run=0.5)
     assert task.result == task.command.reply()
 
 
@@ -484,8 +472,7 @@ def test_reply_with_a_wrong_command_code() -> None:
     rig = bench(PollingSettings((1,)))
     rig[1].slave._serve = lambda command: command.reply()._replace(cmd=0x46)
     task = rig.ask(1)
-    rig.start()
-    rig.run(0.2)
+    rig.start(run=0.2)
     assert isinstance(task.result, WrongCommandCode)
     assert rig.master.numbers() == [(2505, 1, 0x46, 0x4F)]
     assert rig.master.counts()['invalid_messages'] == 1
@@ -494,8 +481,7 @@ def test_reply_with_a_wrong_command_code() -> None:
 def test_broadcast_goes_once_and_nobody_is_polled_for_it() -> None:
     rig = bench(PollingSettings((1, 2)))
     task = rig.ask(BROADCAST)
-    rig.start()
-    rig.run(0.2)
+    rig.start(run=0.2)
     log = rig.master.machine.log
     assert [text for _, text in log[:2]] == ['C255', 'P1']
     assert log[1][0] - log[0][0] >= BROADCAST_PAUSE
@@ -509,11 +495,9 @@ def test_broadcast_goes_once_and_nobody_is_polled_for_it() -> None:
 @pytest.mark.parametrize('in_sequence', [True, False])
 def test_broadcast_without_any_station_to_poll(in_sequence: bool) -> None:
     rig = bench(PollingSettings((), in_sequence=in_sequence))
-    rig.start()
-    rig.run(1.0)
+    rig.start(run=1.0)
     assert rig.master.said == ''
-    task = rig.ask(BROADCAST)
-    rig.run(0.2)
+    task = rig.ask(BROADCAST, run=0.2)
     assert task.result == task.command.reply()
     assert rig.master.said == 'C255'
 
@@ -523,8 +507,7 @@ def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
     rig.start(1)
     rig.master.stations.heard(77, 0.0)  # lives, but is in no list
     rig.run(0.3)
-    task = rig.ask(BROADCAST)
-    rig.run(0.2)
+    task = rig.ask(BROADCAST, run=0.2)
     assert ended(task)
 
 
@@ -537,8 +520,7 @@ def test_last_and_longest_scan_of_each_list_are_known() -> None:
     rig.run(1.0)
     assert priority.last == priority.longest == pytest.approx(12 * 10 / 19200)
     assert normal.last == normal.longest == pytest.approx(3 * 12 * 10 / 19200)
-    rig.ask(2)
-    rig.run(1.0)
+    rig.ask(2, run=1.0)
     assert priority.longest is not None and priority.last is not None
     assert priority.longest > 1.5 * priority.last
     assert normal.longest is not None and normal.last is not None
@@ -548,8 +530,7 @@ def test_last_and_longest_scan_of_each_list_are_known() -> None:
 def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig = bench(PollingSettings((1,)))
     normal = rig.master.link.status().scans['normal']
-    rig.start()
-    rig.run(1.0)
+    rig.start(run=1.0)
     rig.master.machine.stop(PortLost('unplugged'))
     rig.run(30.0)
     rig.master.machine.start(rig.clock())
@@ -562,8 +543,7 @@ def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
 def test_line_without_a_speed_is_polled_no_faster_than_the_set_one() -> None:
     rig = bench(PollingSettings((1, 2)), baud=19200)
     rig.line.char_time = 0.0  # as TCP: what is written is there
-    rig.start()
-    rig.run(1.0)
+    rig.start(run=1.0)
     assert 0.8 < rig.master.counts()['polls_sent'] * 6 * 10 / 19200 <= 1.01
 
 
@@ -618,8 +598,7 @@ def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, enq_retries=3))
     setattr(rig.line, 'propagation', 0.06)
     tasks = [rig.ask(1), rig.ask(2)]
-    rig.start()
-    rig.run(3.0)
+    rig.start(run=3.0)
     assert [task.result for task in tasks] == [task.command.reply() for task in tasks]
     assert rig[1].slave.counters.acks_received + rig[2].slave.counters.acks_received == 2
     assert [len(rig[number].served) for number in (1, 2)] == [1, 1]
@@ -655,12 +634,10 @@ def test_start_is_a_clean_one() -> None:
     rig = bench(PollingSettings((1, 2)))
     rig[1].delay = 0.2
     rig.ask(1)
-    rig.start()
-    rig.run(0.1)
+    rig.start(run=0.1)
     rig.master.machine.stop(PortLost('unplugged'))
     rig.master.machine.start(rig.clock())
-    task = rig.ask(1)
-    rig.run(0.5)
+    task = rig.ask(1, run=0.5)
     assert task.result == task.command.reply()
     assert rig.master.counts()['stale_messages'] == 1
 
@@ -670,8 +647,7 @@ def test_station_that_always_has_a_message_does_not_keep_the_line() -> None:
     for number in range(5000):
         rig[1].outbox.append(Packet(5, 1, 0x4F, 0, number))  # replies to nothing
     tasks = [rig.ask(2) for _ in range(10)]
-    rig.start()
-    rig.run(3.0)
+    rig.start(run=3.0)
     assert all(isinstance(task.result, Packet) for task in tasks)
 
 
@@ -687,8 +663,7 @@ def test_multiple_messages_stop_when_no_more_can_be_kept() -> None:
     rig = bench(PollingSettings((1, 2), multiple=True))
     for _ in range(40):
         rig.message(1, 2)
-    rig.start()
-    rig.run(10.0)
+    rig.start(run=10.0)
     assert rig[1].failed == []
     assert len(rig[2].served) == len(rig[1].heard) == 40
     assert all(reply.sts == 0 for reply in rig[1].heard)
@@ -698,8 +673,7 @@ def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> No
     rig = bench(PollingSettings((1, 2)))
     rig[2].delay = 0.4
     task = rig.ask(2)
-    rig.start()
-    rig.run(0.1)
+    rig.start(run=0.1)
     rig[2].deaf = True  # takes no more commands, and then dies
     rig.message(1, 2)
     rig.line.run(lambda: (2, False) in rig.master.changes, 5.0)

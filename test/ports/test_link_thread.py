@@ -82,6 +82,11 @@ class Impatient(LinkThread):
         self.pauses: list[float] = []
         self._most = most
 
+    def run_out(self) -> None:
+        """Run in this thread until the end."""
+        self.run()
+        self.stop()
+
     def _pause(self, seconds: float) -> None:
         self.pauses.append(seconds)
         if len(self.pauses) >= self._most:
@@ -111,6 +116,13 @@ class Link:
         self.threads.append(thread)
         thread.start()
         return thread
+
+    def begin(self, pty: Pty, *steps: Step) -> tuple[Script, LinkThread]:
+        """Run a script on a pseudo-terminal until it is ready."""
+        script = Script(*steps)
+        thread = self.start(script.machine, pty.name)
+        assert pty.read(5) == READY
+        return script, thread
 
     def state(self) -> PortState:
         """Return the next state."""
@@ -151,9 +163,7 @@ def test_deadlines_of_the_machine_are_kept(pty: Pty, link: Link) -> None:
 
 
 def test_wake_ends_a_rest(pty: Pty, link: Link) -> None:
-    script = Script(Step(None, None), Step(b'awake', None))
-    thread = link.start(script.machine, pty.name)
-    assert pty.read(5) == READY
+    script, thread = link.begin(pty, Step(None, None), Step(b'awake', None))
     thread.wake()
     assert script.next() is None
     assert pty.read(5) == b'awake'
@@ -173,10 +183,8 @@ def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) 
 
 
 def test_port_that_vanishes_is_opened_again_when_it_is_back(pty: Pty, link: Link) -> None:
-    script = Script(Step(b'', None))
-    thread = link.start(script.machine, pty.name)
+    script, thread = link.begin(pty, Step(b'', None))
     assert link.state().is_open
-    assert pty.read(5) == READY
     pty.close()
     lost = link.state()
     assert not lost.is_open
@@ -204,10 +212,9 @@ def test_attempts_to_open_do_not_end_and_are_half_a_second_apart() -> None:
 
     states: list[PortState] = []
     thread = Impatient(Script().machine, refuse, 4, on_state=states.append)
-    thread.run()
+    thread.run_out()
     assert thread.pauses == [0.5, 0.5, 0.5, 0.5]
     assert set(states) == {PortState(False, 'cannot open the port: Device or resource busy')}
-    thread.stop()
 
 
 def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:
@@ -317,9 +324,8 @@ class Paused(_NoLine):
 def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
     script, port = Script(Step(b'command', 1.0)), Paused()
     thread = Impatient(script.machine, lambda: port, 1, clock=port.clock)
-    thread.run()
+    thread.run_out()
     assert script.next() is None
-    thread.stop()
 
 
 def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None:
@@ -329,18 +335,15 @@ def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None
     port.write = written.append  # type: ignore[method-assign]
     looks = iter([1.0])  # at the start; then the process does not run for a while
     thread = Impatient(script.machine, lambda: port, 1, clock=lambda: next(looks, 60.0))
-    thread.run()
+    thread.run_out()
     assert 'CommandExpired' in script.end()
     assert written == [READY]
-    thread.stop()
 
 
 @pytest.mark.parametrize('step', [
     Step(None, None), Step(None, 3600.0), Step(b'', None), Step(b'x', 3600.0)])
 def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> None:
-    script = Script(step)
-    thread = link.start(script.machine, pty.name)
-    assert pty.read(5) == READY
+    script, thread = link.begin(pty, step)
     thread.stop()
     assert not thread.is_alive()
     assert script.end() == repr(PortLost('the driver is stopping'))
@@ -510,10 +513,9 @@ def test_connection_that_babbles_leaves_time_to_others(
         work: float, host: float, rest: float) -> None:
     script = Script(Step(b'', None), timing=LineTiming(0.001))
     thread = Restful(script, Babbler(bytes(READ_SIZE), 11), work=work, host=host)
-    thread.run()
+    thread.run_out()
     assert thread.taken == [64] * 10 * 8
     assert thread.rests == [pytest.approx(rest)] * 10 * 8
-    thread.stop()
 
 
 def test_burst_beside_load_takes_the_time_of_the_line() -> None:
@@ -524,9 +526,8 @@ def test_burst_beside_load_takes_the_time_of_the_line() -> None:
     thread = Restful(script, port, work=0.01)
     rest = thread._rest
     thread._rest = lambda seconds: rest(seconds + next(late, 0.0))  # type: ignore[method-assign]
-    thread.run()
+    thread.run_out()
     assert port.now - 100.0 == pytest.approx(10 * READ_SIZE * 0.001)
-    thread.stop()
 
 
 def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
@@ -534,28 +535,25 @@ def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
     port = Babbler(b'', 11)
     thread = Restful(script, port)
     port.worked = 1.0
-    thread.run()
+    thread.run_out()
     assert thread.taken == []
     assert thread.rests[0] == pytest.approx(0.001 * READ_SIZE)
-    thread.stop()
 
 
 def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:
     script = Script(Step(None, None), Step(b'awake', None))
     thread = Restful(script, Babbler(bytes(READ_SIZE), 11),
                      on_state=lambda state: thread.wake())  # as soon as the port is open
-    thread.run()
+    thread.run_out()
     assert script.next() is None
-    thread.stop()
 
 
 def test_line_is_not_left_alone_after_a_frame() -> None:
     script = Script(Step(b'', None))
     thread = Restful(script, Babbler(bytes(READ_SIZE - 1), 11, has_more=False))
-    thread.run()
+    thread.run_out()
     assert script.machine.counters.chars_received == 10 * (READ_SIZE - 1)
     assert not thread.rests
-    thread.stop()
 
 
 class Broken:
@@ -575,13 +573,12 @@ def test_three_faults_within_a_minute_end_the_thread() -> None:
     broken, faults, states = Broken(), list[Exception](), list[PortState]()
     thread = Impatient(broken.machine, _NoLine, 100, on_fault=faults.append,
                        on_state=states.append, clock=lambda: 5.0)
-    thread.run()
+    thread.run_out()
     assert thread.has_failed
     assert broken.runs == len(faults) == 3
     assert all(isinstance(fault, ZeroDivisionError) for fault in faults)
     assert states[1] == PortState(False, 'internal error: ZeroDivisionError()')
     assert thread.pauses == [0.5, 0.5]
-    thread.stop()
 
 
 @pytest.mark.parametrize('apart, fails', [(29.0, True), (31.0, False)])
@@ -592,10 +589,9 @@ def test_faults_that_are_rare_do_not_end_the_thread(apart: float, fails: bool) -
         now[0] += apart
 
     thread = Impatient(broken.machine, _NoLine, 20, on_fault=wait, clock=lambda: now[0])
-    thread.run()
+    thread.run_out()
     assert thread.has_failed is fails
     assert broken.runs == (3 if fails else 20)
-    thread.stop()
 
 
 def test_fault_ends_what_runs_and_the_next_port_has_a_fresh_procedure(
@@ -733,10 +729,8 @@ def test_port_that_opens_while_the_end_begins_is_closed() -> None:
 
 
 def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: Link) -> None:
-    script = Script(Step(b'', None))
-    thread = link.start(script.machine, pty.name)
+    script, thread = link.begin(pty, Step(b'', None))
     assert link.state().is_open
-    assert pty.read(5) == READY
     assert thread.release()
     assert link.state() == PortState(False, 'the port is left to others: polling is off')
     assert script.end() == repr(PortLost('the port is left to others: polling is off'))

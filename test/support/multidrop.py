@@ -221,11 +221,13 @@ class MasterBench:
         """Return a station."""
         return self.slaves[number]
 
-    def ask(self, number: int, master: int = 5, cmd: int = 0x0F) -> CommandTask:
-        """Queue a command of the master."""
+    def ask(self, number: int, master: int = 5, cmd: int = 0x0F, run: float = 0.0) -> CommandTask:
+        """Queue a command of the master; let so many seconds pass."""
         self._tns += 1
         task = self.master.add(Packet(number, master, cmd, 0, self._tns, b'\x68'))
         self.line.wake(self.master.machine)
+        if run:
+            self.run(run)
         return task
 
     def message(self, src: int, dst: int) -> Packet:
@@ -235,12 +237,14 @@ class MasterBench:
         self.slaves[src].outbox.append(command)
         return command
 
-    def start(self, *inactive: int) -> None:
-        """Start both ends; the master knows some stations as inactive."""
+    def start(self, *inactive: int, run: float = 0.0) -> None:
+        """Start both ends, the master knows some stations as inactive; let seconds pass."""
         for number in inactive:
             self.master.stations.lost(number, 0.0)
         self.master.changes.clear()
         self.line.start()
+        if run:
+            self.run(run)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
