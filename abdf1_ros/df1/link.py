@@ -23,8 +23,8 @@ from typing import Protocol
 
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Duplex, Frame, Symbol
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.frames import ACK, Control, Duplex, Frame, Symbol
+from abdf1_ros.df1.machine import Heard, LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
@@ -126,3 +126,9 @@ class EqualNode:
     def status(self) -> LinkStatus:
         """Return that there are no details."""
         return NO_STATUS
+
+    def _count_symbol(self, symbol: Heard) -> None:
+        """Count DLE ACK, NAK and ENQ."""
+        self._counters.acks_received += symbol is Control.ACK
+        self._counters.naks_received += symbol is Control.NAK
+        self._counters.enqs_received += symbol is Control.ENQ

@@ -287,7 +287,7 @@ class FullDuplexPeer(EqualNode):
         while not isinstance(symbol, Silence) or self._left(end) > 0:
             if symbol in (Control.ACK, Control.NAK) and machine.has_left(position):
                 assert isinstance(symbol, Control)
-                self._count_response(symbol.code)
+                self._count_symbol(symbol)
                 return symbol.code
             if isinstance(symbol, Silence):
                 last_byte = self._heard_since(begun, symbol) or last_byte
@@ -355,10 +355,10 @@ class FullDuplexPeer(EqualNode):
             return self._message(symbol)
         if symbol is Control.ENQ:
             self._expect_repetition()
-            self._counters.enqs_received += 1
+            self._count_symbol(symbol)
             return self._respond(self._last_response)
         if symbol is Control.ACK or symbol is Control.NAK:
-            self._count_response(symbol.code)
+            self._count_symbol(symbol)
             return b''
         self._last_response = frames.NAK
         if isinstance(symbol, Unknown) and not symbol.is_misplaced:
@@ -432,7 +432,3 @@ class FullDuplexPeer(EqualNode):
         self._counters.acks_sent += response == frames.ACK
         self._counters.naks_sent += response == frames.NAK
         return response
-
-    def _count_response(self, code: Code) -> None:
-        self._counters.acks_received += code is Code.ACK
-        self._counters.naks_received += code is Code.NAK

@@ -327,6 +327,7 @@ class RadioNode(EqualNode):
     def _hear(self, symbol: Heard) -> None:
         """Take a packet; a symbol of another mode is noise."""
         if not isinstance(symbol, Frame):
+            self._count_symbol(symbol)
             return
         if symbol.fault is not None:
             self._report(count_fault(symbol, self._settings.checksum, self._counters))

@@ -353,7 +353,8 @@ def _detect(options: argparse.Namespace) -> int:
     with Session(found.network(network)) as session, suppress(LinkError):
         if ways := presence.io_access(session, there):
             print(f'inputs and outputs: Access {" or ".join(ways)}')
-    whom = f'--station {there.station}' if settings.mode == MODES['half'] else '--peer'
+    whom = {MODES['full']: '--peer', MODES['half']: f'--station {there.station}'}.get(
+        settings.mode, f'--radio --station {there.station}')
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
     print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
           f'--check {settings.check}{parity}')
@@ -395,7 +396,7 @@ def _init(options: argparse.Namespace) -> int:
         return EXIT_FAILED
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}')
     # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
-    others = options.stations if found.settings.mode == MODES['half'] else \
+    others = options.stations if found.settings.mode != MODES['full'] else \
         [1] if found.presence.station == 0 else []
     there = [seen for seen in presence.scan(found.network(network), others)
              if seen.is_there] if others else []

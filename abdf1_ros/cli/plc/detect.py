@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+import time
 
 from abdf1_ros.cli.plc.line import free_station, MODES
 from abdf1_ros.cli.plc.presence import look_at, Presence, understands
@@ -42,7 +43,13 @@ class LineSettings:
         return f'{self.baud} baud, {_WORDS[self.mode]}, {self.check}'
 
 
-_WORDS = {'Peer': 'full duplex', 'Master': 'half duplex'}
+_WORDS = {'Peer': 'full duplex', 'Master': 'half duplex',
+          'Radio': 'radio modem (replies come without ACK)'}
+
+# Echoes that show that a line is radio modem, and s after which a full-duplex PLC whose message we
+# have not acknowledged has asked for the ACK (M 7-25, 7-27).
+_RADIO_ECHOES = 3
+_ENQ_TIME = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +82,20 @@ class Search:
                                 cmd_timeout=max(500, network.timeout))
         self._stations = stations
         self._show = show
+        self._lacks_acks = False  # replies have come, and not one ACK
 
-    def run(self, bauds: Sequence[int], modes: Sequence[str] = tuple(_WORDS),
+    def run(self, bauds: Sequence[int], modes: Sequence[str] = ('Peer', 'Master'),
             checks: Sequence[str] = CHECKS) -> Found | None:
         """Return the first settings that work, None when none do; raises OSError, PortLost."""
         for baud in bauds:
             for mode in modes:
                 found = self._try(baud, mode, checks)
-                if found is not None:
-                    return found
+                if found is None:
+                    continue
+                radio = replace(found.settings, mode='Radio')
+                is_radio = mode == MODES['full'] and self._lacks_acks and self._is_radio(
+                    radio, found.presence.station)
+                return replace(found, settings=radio) if is_radio else found
         return None
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
@@ -108,8 +120,7 @@ class Search:
     def _look(self, settings: LineSettings, stations: Sequence[int],
               is_first: bool) -> Iterator[Presence]:
         """Yield the presence of each station; ignore one that only seems to take commands."""
-        network = replace(self._network, baud=settings.baud, mode=settings.mode,
-                          error_code=settings.check)
+        network = self._with(settings)
         if settings.mode == MODES['half']:  # a PLC does not answer to its own address
             network = replace(network, station=free_station(network.station, stations))
         # One that is not absent is asked with ENQ when it is silent, which any full-duplex port
@@ -124,7 +135,24 @@ class Search:
                     return
                 if presence.takes_commands and not understands(session, station):
                     presence = replace(presence, takes_commands=False)
+                self._lacks_acks = not session.counters.acks_received
                 yield presence
             if session.counters.chars_received and not session.echoes:
                 self.traces.append(
                     f'{settings}: {session.counters.chars_received} characters came')
+
+    def _is_radio(self, settings: LineSettings, station: int) -> bool:
+        """Tell whether replies come without any symbol, though we give none either."""
+        self._show(f'trying {settings}, station {station}')
+        with Session(self._with(settings)) as session:
+            counters, end = session.counters, time.monotonic() + _ENQ_TIME
+            if not all(understands(session, station) for _ in range(_RADIO_ECHOES)):
+                return False
+            while not (symbols := counters.acks_received + counters.naks_received
+                       + counters.enqs_received) and time.monotonic() < end:
+                time.sleep(0.1)
+        return not symbols
+
+    def _with(self, settings: LineSettings) -> Network:
+        return replace(self._network, baud=settings.baud, mode=settings.mode,
+                       error_code=settings.check)

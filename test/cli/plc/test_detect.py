@@ -19,10 +19,14 @@ from contextlib import contextmanager
 from pathlib import Path
 import threading
 
+from abdf1_ros.cli.plc import detect
 from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
-from abdf1_ros.df1.frames import Duplex, Frame
+from abdf1_ros.cli.plc.init import net_csv
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, Duplex, Frame
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.ports.endpoints import PtyEndpoint
@@ -44,13 +48,13 @@ class Trying(list[str]):
 
 @contextmanager
 def plc_on(path: Path, check: str, duplex: Duplex,
-           kind: type[FullDuplexPeer] = FullDuplexPeer) -> Iterator[Network]:
+           kind: type[FullDuplexPeer | RadioNode] = FullDuplexPeer) -> Iterator[Network]:
     """Put an SLC that is station 1 on a pseudo-terminal."""
     plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 10), checksum=check)
     checksum = Network(error_code=check).checksum
     line = PtyEndpoint(str(path))
     procedure = multidrop([plc]) if duplex is Duplex.HALF \
-        else _full_duplex(plc, PeerSettings(checksum), kind)
+        else _everybody_sends(plc, checksum, kind)
     link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
     link.start()
     try:
@@ -60,9 +64,14 @@ def plc_on(path: Path, check: str, duplex: Duplex,
         line.close()
 
 
-def _full_duplex(plc: SimulatedPlc, settings: PeerSettings,
-                 kind: type[FullDuplexPeer]) -> Callable[[Machine], Procedure]:
-    return lambda machine: kind(machine, settings, ActiveStationList(), plc.serve).run(plc)
+def _everybody_sends(plc: SimulatedPlc, checksum: Checksum,
+                     kind: type[FullDuplexPeer | RadioNode]) -> Callable[[Machine], Procedure]:
+    def run(machine: Machine) -> Procedure:
+        if issubclass(kind, FullDuplexPeer):
+            return kind(machine, PeerSettings(checksum), ActiveStationList(), plc.serve).run(plc)
+        return RadioNode(
+            machine, RadioSettings(1, checksum), ActiveStationList(), plc.serve).run(plc)
+    return run
 
 
 def test_usual_baud_rates_come_first_and_none_is_left_out() -> None:
@@ -114,6 +123,46 @@ def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> Non
     assert (found.settings.mode, found.presence.station) == ('Peer', 1)
     assert trying == ['9600 baud, full duplex, CRC, station 0',
                       '9600 baud, full duplex, CRC, station 1']
+
+
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+def test_radio_modem_is_found_by_replies_without_ack(tmp_path: Path, check: str,
+                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detect, '_ENQ_TIME', 0.5)
+    trying = Trying()
+    with plc_on(tmp_path / 'line', check, Duplex.FULL, RadioNode) as network:
+        found = Search(network, range(8), trying).run([9600])
+        assert found is not None
+        assert (found.settings, found.presence.station) == (LineSettings(9600, 'Radio', check), 1)
+        assert 'radio modem (replies come without ACK), ' in trying[-1]
+        assert ',Radio,' in net_csv(network, found, [1])
+        assert found.network(network).mode == 'Radio'
+
+
+class Unheard(FullDuplexPeer):
+    """A full-duplex port whose first ACKs are lost, or all."""
+
+    most = 1000
+
+    def _respond(self, response: bytes) -> bytes:
+        response = super()._respond(response)
+        self.most -= response == ACK
+        return b'' if response == ACK and self.most >= 0 else response
+
+
+class UnheardForAWhile(Unheard):
+    """One whose ACKs come again after a while."""
+
+    most = 3
+
+
+@pytest.mark.parametrize('kind', [Unheard, UnheardForAWhile])
+def test_full_duplex_port_whose_acks_are_lost_is_not_radio(
+        tmp_path: Path, kind: type[Unheard]) -> None:
+    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, kind) as network:
+        found = Search(network, [1]).run([9600])
+    assert found is not None
+    assert found.settings.mode == 'Peer'
 
 
 def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: Path) -> None:
