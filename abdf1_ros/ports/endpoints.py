@@ -134,9 +134,11 @@ class TcpEndpoint:
     """A listening TCP port, any that is free for 0; one client at a time is the line."""
 
     def __init__(self, host: str, port: int) -> None:
-        self._listener = socket.create_server((host, port))
+        family = socket.AF_INET6 if ':' in host else socket.AF_INET
+        self._listener = socket.create_server((host, port), family=family)
         self._listener.settimeout(0.2)
-        self.name = 'socket://{}:{}'.format(*self._listener.getsockname()[:2])
+        host, port = self._listener.getsockname()[:2]
+        self.name = f'socket://[{host}]:{port}' if ':' in host else f'socket://{host}:{port}'
 
     def open(self) -> Port:  # noqa: A003
         """Return the connection of a client; OSError while there is none."""

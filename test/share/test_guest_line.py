@@ -218,6 +218,18 @@ def test_guests_that_babble_break_off_and_never_acknowledge_harm_nobody(tmp_path
         assert all(isinstance(values, list) for _, _, values in line.listener.reads)
 
 
+def test_place_of_ipv6(tmp_path: Path) -> None:
+    try:
+        with socket.create_server(('::1', 0), family=socket.AF_INET6) as listener:
+            port = listener.getsockname()[1]
+    except OSError:
+        pytest.skip('this machine has no IPv6')
+    with shared(tmp_path, f'tcp:[::1]:{port}') as line, \
+            client_at(f'socket://[::1]:{port}') as client:
+        assert client.read('N7:1', 2) == [1, 2]
+        assert line.guests[0].guest.name == f'tcp:[::1]:{port}'
+
+
 def test_lost_line_is_told_to_the_guest(tmp_path: Path) -> None:
     with shared(tmp_path, f'pty:{tmp_path}/hmi') as line, client_at(tmp_path / 'hmi') as client:
         assert client.read('N7:1') == 1
