@@ -27,6 +27,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
@@ -44,6 +45,7 @@ from support.ros import Inbox, Observer, Process, ros_args, write_csv
 
 OURS, THEIRS = 5, 1  # stations of the node, and of what answers it
 PATIENCE = 5.0  # s until a value has to be there
+BEAT = Case('N7:240', [0], [0])  # the heartbeat of a node that shares its line
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,7 @@ class Setup:
     What a run is about.
 
     ``access`` is the cell Access of the node's rows; ``serves`` tells that they are Serve.
+    ``share`` is the cell Share: guests may write, and the node has a heartbeat as well.
     """
 
     family: PlcType
@@ -61,6 +64,8 @@ class Setup:
     folder: Path
     access: str = ''
     serves: bool = False
+    mode: str = 'Peer'
+    share: str = ''
 
 
 class End(Protocol):
@@ -83,7 +88,7 @@ def codec_of(case: Case, family: PlcType) -> tuple[Address, Codec]:
 
 
 class PlcEnd:
-    """The simulated PLC on a full-duplex line, as station 1."""
+    """The simulated PLC at the end of a line, as station 1."""
 
     def __init__(self, setup: Setup) -> None:
         self._family = setup.family
@@ -92,14 +97,17 @@ class PlcEnd:
             address, codec = codec_of(case, setup.family)
             table.create(address, codec.words)
         self._plc = SimulatedPlc(THEIRS, table, setup.check, time.monotonic)
-        self._plc.be_full_duplex()
+        is_peer = setup.mode == 'Peer'
+        if is_peer:
+            self._plc.be_full_duplex()
 
         def run(machine: Machine) -> Procedure:
             peer = FullDuplexPeer(
                 machine, PeerSettings(setup.check), ActiveStationList(), self._plc.serve)
             return peer.run(self._plc)
 
-        machine = Machine(run, checksum=setup.check, duplex=Duplex.FULL,
+        machine = Machine(run if is_peer else multidrop([self._plc]), checksum=setup.check,
+                          duplex=Duplex.FULL if is_peer else Duplex.HALF,
                           counters=self._plc.counters)
         self._link = LinkThread(machine, SerialEndpoint(PortSettings(setup.port, 19200)).open)
         self._link.start()
@@ -133,7 +141,7 @@ def wanted(values: Values, kind: ValueType) -> Values:
 
 
 class NodeEnd:
-    """The node in Mode Peer; its rows are Serve, or it asks station 1."""
+    """The node, in Mode Peer as a rule; its rows are Serve, or it asks station 1."""
 
     def __init__(self, setup: Setup) -> None:
         self._cases = {case.address: f'v{number}' for number, case in enumerate(setup.cases)}
@@ -145,10 +153,14 @@ class NodeEnd:
                 'Read' if case.is_structure else 'ReadWrite', THEIRS)
             rows.append(f'{tag},{command},{case.address},{station},{setup.family.value},'
                         f'{case.count},{"" if setup.serves else 500},{setup.access}')
+        if setup.share:
+            rows.append(f'beat,Heartbeat,{BEAT.address},{THEIRS},{setup.family.value},,200,')
         net = write_csv(
             setup.folder / 'net.csv',
-            'Mode,Station,PLC_Type,Error_Code,Com_Port,Baud,Timeout,Cmd_Timeout',
-            [f'Peer,{OURS},{setup.family.value},{setup.check.value},{setup.port},19200,500,3000'])
+            'Mode,Station,PLC_Type,Error_Code,Com_Port,Baud,Timeout,Cmd_Timeout,Share,'
+            'Share_Access',
+            [f'{setup.mode},{OURS},{setup.family.value},{setup.check.value},{setup.port},19200,'
+             f'500,5000,{setup.share},Write'])
         table = write_csv(
             setup.folder / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Period,Access',
             rows)
@@ -203,6 +215,10 @@ class NodeEnd:
     def _values(inbox: Inbox) -> Values:
         message = inbox[-1]
         return message.data if isinstance(message, String) else list(values_of(message))
+
+    def until_there(self, place: Path) -> None:
+        """Wait until a guest can connect."""
+        self._observer.until(place.exists, f'the place {place}')
 
     def _spin(self, seconds: float) -> None:
         end = time.monotonic() + seconds

@@ -51,6 +51,7 @@ from abdf1_ros.pccc.values import ValueType  # noqa: E402
 from cases import Case, CASES, same, Values  # noqa: E402
 from ethernet import ask, DuplexLine, EthernetPlc, serve  # noqa: E402
 from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, wanted  # noqa: E402
+from shared import share, Tally  # noqa: E402
 from support.ros import Process  # noqa: E402
 
 PATIENCE = 60.0  # s for an answer of a player
@@ -290,6 +291,15 @@ def carry_out(run: Run, save: Path | None) -> list[tuple[str, str, bool]]:
         return [server_case(ours, partner, case) for case in cases]
 
 
+def share_line(run: Run, mode: str, rounds: int) -> Tally:
+    """Let two programs of a product share the line of our node."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        ends = stack.enter_context(tapped(folder, None))
+        setup = Setup(run.family, run.check, '', (), folder, mode=mode)
+        return share(setup, ends, run.start, rounds, stack)
+
+
 def judge(run: Run, case: str) -> None:
     """Let conform judge who answers us, by all of its cases or by one."""
     with ExitStack() as stack:
@@ -473,6 +483,8 @@ def main() -> int:
     parser.add_argument('--python', default=sys.executable, help='that has the product')
     parser.add_argument('--conform', metavar='CASE', nargs='?', const='',
                         help='let conform judge those that answer us, by one case or all')
+    parser.add_argument('--share', metavar='ROUNDS', type=int,
+                        help='let two of them share the line of our node')
     parser.add_argument('--only', default='', help='only runs whose name has this in it')
     products = parser.add_subparsers(dest='product', required=True)
     products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
@@ -497,7 +509,12 @@ def main() -> int:
     for run in options.runs(options):
         if options.only not in run.text:
             continue
-        if options.conform is None:
+        if options.share is not None:
+            for mode in ('Peer', 'Master') if run.ours == 'plc' else ():
+                tally = share_line(run, mode, options.share)
+                print(f'{run.text}, {mode}: {tally}', flush=True)
+                all_good &= tally.is_good
+        elif options.conform is None:
             print(f'{run.text}:', flush=True)
             for address, text, good in carry_out(run, options.save):
                 print(f'  {"good" if good else "BAD "} {address:<10} {text}', flush=True)

@@ -88,6 +88,16 @@ def test_every_value_goes_to_and_fro(run: ModuleType) -> None:
     assert len(told) == len(run.CASES)
 
 
+def test_two_guests_share_the_line_of_a_node_at_work(run: ModuleType) -> None:
+    def start(setup: Any, port: str, stack: ExitStack) -> Client:
+        return Client(run, setup, port)
+
+    tally = run.share_line(
+        run.Run('ourselves', PlcType.SLC, Checksum.CRC, 'plc', start), 'Master', 20)
+    assert tally.is_good, tally
+    assert tally.right == 2 * 20 * 60
+
+
 @pytest.mark.parametrize('path', sorted((_HERE / 'players').glob('*.py')),
                          ids=lambda path: path.name)
 def test_players_are_programs_that_need_nothing_of_this_package(path: Path) -> None:

@@ -21,6 +21,7 @@ driver serves them), and the addresses.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 import ctypes
 import os
 from pathlib import Path
@@ -80,18 +81,24 @@ def main() -> None:
             raise OSError(f'dbGetField {name}')
         return value.value
 
+    def fail_where_invalid(places: Iterable[str], way: str) -> None:
+        for place in places:
+            if get(f'{records[place]}{way}.SEVR') >= INVALID:
+                raise OSError(f'{place}: STAT {get(f"{records[place]}{way}.STAT"):.0f}')
+
+    written: set[str] = set()
+
     def read(address: str, count: int) -> object:
         values = []
         if not places(address, count):
             raise Cannot('no strings, no whole structures, and B files stay undefined')
         time.sleep(SETTLE)
+        fail_where_invalid(written, 'O')  # a write may end after SETTLE
         for place in places(address, count):
-            name = records.get(place)
-            if name is None:
+            if place not in records:
                 raise Cannot(f'there is no record for {place}')
-            if get(f'{name}I.SEVR') >= INVALID:
-                raise OSError(f'{place}: STAT {get(f"{name}I.STAT"):.0f}')
-            values.append(get(f'{name}I.VAL'))
+            fail_where_invalid([place], 'I')
+            values.append(get(f'{records[place]}I.VAL'))
         return values if address.startswith('F') else [int(value) for value in values]
 
     def write(address: str, values: object) -> None:
@@ -105,9 +112,8 @@ def main() -> None:
                              ctypes.c_long(1)):
                 raise OSError(f'dbPutField {place}')
         time.sleep(SETTLE)
-        for place in places(address, len(values)):
-            if get(f'{records[place]}O.SEVR') >= INVALID:
-                raise OSError(f'{place}: STAT {get(f"{records[place]}O.STAT"):.0f}')
+        written.update(places(address, len(values)))
+        fail_where_invalid(written, 'O')
 
     time.sleep(SETTLE)
     play(read, write)

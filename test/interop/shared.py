@@ -1,0 +1,141 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Two guests of one product share the port of a node that reads, writes and beats meanwhile.
+
+Both have the same SRC and mostly the same TNS, and words of their own, so a reply that goes to the
+other one is a wrong value. Each value is looked at in the PLC and read again by its guest.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+import random
+from threading import Event
+import time
+from typing import Any
+
+from cases import Case, same, Values
+from ours import BEAT, NodeEnd, PlcEnd, Setup
+
+_GUESTS = Case('N7:0', [0.0] * 60, []), Case('N7:100', [0.0] * 60, [])
+_OURS = Case('N7:200', [1, 2, 3, 4], [4112, -1, 16, 0])
+_PATIENCE = 10.0  # s until words are written: AbDf1 does not say when
+_LONGEST_BEAT = 1.0  # s between two changes of a heartbeat of 200 ms, on a busy machine
+
+
+@dataclass(slots=True)
+class Tally:
+    """
+    What came of a run: values of guests that were right at both ends, and wrong ones.
+
+    ``failures`` are commands that the product gave up or was refused (AbDf1 tells nobody of a
+    refused write: the word is as it was, and it reads that), ``ours`` the values that ROS wrote
+    and read meanwhile, ``wrong_ours`` those that were wrong; ``longest_beat`` is in s.
+    """
+
+    right: int = 0
+    wrong: int = 0
+    failures: int = 0
+    ours: int = 0
+    wrong_ours: int = 0
+    beats: int = 0
+    longest_beat: float = 0.0
+
+    @property
+    def is_good(self) -> bool:
+        """Tell whether nobody got a wrong value, and all were at work."""
+        return bool(self.right and self.ours) and not self.wrong and not self.wrong_ours \
+            and self.longest_beat < _LONGEST_BEAT
+
+
+def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, ExitStack], Any],
+          rounds: int, stack: ExitStack) -> Tally:
+    """
+    Let two guests write and read values on a shared line.
+
+    ``setup`` has no port and no cases, ``lines`` are both ends of the line, ``start`` starts a
+    product at a port.
+    """
+    places = [setup.folder / name for name in ('one', 'two')]
+    plc = PlcEnd(replace(setup, port=lines[1], cases=(*_GUESTS, _OURS, BEAT)))
+    stack.callback(plc.close)
+    node = NodeEnd(replace(setup, port=lines[0], cases=(_OURS,),
+                           share=' '.join(f'pty:{place}' for place in places)))
+    stack.callback(node.close)
+    guests = []
+    for place, case in zip(places, _GUESTS):
+        node.until_there(place)
+        folder = place.with_suffix('.files')
+        folder.mkdir()
+        theirs = replace(setup, port=str(place), cases=(case,), folder=folder)
+        guests.append((start(theirs, str(place), stack), case))
+        stack.callback(guests[-1][0].close)
+    tally, ended = Tally(), Event()
+    with ThreadPoolExecutor() as pool:
+        work = [pool.submit(_work, guest, case, plc, rounds) for guest, case in guests]
+        watch = pool.submit(_watch, plc, tally, ended)
+        while not all(future.done() for future in work):
+            for values in (_OURS.before, _OURS.after):
+                node.give(_OURS, values)
+                good = same(values, plc.take(_OURS, values)) and same(
+                    values, node.take(_OURS, values))
+                tally.ours += good * _OURS.count
+                tally.wrong_ours += not good
+        ended.set()
+    watch.result()
+    counts = sum((future.result() for future in work), Counter())
+    return replace(tally, **counts)
+
+
+def _work(guest: Any, case: Case, plc: PlcEnd, rounds: int) -> Counter[str]:
+    """Write values of chance, look at them in the PLC, and read them again."""
+    chance = random.Random(case.address)
+    counts: Counter[str] = Counter()
+    for _ in range(rounds):
+        values: Values = [chance.choice((4112, chance.randrange(-32768, 32768)))
+                          for _ in range(case.count)]
+        before = plc.take(case, values)
+        if 'done' not in guest.write(case, values):
+            counts['failures'] += 1
+            continue
+        end = time.monotonic() + _PATIENCE
+        while not same(values, there := plc.take(case, values)) and time.monotonic() < end:
+            time.sleep(0.01)
+        answer = guest.read(case)
+        is_true = same(there, answer.get('values'))
+        if is_true and same(values, there):
+            counts['right'] += case.count
+        elif 'values' not in answer or is_true and all(
+                word in pair for word, *pair in zip(there, before, values)):
+            counts['failures'] += 1
+        else:
+            counts['wrong'] += case.count
+    return counts
+
+
+def _watch(plc: PlcEnd, tally: Tally, ended: Event) -> None:
+    """Measure the time between two beats."""
+    last, since = plc.take(BEAT, []), time.monotonic()
+    while not ended.wait(0.01):
+        now = time.monotonic()
+        if (value := plc.take(BEAT, [])) != last:
+            tally.longest_beat = max(tally.longest_beat, (now - since) * bool(tally.beats))
+            tally.beats += 1
+            last, since = value, now
