@@ -14,7 +14,7 @@
 
 """Text that is shown cannot pass for something else."""
 
-from abdf1_ros.text import by_number, printable
+from abdf1_ros.text import by_number, first, printable
 from hypothesis import given, strategies
 import pytest
 
@@ -51,3 +51,8 @@ def test_names_are_sorted_by_their_numbers() -> None:
     names = ['line10', 'line2', 'Line1', 'line2b', 'hall/3/press', 'hall/20/press', '7', 'x', '']
     assert sorted(names, key=by_number) == [
         '', '7', 'Line1', 'hall/3/press', 'hall/20/press', 'line2', 'line2b', 'line10', 'x']
+
+
+def test_of_many_names_the_first_are_shown_and_the_others_counted() -> None:
+    assert first(['a', 'b\n'], 2) == r'a, b\n'
+    assert first(['a', 'b', 'c', 'd'], 2) == 'a, b and 2 more'
