@@ -246,6 +246,7 @@ local f = {
   data = ProtoField.bytes('abdf1.data', 'After TNS'),
   request = ProtoField.framenum('abdf1.request', 'Answers', base.NONE, frametype.REQUEST),
   reply = ProtoField.framenum('abdf1.reply', 'Answered in', base.NONE, frametype.RESPONSE),
+  copy_of = ProtoField.framenum('abdf1.copy_of', 'Sent on, or again: is that of'),
   latency = ProtoField.relative_time('abdf1.latency', 'After its command'),
 }
 df1.fields = {}
@@ -258,7 +259,10 @@ df1.experts = {bad_check, refused}
 
 -- Commands that wait for their reply, and what was found at the first pass, by packet.
 local open, found = {}, {}
-function df1.init() open, found = {}, {} end
+-- By radio modem there are no symbols: messages by their bytes, and whether a symbol was seen.
+local heard, has_symbols = {}, false
+local MEMORY = 10  -- s after which the same message is another
+function df1.init() open, found, heard, has_symbols = {}, {}, {}, false end
 
 -- Take the bytes of a message out of what stood on the line (from index at): STN, link data, the
 -- check bytes, and whether DLE ETX was there.
@@ -491,7 +495,12 @@ local function message(data, range, tree, pinfo, is_good)
     tree:add_proto_expert_info(refused, text)
   end
   if is_good then
-    if not pinfo.visited then
+    local whole = table.concat(data, ' ')
+    local first = not has_symbols and heard[whole]
+    if not pinfo.visited and first and pinfo.abs_ts - first.time < MEMORY then
+      found[pinfo.number] = {copy = first.number}
+    elseif not pinfo.visited then
+      heard[whole] = {number = pinfo.number, time = pinfo.abs_ts}
       local key = is_reply and string.format('%d %d %d', dst, src, tns)
         or string.format('%d %d %d', src, dst, tns)
       if not is_reply then
@@ -511,6 +520,9 @@ local function message(data, range, tree, pinfo, is_good)
       text = (text == '' and 'done, ' or text .. ', to ') .. known.text
     elseif known and known.reply then
       tree:add(f.reply, range, known.reply)
+    elseif known and known.copy then
+      tree:add(f.copy_of, range, known.copy)
+      text = text .. (text == '' and '' or ', ') .. 'as packet ' .. known.copy
     end
   end
   return is_reply and 'reply' or 'command', string.format(
@@ -553,6 +565,7 @@ function df1.dissector(tvb, pinfo, root)
     text = 'station ' .. bytes[3]
   elseif SYMBOLS[bytes[2]] then
     kind = SYMBOLS[bytes[2]]
+    has_symbols = true
     if bytes[2] ~= ENQ and bytes[2] ~= 0x06 and bytes[2] ~= 0x15 and bytes[2] ~= 0x04 then
       kind = 'unknown'
     end

@@ -39,7 +39,8 @@ from support.vectors import load_json, VECTORS
 _SCRIPT = Path(__file__).resolve().parents[2] / 'wireshark' / 'abdf1.lua'
 _FIELDS = (
     'direction', 'kind', 'check', 'valid', 'computed', 'station', 'dst', 'src', 'sts', 'tns',
-    'code', 'data', 'command', 'address', 'status', 'request', 'latency')
+    'code', 'data', 'command', 'address', 'status', 'request', 'latency',
+    'copy_of')
 _ADDRESSED = (
     '00', '01', '02', '05', '08', '0F/00', '0F/01', '0F/02', '0F/04', '0F/26', '0F/67', '0F/68',
     '0F/A1', '0F/A2', '0F/A9', '0F/AA', '0F/AB')
@@ -119,6 +120,23 @@ def test_dissector_tells_every_capture_as_we_do(tmp_path: Path) -> None:
     told = assert_all_same(tmp_path / 'line.pcapng', entries)
     assert sum(bool(fields['abdf1.request']) for fields in told) >= sum(
         entry.latency is not None for entry in entries)
+
+
+def test_by_radio_a_copy_is_that_of_the_first_and_a_reply_answers_that(tmp_path: Path) -> None:
+    capture, = (entry for entry in CAPTURES if entry.name.startswith('radio'))
+    entries = [entry for entry in capture.entries if entry.wire]
+    told = dissected(tmp_path / 'line.pcapng', entries)
+    copies = [fields for fields in told if fields['abdf1.copy_of']]
+    assert len(copies) == 43
+    for fields, entry in zip(told, entries):
+        assert bool(fields['abdf1.copy_of']) is bool(entry.marks)
+        assert bool(fields['abdf1.latency']) is (entry.latency is not None)
+        if entry.latency is not None:
+            assert float(fields['abdf1.latency']) == pytest.approx(entry.latency, abs=1e-5)
+    for fields in copies:
+        first = told[int(fields['abdf1.copy_of']) - 1]
+        assert [fields[f'abdf1.{name}'] for name in ('dst', 'src', 'tns', 'data')] == [
+            first[f'abdf1.{name}'] for name in ('dst', 'src', 'tns', 'data')]
 
 
 def test_every_frame_of_the_vectors(tmp_path: Path) -> None:
