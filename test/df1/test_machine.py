@@ -249,7 +249,6 @@ def test_procedure_that_does_not_send_its_reflex_is_a_bug_until_the_next_start()
     for step, error in ((Step(NAK, 1.0), pytest.raises(AssertionError)),
                         (Step(None, 1.0), nullcontext())):
         bench = Bench(Step(FRAME, 1.0, reflex=eot_on_ack), step)
-        bench.machine.start(0.0)
         bench.machine.data_to_send()
         with error:
             bench.machine.receive_data(ACK, 0.5)
