@@ -44,7 +44,7 @@ def cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[:max(width - 3, 0)] + '...'[:width]
 
 
-def first(names: Sequence[str], most: int) -> str:
+def first(names: Sequence[str], most: int = 5) -> str:
     """Return names as text, ``most`` of them; how many more there are is counted."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return printable(', '.join(names[:most])) + more

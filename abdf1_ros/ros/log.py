@@ -24,7 +24,7 @@ disk.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 import traceback
@@ -54,17 +54,13 @@ _MINUTE = 60.0
 _PAUSE = 1.0
 _LONGEST = 10.0
 
-_MOST_NAMES = 5
+# So many wait to be told at most; what is in none of them is in /diagnostics.
+_MOST_ROWS = 10_000
 
 # Events of every transaction, and those that come with another event that is logged.
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
-
-
-def few(names: Sequence[str]) -> str:
-    """Return names as text, the first of them where there are many."""
-    return first(names, _MOST_NAMES)
 
 
 def where(mapping: Mapping) -> str:
@@ -207,28 +203,33 @@ class UnreadableRows:
 
     def __init__(self, log: LimitedLog) -> None:
         self._log = log
-        self._rows: deque[tuple[float, Mapping, str]] = deque()
+        self._rows: dict[tuple[Mapping, str], None] = {}  # and reasons, in their order
+        self._first = self._last = 0.0
 
     def add(self, now: float, mapping: Mapping, reason: str) -> None:
         """Take note of a row without a value at the clock value ``now`` (s)."""
-        self._rows.append((now, mapping, reason))
+        if len(self._rows) < _MOST_ROWS:
+            self._last = now
+            self._first = self._first if self._rows else now
+            self._rows[mapping, reason] = None
 
     def look(self, now: float) -> None:
         """Tell when no row has come for a while, or the first has waited for long."""
-        if self._rows and (now - self._rows[-1][0] >= _PAUSE or
-                           now - self._rows[0][0] >= _LONGEST):
+        if self._rows and (now - self._last >= _PAUSE or now - self._first >= _LONGEST):
             self.tell()
 
     def tell(self) -> None:
         """Write the entries."""
-        groups: defaultdict[tuple[int, Area, str], list[Mapping]] = defaultdict(list)
-        with suppress(IndexError):  # until it is empty; another thread may do the same
+        found = []
+        with suppress(KeyError):  # until it is empty; another thread may do the same
             while True:
-                _, mapping, reason = self._rows.popleft()
-                groups[mapping.station, mapping.address.area, reason].append(mapping)
+                found.append(self._rows.popitem()[0])
+        groups: defaultdict[tuple[int, Area, str], list[Mapping]] = defaultdict(list)
+        for mapping, reason in reversed(found):
+            groups[mapping.station, mapping.address.area, reason].append(mapping)
         for (station, _, reason), rows in groups.items():
             rows.sort(key=lambda row: row.address.offset)
-            about, first = rows[0].tag, rows[0].address
+            about, begin = rows[0].tag, rows[0].address
             self._log.error(about, f'{where(rows[0])}: {reason}' if len(rows) == 1 else (
-                f'{len(rows)} rows from {first} to {rows[-1].address} at station {station} '
-                f'({few([row.tag for row in rows])}): {reason}'))
+                f'{len(rows)} rows from {begin} to {rows[-1].address} at station {station} '
+                f'({first([row.tag for row in rows])}): {reason}'))

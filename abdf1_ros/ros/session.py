@@ -44,7 +44,7 @@ from abdf1_ros.ros.diagnostics import changed_text, deaf_text, Diagnostics
 from abdf1_ros.ros.graph import DuplicateNameWatch, Graph, TypeWatch
 from abdf1_ros.ros.interlocks import InterlockWatch, wait_for_end
 from abdf1_ros.ros.line_figures import speed_seen
-from abdf1_ros.ros.log import EventLog, few, LimitedLog, UnreadableRows, where
+from abdf1_ros.ros.log import EventLog, LimitedLog, UnreadableRows, where
 from abdf1_ros.ros.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.parameters import Configuration
 from abdf1_ros.ros.reads import ReadTopic, ReadTopics
@@ -55,7 +55,7 @@ from abdf1_ros.ros.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
-from abdf1_ros.text import printable
+from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -189,7 +189,7 @@ class Session:
         """
         tags = wait_for_end(self.driver, self._surroundings.link, give_up)
         if tags:
-            self._logger.error(f'{what} before the PLC has confirmed: {few(tags)}')
+            self._logger.error(f'{what} before the PLC has confirmed: {first(tags)}')
 
     def _wake_link(self) -> None:
         self._surroundings.link.wake()
@@ -216,7 +216,7 @@ class Session:
             guest.collisions += 1
             self.notes.warning(
                 f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
-                f'{describe(command)}, words of {few([row.tag for row in rows])}')
+                f'{describe(command)}, words of {first([row.tag for row in rows])}')
 
     def _guest_refused(self, guest: Guest, command: Packet) -> None:
         if guest.refused == 1:
@@ -245,13 +245,13 @@ class Session:
                   if mapping.heartbeat or mapping.fallback]
         if silent and configuration.parameters.read_only:
             self._logger.warning(
-                f'read_only: no heartbeat and no fallback value is written: {few(silent)}')
+                f'read_only: no heartbeat and no fallback value is written: {first(silent)}')
         if not configuration.mappings:
             self._logger.warning('the map has no usable row: nothing is read or written')
         if configuration.ignored:
             self._logger.warning(
                 'parameters without effect, as the map comes from its file alone: '
-                + few(configuration.ignored))
+                + first(configuration.ignored))
 
     # Writes
 

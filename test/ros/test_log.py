@@ -238,7 +238,7 @@ def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
     rows = UnreadableRows(lines)
     for now, address, station, reason in (
             (0.0, 'N7:5', 1, 'no'), (0.9, 'N7:2', 1, 'no'), (1.0, 'N7:1', 2, 'no'),
-            (1.1, 'N7:3', 1, 'never'), (1.2, 'N9:3', 1, 'no')):
+            (1.1, 'N7:3', 1, 'never'), (1.2, 'N9:3', 1, 'no'), (1.2, 'N7:5', 1, 'no')):
         rows.look(now)
         rows.add(now, make_mapping(address, station=station, tag=address), reason)
     rows.look(2.1)
