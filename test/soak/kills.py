@@ -211,18 +211,22 @@ class Cell:
         self.publisher.stdin.flush()
 
     def take_control(self) -> None:
-        """Bring all to work: bridge, publisher, a reset of the PLC, and a speed of 800."""
+        """
+        Bring all to work: bridge, publisher, a reset of the PLC, and commands of 800.
+
+        A busy machine may take control away at once, as nobody answers for longer than Timeout.
+        """
         if self.bridge is None or self.bridge.poll() is not None:
             self.start_bridge()
         if self.publisher is None or self.publisher.poll() is not None:
             self.start_publisher()
         self.wait(lambda: self.ladder.is_on(Lamp.ALIVE), 'a heartbeat')
         give_up = time.monotonic() + 60
-        while not self.ladder.is_on(Lamp.IN_CONTROL) and time.monotonic() < give_up:
+        while self.used() != {800} and time.monotonic() < give_up:
+            self.publish(800 * self.ladder.is_on(Lamp.IN_CONTROL))
             self.ladder.press_reset()
             self.rest(0.3)
-        self.publish(800)
-        self.wait(lambda: self.used() == {800}, 'the commands')
+        self.wait(lambda: self.used() == {800}, 'the commands', 1.0)
 
     def until_fallen(self, is_written: bool) -> float:
         """
@@ -230,10 +234,11 @@ class Cell:
 
         ``is_written``: not before the bridge has written the fallback values.
         """
-        self.wait(lambda: self.used() == {0}, 'the outputs to fall back')
-        fallen = next(at for at, is_on in reversed(self.in_control) if not is_on)
+        # The lamp is told at the end of the scan in which the outputs fall.
+        self.wait(lambda: not self.in_control[-1][1] and self.used() == {0},
+                  'the outputs to fall back')
         if not is_written or self.written() == {0}:
-            return fallen
+            return self.in_control[-1][0]
         self.wait(lambda: self.written() == {0}, 'the fallback values')
         return time.monotonic()
 
@@ -381,6 +386,8 @@ def run(cell: Cell, name: str, scan_time: float, seen: Seen) -> None:
     cell.ladder.scan_time = scan_time
     cell.take_control()
     cell.rest(cell.dice.uniform(0.0, PERIOD))
+    if cell.used() != {800}:
+        cell.take_control()
     cell.died = time.monotonic()
     death.kill(cell)
     seen.times.append(round(max(0.0, cell.until_fallen(death.is_written) - cell.died), 3))
@@ -391,20 +398,21 @@ def run(cell: Cell, name: str, scan_time: float, seen: Seen) -> None:
 
 
 def run_all(names: list[str], rounds: int, seed: int) -> tuple[dict[str, Seen], str]:
-    """Run deaths in a cell; return what was seen, and what went wrong, empty for nothing."""
-    found = {name: Seen([]) for name in names}
-    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
-        cell = Cell(Path(folder), Random(seed))
-        try:
-            for name, seen in found.items():
+    """Run deaths, each in a cell; return what was seen, and what went wrong, empty for nothing."""
+    found, wrong, dice = {name: Seen([]) for name in names}, [], Random(seed)
+    for name, seen in found.items():
+        with tempfile.TemporaryDirectory(prefix='abdf1_') as folder:
+            cell = Cell(Path(folder), dice)
+            try:
                 for number in range(rounds):
                     run(cell, name, SCAN_TIMES[(seed + number) % len(SCAN_TIMES)], seen)
-                print(seen.row(name), file=sys.stderr, flush=True)
-        except SystemExit as error:
-            return found, f'seed {seed}, {name}: {error}'
-        finally:
-            cell.close()
-    return found, ''
+            except SystemExit as error:
+                wrong.append(f'seed {seed}, {name}: {error}')
+            finally:
+                cell.close()
+        if seen.times:
+            print(seen.row(name), file=sys.stderr, flush=True)
+    return found, '; '.join(wrong)
 
 
 def run_side_by_side(arguments: list[str], processes: int, seed: int
