@@ -193,11 +193,13 @@ def test_heartbeats_go_before_guests() -> None:
     rows = [make_mapping(f'N{20 + row}:0', plc='SLC', period=1) for row in range(6)]
     bench = DriverBench([beat, *rows], network=Network(baud=19200, timeout=200))
     plc = bench.plc(1, 'SLC', ('N10:0', 4), *((f'N{20 + row}:0', 4) for row in range(6)))
-    for number in range(5):
+    for number in range(10):
         Program(bench, src=20 + number).keep_asking(READ_N7)
+    flood = Program(bench)
     changes, last = [], b''
     for _ in range(2000):
         bench.driver.interlocks.executor_ran(bench.clock())
+        flood.ask(READ_N7)
         bench.run(0.005)
         if (now := stored(plc, 'N10:0')) != last:
             changes.append(bench.clock())
