@@ -64,7 +64,8 @@ def test_file_of_a_package_that_no_index_knows(
         Path(sys.prefix) / 'share' / 'abdf1_ros' / 'config' / 'net.csv'
 
 
-def test_file_without_ros(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_installed_file_is_found_without_ros(
+        installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'ament_index_python', None)
     monkeypatch.setitem(sys.modules, 'ament_index_python.packages', None)
     assert paths.config_file('map.csv').parts[-4:] == ('share', 'abdf1_ros', 'config', 'map.csv')

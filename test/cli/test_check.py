@@ -132,7 +132,8 @@ def test_files_in_the_wrong_order_are_told_once_each(
     assert ['is this the right file?' in line for line in told] == [True, True]
 
 
-def test_json_of_errors(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_errors_names_place_and_number_of_each(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     assert check(files, '5,Mastr,9600,500', BAD_ROWS[:1], '--json') == 2
     content = parsed(capsys)
     mode, address = content['errors']
@@ -341,7 +342,8 @@ def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert lines['press']['blocks'][0]['tags'] == ['speed']
 
 
-def test_folder_without_lines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_without_lines_is_refused(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path)]) == 2
     assert 'no files NAME_net.csv and NAME_map.csv' in capsys.readouterr().out
 

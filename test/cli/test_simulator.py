@@ -255,7 +255,8 @@ def test_command_for_later_is_looked_at_before(
     assert text in _refused(capsys, '--data', str(data), '--at', f'5 {command}')
 
 
-def test_bad_data_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_faults_of_a_data_file_are_told_with_their_cells(
+        capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / 'data.csv'
     path.write_text(DATA + '3,PLC7,N7:0,,,,\n3,SLC,Q7:0,,,,\n', encoding='utf-8')
     assert _refused(capsys, '--data', str(path)).splitlines() == [
@@ -265,7 +266,7 @@ def test_bad_data_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> No
         'A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
 
 
-def test_missing_data_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_data_file_that_is_missing_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert _refused(capsys, '--data', '/nowhere') == \
         'simulator: /nowhere: cannot be read: No such file or directory\n'
 
@@ -279,7 +280,8 @@ def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None
 
 @pytest.mark.parametrize('where', [
     '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80'])
-def test_bad_tcp_port(capsys: pytest.CaptureFixture[str], data: Path, where: str) -> None:
+def test_tcp_that_is_not_host_and_port_is_refused(
+        capsys: pytest.CaptureFixture[str], data: Path, where: str) -> None:
     assert _refused(capsys, '--data', str(data), '--tcp', where) == \
         f'simulator: --tcp "{where}" should be HOST:PORT\n'
 
@@ -304,15 +306,21 @@ def test_link_of_somebody_else_is_left_alone(
 def test_two_simulators_do_not_share_a_name(
         capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
     name = tmp_path / 'plc'
-    simulator = start('--pty', str(name))
-    simulator.line()
+    start('--pty', str(name)).line()
     before = os.readlink(name)
     assert _refused(capsys, '--data', str(data), '--pty', str(name), status=1) == \
         f'simulator: {name} is in use by another simulator or sniff\n'
     assert os.readlink(name) == before
+
+
+def test_name_that_a_killed_simulator_left_is_taken_by_the_next_and_removed(
+        capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
+    name = tmp_path / 'plc'
+    killed = start('--pty', str(name))
+    killed.line()
     held = os.open(name, os.O_RDWR | os.O_NOCTTY)  # no other simulator is to get this number
-    simulator.signal(signal.SIGKILL)
-    simulator.end()
+    killed.signal(signal.SIGKILL)
+    killed.end()
     assert os.path.lexists(name)
     again = start('--pty', str(name))
     assert again.line().startswith('simulator: stations')

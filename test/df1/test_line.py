@@ -249,7 +249,8 @@ STORM = Noise(lost=0.1, flipped=0.1, doubled=0.1, inserted=0.1)
 @pytest.mark.parametrize(('noise', 'seed', 'count', 'chunk', 'good'), [
     (LIGHT, 11, 600, 1, 0.98), (LIGHT, 12, 1000, 14, 0.98), (HEAVY, 13, 600, 1, 0.2),
     (HEAVY, 14, 1000, 14, 0.2), (STORM, 15, 500, 1, 0.0)])
-def test_noise_with_crc(noise: Noise, seed: int, count: int, chunk: int, good: float) -> None:
+def test_noise_with_crc_costs_replies_and_no_exchange_is_wrong(
+        noise: Noise, seed: int, count: int, chunk: int, good: float) -> None:
     rig = Rig(Checksum.CRC, seed, chunk=chunk)
     rig.line.noise = noise
     for _ in range(count):
@@ -265,7 +266,7 @@ def test_noise_with_crc(noise: Noise, seed: int, count: int, chunk: int, good: f
 
 
 @pytest.mark.parametrize(('noise', 'seed', 'count'), [(LIGHT, 21, 600), (HEAVY, 22, 600)])
-def test_noise_with_bcc(noise: Noise, seed: int, count: int) -> None:
+def test_noise_with_bcc_executes_no_command_twice(noise: Noise, seed: int, count: int) -> None:
     rig = Rig(Checksum.BCC, seed)
     rig.line.noise = noise
     for _ in range(count):

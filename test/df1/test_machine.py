@@ -541,7 +541,7 @@ def test_wake_disturbs_no_transaction(step: Step) -> None:
     assert (bench.got, bench.machine.deadline) == ([], deadline)
 
 
-def test_rest_is_deaf() -> None:
+def test_what_comes_during_a_rest_is_not_heard() -> None:
     bench = Bench(Step(None, 1.0), Step(FRAME, 1.0), forget_on_send=True)
     bench.machine.receive_data(ACK, 0.5)
     bench.machine.handle_timeout(1.0)

@@ -127,7 +127,7 @@ def test_only_a_reply_of_the_polled_slave_has_its_ack_before_it_is_looked_at(hea
     assert 0 not in looked_at
 
 
-def test_normal_with_bcc() -> None:
+def test_command_and_reply_carry_a_bcc_where_that_is_set() -> None:
     script = MasterScript(replace(SETTINGS, checksum=Checksum.BCC))
     reply = script.run(
         COMMAND, Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.BCC)), SAYS_ACK,
@@ -475,7 +475,7 @@ def test_message_instead_of_an_ack_is_no_ack() -> None:
     assert 'messages_received' in script.counts()
 
 
-def test_wrong_command_code() -> None:
+def test_reply_with_a_wrong_command_code_fails_the_command_alone() -> None:
     script = MasterScript(SETTINGS)
     error = script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(REPLY._replace(cmd=0x41)), ACKED)
     assert isinstance(error, WrongCommandCode)
@@ -561,7 +561,7 @@ def test_reply_with_an_error_status_is_a_reply() -> None:
     assert script.counts() == REPLIED | {'error_messages_received': 1}
 
 
-def test_message_too_short() -> None:
+def test_message_too_short_is_told_and_polled_for_again() -> None:
     script = MasterScript(SETTINGS)
     short = Answer(message_frame(b'abcde', Checksum.CRC))
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, short, POLLED, SAYS_REPLY, ACKED) == REPLY
@@ -570,7 +570,7 @@ def test_message_too_short() -> None:
     assert script.counts()['messages_received'] == 1
 
 
-def test_message_too_long() -> None:
+def test_message_too_long_is_told_and_polled_for_again() -> None:
     script = MasterScript(SETTINGS)
     long = Answer(message_frame(bytes(262), Checksum.CRC))
     assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY, ACKED) == REPLY

@@ -253,7 +253,7 @@ def test_line_that_goes_and_comes_again(mode: str) -> None:
 
 
 @pytest.mark.parametrize('mode', MODES)
-def test_noise_with_bcc(mode: str) -> None:
+def test_noise_with_bcc_executes_no_command_twice(mode: str) -> None:
     rig = Rig(mode, noise=noise_of(1e-3), seed=7, checksum=Checksum.BCC)
     rig.run(20)
     for src, node in rig.nodes.items():

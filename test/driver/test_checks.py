@@ -382,7 +382,7 @@ def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
 
 
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
-def test_counters_on_request(network: Network) -> None:
+def test_counters_are_read_once_for_each_request_and_never_else(network: Network) -> None:
     bench, (plc,), (ears,) = make_bench(word(), network=network, run=2.0)
     assert ears.times(COUNTERS) == []
     bench.driver.request_counters(1)

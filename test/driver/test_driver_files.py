@@ -51,7 +51,8 @@ READ_ONLY = [
 
 
 @for_all(('plc', 'text', 'length', 'values'), WRITABLE + READ_ONLY)
-def test_value_is_read(plc: str, text: str, length: int, values: list[float] | str) -> None:
+def test_value_of_each_file_type_is_read(
+        plc: str, text: str, length: int, values: list[float] | str) -> None:
     mapping = make_mapping(text, plc=plc, length=length)
     bench = DriverBench([mapping])
     store(bench.plc(1, plc, *FILES[plc]), text, values)

@@ -235,7 +235,7 @@ def test_values_for_served_words_are_checked() -> None:
 
 
 @pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
-def test_served_engineering_values(family: str) -> None:
+def test_served_values_are_scaled_both_ways_and_keep_their_limits(family: str) -> None:
     mapping = serve_row('N7:50', family, 2, scaling=Scaling(0.5, -10.0), maximum=100.0)
     bench = Bench([mapping], family=family)
     bench.start()
@@ -250,7 +250,8 @@ def test_served_engineering_values(family: str) -> None:
 
 @pytest.mark.parametrize('family', ['PLC5', 'SLC'])
 @pytest.mark.parametrize('outstanding', [1, 3])
-def test_everything_at_once(family: str, outstanding: int) -> None:
+def test_nothing_is_lost_or_mixed_up_when_everything_happens_at_once(
+        family: str, outstanding: int) -> None:
     read = make_mapping('N7:0', plc=family, length=10, period=0)
     others = [make_mapping(f'N7:{60 + 60 * n}', plc=family, period=0) for n in range(3)]
     write = make_mapping('N9:0', 'Write', plc=family, length=2)
@@ -293,7 +294,7 @@ def test_more_outstanding_commands_do_not_mix_up_blocks() -> None:
         assert {tuple(entry) for entry in values} == {(number, 100 + number)}
 
 
-def test_dead_line_and_recovery() -> None:
+def test_dead_line_fails_reads_and_writes_and_all_goes_on_when_it_is_back() -> None:
     read, write = make_mapping(), make_mapping('N7:5', 'Write')
     pushed = serve_row('N7:50')
     bench = Bench([read, write, pushed])

@@ -171,7 +171,7 @@ def test_broadcast_row_is_written_to_every_station(polling: str) -> None:
 
 
 @BOTH
-def test_broadcast_row_alone(polling: str) -> None:
+def test_broadcast_is_written_where_nobody_is_polled(polling: str) -> None:
     everybody = make_mapping('N7:0', 'Write', station=BROADCAST)
     bench = DriverBench([everybody], network=network(polling))
     plc = bench.plc(1, 'PLC5', *FILES)

@@ -148,7 +148,7 @@ def test_word_written_to_the_master_itself() -> None:
     assert [packet.src for packet in bench.master.served] == [US]
 
 
-def test_broadcast_of_ours() -> None:
+def test_broadcast_of_ours_reaches_everybody_and_ourselves() -> None:
     write = make_mapping('N7:10', 'Write', station=BROADCAST, plc='SLC')
     words = serve_row('N7:10')
     bench = Bench([write, words])

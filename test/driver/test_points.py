@@ -279,7 +279,7 @@ def test_limits_hold_for_every_element(values: list[float], error: str | None) -
     assert str(caught.value) == error
 
 
-def test_one_limit_alone() -> None:
+def test_min_without_max_limits_one_side_only() -> None:
     low = make_mapping(command='Write', minimum=0)
     Write(low, [32767], 0.0)
     with pytest.raises(FormatError, match='^value -1 at index 0 is outside Min 0, Max inf$'):
@@ -388,7 +388,7 @@ def test_result_of_a_write() -> None:
     ([4294967295], '[4294967295]'), (array('f', [1234567, 0.3]), '[1234567, 0.3]'),
     (list(range(16)), str(list(range(16)))),
     (list(range(18)), str(list(range(16)))[:-1] + ', and 2 more]')])
-def test_values_as_text(values: list[float] | str, text: str) -> None:
+def test_values_are_shown_short_and_exact(values: list[float] | str, text: str) -> None:
     assert show(values) == text
 
 

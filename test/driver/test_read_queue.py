@@ -121,14 +121,14 @@ def test_nothing_goes_before_it_is_due() -> None:
     assert [queue.take(5.0), queue.take(5.0), queue.next_due()] == [job, other, None]
 
 
-def test_schedule_by_hand() -> None:
+def test_starts_are_those_of_a_schedule_made_by_hand() -> None:
     # 40 ms each: one every 100 ms, one every 200 ms, one every 400 ms, 70 % of the line.
     found = starts({100: 1, 200: 1, 400: 1}, 0.79, took=0.04)
     at = [[round(1000 * time) for time in times] for times in found.values()]
     assert at == [[0, 120, 200, 300, 400, 520, 600, 700], [40, 240, 440, 640], [80, 480]]
 
 
-def test_schedule_by_hand_of_a_line_that_is_too_slow() -> None:
+def test_starts_on_a_line_that_is_too_slow_are_those_of_a_schedule_made_by_hand() -> None:
     # 125 ms each: one every 125 ms, one every 250 ms, 150 % of the line.
     fast, slow = starts({125: 1, 250: 1}, 1.49, took=0.125).values()
     assert [round(8 * time) for time in fast] == [0, 1, 3, 4, 6, 7, 9, 10]

@@ -309,7 +309,7 @@ def test_string_is_served_and_read_in_whole_elements(plc: str) -> None:
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
-def test_string_over_words(plc: str) -> None:
+def test_string_over_words_is_served_byte_by_byte(plc: str) -> None:
     mapping = row('A10:1', plc, 3, 'string')
     bench = Bench(plc, mapping)
     bench.served.store(mapping, 'abc')
@@ -320,7 +320,7 @@ def test_string_over_words(plc: str) -> None:
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
-def test_high_word_first(plc: str) -> None:
+def test_high_word_is_served_first_where_the_row_says_so(plc: str) -> None:
     mapping = row('N7:50', plc, kind='int32', word_order='High')
     bench = Bench(plc, mapping)
     bench.served.store(mapping, [0x10002])

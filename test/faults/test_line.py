@@ -191,7 +191,7 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
     ('delay 2 300', 'written'),
     # Not sent, where two reads before it were too late already.
     ('delay 2 3000', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
-def test_station_is_slow(line: Boxed, fault: str, text: str) -> None:
+def test_station_that_is_slow_fails_alone(line: Boxed, fault: str, text: str) -> None:
     rig, _ = line
     rig.simulator.say(fault)
     assert text in rig.write(3.0)

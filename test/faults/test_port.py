@@ -56,7 +56,7 @@ def test_device_vanishes_and_returns(
         assert rig.has_read_only(SETPOINT, 3.0)
 
 
-def test_port_is_busy(observer: Observer, tmp_path: Path) -> None:
+def test_port_that_is_busy_is_opened_when_it_is_free(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path)
     simulator = files.start_simulator()
     other = open_port(PortSettings(str(files.port)))

@@ -207,7 +207,8 @@ def losing_ack(receiver: str, word: bytes) -> tuple[Callable[[str, bytes], bytes
     return pass_on, lost
 
 
-def test_polls_stay_away(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_write_is_not_sent_by_a_slave_that_nobody_polls(
+        observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> None:
     with two_nodes(observer, tmp_path_factory.mktemp('line'), 'poll_timeout:=1.0') as line:
         line.master.node.send(signal.SIGSTOP)
         line.slave.status('mappings', ERROR, '1 failed')

@@ -174,7 +174,7 @@ def test_together_the_periods_may_be_too_short_though_none_is() -> None:
 
 
 @pytest.mark.parametrize('period, warned', [(90, True), (95, False)])
-def test_little_time_left(period: int, warned: bool) -> None:
+def test_load_above_80_percent_is_warned_of(period: int, warned: bool) -> None:
     # 75.2 ms are 84 % of 90 ms and 79 % of 95 ms.
     report = report_of(make_mapping('N7:0', length=2, period=period))
     assert bool(texts(report, RemarkKind.LOAD)) is warned

@@ -34,7 +34,7 @@ def texts(*mappings: Mapping, network: Network = PEER) -> list[str]:
     return [str(problem) for _, problem in line_problems(mappings, network)]
 
 
-def test_rows_that_fit() -> None:
+def test_rows_that_fit_are_not_remarked() -> None:
     assert texts(row('N7:50', length=4), row('N7:52', length=9), row('B3:5/0', length=8),
                  make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', plc='SLC')) == []
 

@@ -253,7 +253,7 @@ def test_station_before_its_first_answer(bench: Bench) -> None:
         'processor': 'unknown (not asked yet)', 'mode': 'unknown', 'faults': 'unknown'}
 
 
-def test_station_that_answers(bench: Bench) -> None:
+def test_station_that_answers_is_ok_and_tells_its_last_answer(bench: Bench) -> None:
     bench.driver.stations.heard(1, NOW - 0.3)
     station = bench.driver.stations[1]
     station.last_tns, station.replies, station.remote_errors = 0xAB, 4, 1
@@ -391,7 +391,7 @@ def test_tag_does_not_stand_in_for_a_count(make_bench: Callable[..., Bench]) -> 
     assert values['tag total'] == 'waiting for the first read: N7:0 at station 1, never read'
 
 
-def test_map_without_reads(make_bench: Callable[..., Bench]) -> None:
+def test_map_without_reads_is_ok(make_bench: Callable[..., Bench]) -> None:
     assert make_bench(ROWS[2]).says('mappings') == (OK, 'OK: no mapping reads')
 
 

@@ -46,7 +46,7 @@ def test_bad_file_as_a_whole() -> None:
         load_text('Tag,Adress\na,N7:0\n')
 
 
-def test_same_tag_twice() -> None:
+def test_tags_that_become_one_name_are_refused() -> None:
     assert faults(row(Tag='Tank.Level'), row(Tag='Tank Level', Topic='other')) == [
         '3:1 (Tag): Item: 2, tag "Tank Level" becomes "Tank_Level", the name of item 1 (line 2,'
         ' tag "Tank.Level")']

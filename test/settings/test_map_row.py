@@ -280,7 +280,8 @@ def test_string_over_words_counts_words(address: str, plc: str) -> None:
     {'Address': 'B3:0', 'Type': 'float32'}, {'Address': 'D9:0', 'Type': 'float32'},
     {'Address': 'S:0', 'Type': 'int32'}, {'Address': 'A9:0', 'Type': 'int32'},
     {'Address': 'O:001', 'Type': 'uint32', 'Command': 'Serve'}])
-def test_high_word_first(cells: dict[str, str]) -> None:
+def test_word_order_is_high_where_the_cell_says_so_and_low_without_it(
+        cells: dict[str, str]) -> None:
     mapping = one(Word_Order='high', **cells)
     assert mapping.word_order is mapping.codec.word_order is WordOrder.HIGH
     assert mapping.cell('Word_Order') == 'High'
@@ -305,7 +306,8 @@ def test_word_order_of_what_has_none(cells: dict[str, str], kind: str) -> None:
     ({'Scale': '-2', 'Offset': '1e3'}, Scaling(-2.0, 1000.0)),
     ({'Scale': '"0,25"', 'Offset': '0'}, Scaling(0.25, 0.0)),
     ({'Scale': '1'}, Scaling(1.0, 0.0)), ({}, None)])
-def test_scale_and_offset(cells: dict[str, str], scaling: Scaling | None) -> None:
+def test_scale_or_offset_make_the_message_float32(
+        cells: dict[str, str], scaling: Scaling | None) -> None:
     mapping = one(**cells)
     assert mapping.scaling == scaling
     assert mapping.type is ValueType.INT16
@@ -342,7 +344,8 @@ def test_scale_and_offset_that_do_not_go(cells: dict[str, str], expected: str) -
     ('PLC2', '020', 'uint16', '020'), ('plc2', '110/17', 'bool', '110/17'),
     ('PLC3', 'E3.1.8.10.0.5', 'uint16', 'B10:5'), ('PLC3', 'N7:0', 'int16', 'N7:0'),
     ('PLC3', 'T:4.ACC', 'int16', 'T:4.ACC'), ('PLC3', 'I:17/7', 'bool', 'I:0017/07')])
-def test_plc2_and_plc3(plc: str, address: str, kind: str, shown: str) -> None:
+def test_addresses_of_a_plc2_and_a_plc3_have_their_types(
+        plc: str, address: str, kind: str, shown: str) -> None:
     mapping = one(PLC_Type=plc, Address=address, Command='Read')
     assert (mapping.type.value, str(mapping.address)) == (kind, shown)
 
@@ -416,7 +419,8 @@ def test_control_bits_of_a_plc3_belong_to_its_program(address: str) -> None:
     ('PLC5', 'BT9:0', '12', 'int16'), ('PLC5', 'SC9:0/SA', '1', 'bool'),
     ('SLC', 'PD10:0.SPV', '1', 'int16'), ('SLC', 'MG9:0/DN', '1', 'bool'),
     ('SLC', 'PD10:0', '23', 'int16')])
-def test_parts_of_structures(plc: str, address: str, length: str, kind: str) -> None:
+def test_part_of_a_structure_has_its_own_type(
+        plc: str, address: str, length: str, kind: str) -> None:
     mapping = one(PLC_Type=plc, Address=address, Length=length, Command='Read')
     assert (mapping.type.value, mapping.cell('Address')) == (kind, address)
 

@@ -229,7 +229,7 @@ def test_com_port_may_be_a_number_a_device_or_a_url(path: Path, text: str, port:
                                   '://host:1', 'hwgrep://0403:6001', 'spy:///dev/ttyUSB0',
                                   'alt://x:1', 'cp2110://x:1', 'socket://host:1?logging=debug',
                                   'rfc2217://host:1/x'])
-def test_bad_com_port(path: Path, text: str) -> None:
+def test_com_port_that_is_no_port_is_refused(path: Path, text: str) -> None:
     fault, = faults(path, 'Com_Port', text)
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')
 
@@ -258,7 +258,7 @@ def test_character_time_and_delay_are_in_seconds() -> None:
     ('Station\n', ': a net file has one data row, this one has 0'),
     ('Station\n1\n\n2\n', ':4: a net file has one data row, this one has 2'),
     ('Station\n1\n2\n3\n', ':3: a net file has one data row, this one has 3')])
-def test_number_of_rows(path: Path, content: str, text: str) -> None:
+def test_file_without_exactly_one_row_is_refused(path: Path, content: str, text: str) -> None:
     path.write_text(content, encoding='utf-8')
     with pytest.raises(ConfigurationError) as caught:
         load_network(str(path))

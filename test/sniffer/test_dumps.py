@@ -66,7 +66,7 @@ def test_bytes_alone_are_read_in_any_notation(text: str) -> None:
     strategies.binary(max_size=70),
     strategies.tuples(strategies.binary(min_size=1, max_size=2), strategies.integers(1, 80)).map(
         lambda pair: pair[0] * pair[1])))
-def test_dumps_with_offsets(data: bytes) -> None:
+def test_dumps_with_offsets_give_back_their_bytes(data: bytes) -> None:
     assert joined(xxd(data)) == data
     assert joined(hexdump(data)) == data
 
@@ -142,13 +142,24 @@ def test_file_without_an_end() -> None:
     assert all(0 < len(next(endless).data) <= 65536 for _ in range(3))
 
 
-def test_settings_and_percent(tmp_path: Path) -> None:
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
     path = tmp_path / 'x'
     path.write_text('# abdf1_ros capture 1\n# check: BCC\n0 > 10\n1 > 20\n', encoding='ascii')
-    recording = Recording(path)
-    percents = [recording.percent for _ in recording.chunks()]
+    return Recording(path)
+
+
+def test_settings_of_a_capture_are_known_once_it_is_read(recording: Recording) -> None:
+    assert len(list(recording.chunks())) == 2
     assert recording.settings == {'check': 'BCC'}
+
+
+def test_percent_tells_how_much_has_been_read(recording: Recording) -> None:
+    percents = [recording.percent for _ in recording.chunks()]
     assert 0 < percents[0] < percents[1] == 100
+
+
+def test_file_has_a_size_and_a_device_has_none(recording: Recording) -> None:
     assert recording.has_size
     assert not Recording(Path('/dev/zero')).has_size
 

@@ -99,12 +99,12 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
     assert sixteen.split() == ['16', '1', '1', *'000000', '-', '-']
 
 
-def test_summary_of_nothing() -> None:
+def test_summary_of_nothing_says_none() -> None:
     assert list(summary_lines(Summary(), LineKind())) == [
         'summary: 0 bytes', '  seen: none', '  faults: none']
 
 
-def test_summary_as_json(summary: Summary) -> None:
+def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     found = json.loads(summary_json(summary, HALF))
     assert {name: found[name] for name in (
         'kind', 'seconds', 'bytes', 'check', 'duplex', 'baud', 'load', 'errors', 'damaged')} == {

@@ -141,7 +141,7 @@ def test_broadcast_needs_no_answer() -> None:
     assert kinds(entries) == [Kind.COMMAND, Kind.POLL]
 
 
-def test_command_without_reply() -> None:
+def test_command_without_a_reply_is_told_at_the_end() -> None:
     entries = decode([(OUT, master(COMMAND)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
                       (IN, frames.EOT)])
     assert (entries[-1].kind, entries[-1].station, entries[-1].text) == (
@@ -238,7 +238,7 @@ def test_capture_of_a_real_line() -> None:
     assert not any(entry.marks for entry in entries)
 
 
-def test_recording_without_times() -> None:
+def test_recording_without_times_says_the_same_without_latencies() -> None:
     session = TrafficDecoder()
     entries: list[Entry] = []
     for _, data in TRANSACTION:

@@ -50,7 +50,7 @@ def set_clock(plc: SimulatedPlc, when: datetime) -> None:
 
 
 @pytest.mark.parametrize('station', [1, 2])
-def test_time_and_drift(port: str, plcs: tuple[SimulatedPlc, ...], station: int,
+def test_clock_is_told_with_its_drift(port: str, plcs: tuple[SimulatedPlc, ...], station: int,
                         capsys: Output) -> None:
     set_clock(plcs[station - 1], datetime.now() - timedelta(days=1, hours=2))
     said = call(main, capsys, 'clock', str(station), '--port', port)
@@ -99,6 +99,6 @@ def test_station_is_named_where_several_may_be(port: str, capsys: Output) -> Non
 @pytest.mark.parametrize(('seconds', 'text'), [
     (0.4, 'as this computer'), (-1.2, 'as this computer'),
     (90, '0:01:30 ahead of this computer'), (-3600, '1:00:00 behind this computer')])
-def test_drift_in_words(seconds: float, text: str) -> None:
+def test_drift_is_told_in_words(seconds: float, text: str) -> None:
     assert told(datetime(2026, 1, 2, 3, 4, 5), timedelta(seconds=seconds)) == \
         f'2026-01-02 03:04:05, {text}'

@@ -303,7 +303,7 @@ def test_ping_shows_each_answer_and_sums_up(plc: Plc) -> None:
     assert said.lines[3].startswith('3 sent, 3 answered; shortest ')
 
 
-def test_ping_of_nobody(plc: Plc) -> None:
+def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> None:
     said = plc('ping', '9', '--count', '2')
     assert (said.status, said.lines) == (1, ['2 sent, 0 answered'])
     assert said.err.count('2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive') == 2
@@ -326,7 +326,7 @@ def test_scan_finds_who_does_not_say_what_it_is(plc: Plc, simulator: Process) ->
     assert 'answers, but not who it is: STS 10' in said.lines[1]
 
 
-def test_scan_of_nobody(plc: Plc) -> None:
+def test_scan_of_nobody_has_status_1(plc: Plc) -> None:
     said = plc('scan', '8,9')
     assert (said.status, said.lines) == (1, ['0 of 2 stations answer'])
 
@@ -450,7 +450,8 @@ def test_detect_tries_in_order_and_stops_at_the_first_answer(
         f'5,Master,BCC,{port},19200,None,300']
 
 
-def test_detect_of_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_detect_of_nobody_has_status_1_and_says_what_was_tried(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = Pty(tmp_path / 'line')
     said = call(main, capsys, 'detect', '--port', str(line.name), '--stations', '1', '--timeout',
                 '30', '--baud', '9600')

@@ -85,7 +85,8 @@ def imported(folder: Path, text: str | bytes,
     ('"Down","N7:22",Short,1,RO,100,Linear,0,100,0,10,Float,0,0,,"",1',
      {'Scale': '-0.1', 'Offset': '0'}),
     ('"Turned","N7:23",Short,1,RO,100,,,,,,,,,,"",1', {'Scale': '-1'})])
-def test_tag_of_kepserver(tmp_path: Path, row: str, expected: dict[str, str]) -> None:
+def test_tag_of_kepserver_becomes_a_row(
+        tmp_path: Path, row: str, expected: dict[str, str]) -> None:
     (mapping,), left_out = imported(tmp_path, f'{KEPSERVER}{row}\n')
     assert left_out == []
     assert {column: mapping.cell(column) for column in expected} == expected
@@ -113,7 +114,7 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
     assert f'# line 3: {row.split(",")[0].strip(chr(34))},' in (tmp_path / 'map.csv').read_text()
 
 
-def test_symbols_of_rslogix(tmp_path: Path) -> None:
+def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> None:
     rows = RSLOGIX + '"DFILE:N7","","","Numbers"\n"PLS10:0","Global","CAM"\n"","Global","LOST"\n'
     mappings, left_out = imported(tmp_path, rows)
     assert [(mapping.tag, mapping.name, str(mapping.address), mapping.length, mapping.description)

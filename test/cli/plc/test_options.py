@@ -76,7 +76,7 @@ def test_detect_waits_for_a_short_time_only() -> None:
     assert parse('scan', '1').timeout is None
 
 
-def test_lists_of_stations() -> None:
+def test_list_of_stations_has_ranges_and_numbers() -> None:
     assert parse('scan', '0-3,9').stations == (0, 1, 2, 3, 9)
 
 
