@@ -215,6 +215,7 @@ class FrameDecoder:
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
     everything heard. ``waiting`` are bytes that are to be read. Bytes outside of any symbol are
     counted in ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
+    ``link_data`` are those of the message that is coming in, as far as it has come.
     ``in_message`` tells whether a message has begun and not ended, ``begun`` counts beginnings.
     """
 
@@ -222,7 +223,7 @@ class FrameDecoder:
         self._checksum = checksum
         self._is_half_duplex = duplex is Duplex.HALF
         self.waiting = bytearray()
-        self._data = bytearray()
+        self.link_data = bytearray()
         self._step: Callable[[], Decoded] = self._idle
         self._station: int | None = None
         self.last_byte = 0
@@ -232,11 +233,6 @@ class FrameDecoder:
         self.begun = 0
         self._is_damaged = False  # a character of the message that is coming in
         self._has_response = False
-
-    @property
-    def link_data(self) -> bytearray:
-        """Return the link data of the message that is coming in, as far as it has come."""
-        return self._data
 
     def reset(self) -> None:
         """Forget everything heard so far."""
@@ -314,7 +310,7 @@ class FrameDecoder:
         self.in_message, self._is_damaged, self._has_response = True, False, False
         self.begun += 1
         self._station = station
-        self._data.clear()
+        self.link_data.clear()
 
     def _take_station(self, following: Callable[[], Decoded]) -> Decoded:
         """Read STN, which is stuffed like data (M 3-4), and go on to ``following``."""
@@ -385,7 +381,7 @@ class FrameDecoder:
 
     def _take_data(self, count: int) -> None:
         """Take bytes of a message; those that are too many are dropped, up to its end (M 4-8)."""
-        self._data += self.waiting[:min(count, MAX_LINK_DATA + 1 - len(self._data))]
+        self.link_data += self.waiting[:min(count, MAX_LINK_DATA + 1 - len(self.link_data))]
         del self.waiting[:count]
 
     def _check(self) -> Decoded:
@@ -394,12 +390,12 @@ class FrameDecoder:
             return MORE
         received = int.from_bytes(self.waiting[:size], 'little')
         del self.waiting[:size]
-        if len(self._data) > MAX_LINK_DATA:
+        if len(self.link_data) > MAX_LINK_DATA:
             return self._frame(FrameFault.TOO_LONG)
-        expected = self._checksum.of_message(self._data, self._station)
+        expected = self._checksum.of_message(self.link_data, self._station)
         if received != expected or self._is_damaged:
             return self._frame(FrameFault.BAD_CHECK, received, expected)
-        fault = FrameFault.TOO_SHORT if len(self._data) < HEADER_SIZE else None
+        fault = FrameFault.TOO_SHORT if len(self.link_data) < HEADER_SIZE else None
         return self._frame(fault, received, expected)
 
     def _frame(self, fault: FrameFault | None, received: int = 0, expected: int = 0) -> Frame:
@@ -407,4 +403,4 @@ class FrameDecoder:
         self._step = self._idle
         self.in_message, self._noise_told = False, self.noise
         return Frame(
-            bytes(self._data), self._station, fault, received, expected, self._has_response)
+            bytes(self.link_data), self._station, fault, received, expected, self._has_response)

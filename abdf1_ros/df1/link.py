@@ -24,7 +24,7 @@ from typing import Protocol
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Control, Duplex, Frame, Symbol
-from abdf1_ros.df1.machine import Heard, LineTiming, Machine, Procedure
+from abdf1_ros.df1.machine import Heard, LineTiming, Machine, Procedure, Reflex
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
@@ -60,7 +60,7 @@ class LinkSettings:
 
 
 @cache
-def ack_on_reply(sender: int | None = None) -> Callable[[Symbol], bytes]:
+def ack_on_reply(sender: int | None = None) -> Reflex:
     """Return the reflex to a good reply to another node, of this sender if one is given."""
     def reflex(symbol: Symbol) -> bytes:
         if not isinstance(symbol, Frame) or symbol.fault is not None or symbol.station is not None:

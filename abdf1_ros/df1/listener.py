@@ -191,5 +191,5 @@ class ListeningDecoder(FrameDecoder):
 
     def _matches(self, checksum: Checksum, count: int = 2) -> bool:
         """Tell whether the check that has come is of this kind, by its first ``count`` bytes."""
-        check = checksum.encode(checksum.of_message(self._data, self._station))
+        check = checksum.encode(checksum.of_message(self.link_data, self._station))
         return self.waiting.startswith(check[:count])

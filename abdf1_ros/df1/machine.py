@@ -57,6 +57,8 @@ from abdf1_ros.df1.outgoing import Outgoing
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 from abdf1_ros.errors import CommandExpired
 
+Reflex = Callable[[Symbol], bytes]
+
 
 class Step(NamedTuple):
     """
@@ -81,7 +83,7 @@ class Step(NamedTuple):
     delay: float = 0.0
     expires: float = math.inf
     reply_size: int = 0
-    reflex: Callable[[Symbol], bytes] | None = None
+    reflex: Reflex | None = None
 
 
 class Silence(NamedTuple):
@@ -218,7 +220,7 @@ class Machine:
         self._is_listening = False
         self._line_free = -math.inf
         self._reply_size = 0
-        self._reflex: Callable[[Symbol], bytes] | None = None
+        self._reflex: Reflex | None = None
         self._ahead = b''  # on the line by reflex, and not yet sent by the procedure
         self._last_heard = -math.inf
         self._echo = LineEcho(duplex is Duplex.HALF)

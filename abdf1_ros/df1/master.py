@@ -43,7 +43,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
 from abdf1_ros.df1.link import LinkStatus, NO_STATUS
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Step
-from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED
+from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, poll_on_ack
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -72,7 +72,7 @@ class HalfDuplexMaster:
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source``, one after the other, for ever."""
-        self._line.forget_forwards()
+        self._line.forwards.clear()
         while True:
             # In turns, or slaves that send all the time would keep our own commands from the line.
             if self._line.forwards:
@@ -95,7 +95,7 @@ class HalfDuplexMaster:
                 yield from self._line.probe(number)
             task.sent = True
             started = yield from self._line.deliver(
-                number, command, task.expires, is_polled_next=True)
+                number, command, task.expires, poll_on_ack(number))
             reply = command.reply() if number == BROADCAST else (
                 yield from self._collect(number, command, started, task.reply_size))
         except CommandExpired as error:

@@ -36,7 +36,7 @@ from typing import NoReturn, TypeGuard
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
+from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
 from abdf1_ros.df1.link import ack_on_reply
 from abdf1_ros.df1.machine import (
     Heard,
@@ -44,6 +44,7 @@ from abdf1_ros.df1.machine import (
     Machine,
     MIN_RESPONSE_TIME,
     Procedure,
+    Reflex,
     Silence,
     Step,
 )
@@ -135,12 +136,11 @@ class MasterLine:
         self.forwards: deque[Packet] = deque()
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf,
-                *, is_polled_next: bool = False) -> Generator[Step, Heard, float]:
+                reflex: Reflex | None = None) -> Generator[Step, Heard, float]:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
         Return when the transmission began that was acknowledged (clock value in s).
-        ``is_polled_next`` tells that its poll is what the caller sends then.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -149,7 +149,6 @@ class MasterLine:
             begun = self.machine.now
             yield Step(frame, BROADCAST_PAUSE)
             return begun
-        reflex = _poll_on_ack(number) if is_polled_next else None
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             begun = self.machine.now
@@ -366,13 +365,12 @@ class MasterLine:
 
         It is served, kept to be passed on, or dropped and counted.
         """
-        has_room = len(self.forwards) < MAX_KEPT
-        if self._is_to_forward(packet) and has_room:
+        is_ours = packet.dst == self.settings.station
+        is_kept = self.settings.accept_slave_messages and len(self.forwards) < MAX_KEPT
+        if is_kept and not is_ours:
             self.forwards.append(packet)
             return
-        is_ours = packet.dst == self.settings.station
-        if is_ours and not packet.is_reply and self.settings.accept_slave_messages \
-                and self._serve is not None and has_room:
+        if is_kept and not packet.is_reply and self._serve is not None:
             self.forwards.append(self._serve(packet))
             return
         if packet.is_reply and is_ours:
@@ -426,20 +424,12 @@ class MasterLine:
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""
-        return bool(self.forwards) and any(
-            packet.dst not in busy for packet in self.forwards)
+        return any(packet.dst not in busy for packet in self.forwards)
 
     @property
     def is_full(self) -> bool:
         """Tell whether no more messages can be kept to be passed on."""
         return len(self.forwards) >= MAX_FORWARDS
-
-    def forget_forwards(self) -> None:
-        """Drop what waits to be passed on."""
-        self.forwards.clear()
-
-    def _is_to_forward(self, packet: Packet) -> bool:
-        return self.settings.accept_slave_messages and packet.dst != self.settings.station
 
     def fail_inactive(self, number: int) -> NoReturn:
         """Make a station inactive, and report it."""
@@ -463,8 +453,8 @@ class MasterLine:
 
 
 @cache
-def _poll_on_ack(number: int) -> Callable[[Symbol], bytes]:
-    """Return the reflex to the ACK of a station."""
+def poll_on_ack(number: int) -> Reflex:
+    """Return the reflex to the ACK of a station that is polled for its reply."""
     poll = frames.poll_frame(number)
     return lambda symbol: poll if symbol is Control.ACK else b''
 

@@ -134,9 +134,9 @@ class FullDuplexPeer(EqualNode):
     Carry out tasks on the line of ``machine`` and answer the commands that come in.
 
     ``serve`` executes a command and returns its reply; it is called once for each command,
-    never for a repetition. Where it returns None, somebody adds the reply to ``replies`` later, in
-    any thread, and then wakes the machine. ``report`` is called with every numbered error and
-    notice.
+    never for a repetition. Where it returns None, somebody adds the reply to ``replies`` (others
+    after a start) later, in any thread, and then wakes the machine. ``report`` is called with
+    every numbered error and notice.
     """
 
     def __init__(self, machine: Machine, settings: PeerSettings, stations: ActiveStationList,
@@ -147,11 +147,6 @@ class FullDuplexPeer(EqualNode):
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._forget()
 
-    @property
-    def replies(self) -> deque[Packet]:
-        """Return the replies that are to be sent; after a start these are others."""
-        return self._replies
-
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve the other end, for ever."""
         self._forget()
@@ -159,20 +154,20 @@ class FullDuplexPeer(EqualNode):
         while True:
             self._expire()
             # In turns, or an end that asks all the time would keep our commands waiting.
-            if self._replies:
-                yield from self._send_reply(self._replies.popleft())
+            if self.replies:
+                yield from self._send_reply(self.replies.popleft())
             task = self._next_task(source)
             if task is not None:
                 yield from self._send_command(task)
                 continue
-            if self._replies:
+            if self.replies:
                 continue
             symbol = yield Step(None, self._idle_time(source), reflex=_REFLEX)
             if not isinstance(symbol, Silence):
                 yield from self._answer(symbol)
 
     def _forget(self) -> None:
-        self._replies: deque[Packet] = deque()
+        self.replies: deque[Packet] = deque()
         self._outstanding: dict[tuple[int, int], Outstanding] = {}
         self._last_response = frames.NAK
         self._accepted: _Accepted | None = None
@@ -347,7 +342,7 @@ class FullDuplexPeer(EqualNode):
             self._counters.invalid_messages += not is_ours
             reply = self._serve(packet)
             if reply is not None:
-                self._replies.append(reply)
+                self.replies.append(reply)
 
     def _hear(self, symbol: Symbol) -> bytes:
         """Return what the receiver answers to a symbol (M 4-7..4-9)."""
@@ -384,7 +379,7 @@ class FullDuplexPeer(EqualNode):
             self._counters.duplicate_messages += 1
             self._note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
             return self._respond(frames.ACK)
-        if not packet.is_reply and len(self._replies) >= MAX_WAITING_REPLIES:
+        if not packet.is_reply and len(self.replies) >= MAX_WAITING_REPLIES:
             self._counters.refused_for_memory += 1
             return self._respond(frames.NAK)  # sink full: not remembered, so it may come again
         self._accepted = _Accepted(packet.duplicate_key, self._machine.now)

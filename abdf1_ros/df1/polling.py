@@ -163,7 +163,7 @@ class StandardPollingMaster:
 
     def run(self, source: TaskSource) -> Procedure:
         """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
-        self._line.forget_forwards()
+        self._line.forwards.clear()
         self._outstanding.clear()
         self._given.clear()
         self._unproven.clear()

@@ -366,7 +366,7 @@ def test_decoder_takes_any_bytes_and_keeps_few(decoder: FrameDecoder, parts: lis
         for symbol in drain(decoder):
             assert not isinstance(symbol, Frame) or len(symbol.data) <= MAX_LINK_DATA + 1
         assert len(decoder.waiting) <= 2  # a DLE, or one of two check bytes
-        assert len(decoder._data) <= MAX_LINK_DATA + 1
+        assert len(decoder.link_data) <= MAX_LINK_DATA + 1
 
 
 def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:

@@ -141,7 +141,7 @@ def _entries(parts: Sequence[bytes]) -> list[Entry]:
         entries += session.feed(Chunk(None, Direction.UNKNOWN, part))
         for wire in session._wires.values():
             assert len(wire.decoder.waiting) <= 2
-            assert len(wire.decoder._data) <= frames.MAX_LINK_DATA + 1
+            assert len(wire.decoder.link_data) <= frames.MAX_LINK_DATA + 1
     return [*entries, *session.finish()]
 
 

@@ -51,7 +51,7 @@ def _drain(decoder: FrameDecoder) -> list[Symbol]:
     symbols = []
     while (symbol := decoder.next_symbol()) is not None:
         symbols.append(symbol)
-    assert len(decoder.waiting) <= 2 and len(decoder._data) <= MAX_LINK_DATA + 1
+    assert len(decoder.waiting) <= 2 and len(decoder.link_data) <= MAX_LINK_DATA + 1
     return symbols
 
 

@@ -59,7 +59,7 @@ def ends() -> Iterator[tuple[Rfc2217Port, socket.socket]]:
 def is_watched_and_sends_at_once(port: DescriptorPort) -> bool:
     options = (socket.TCP_NODELAY, socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL,
                socket.TCP_USER_TIMEOUT)
-    with socket.socket(fileno=os.dup(port.fileno())) as connection:
+    with socket.socket(fileno=os.dup(port._descriptor)) as connection:
         values = [connection.getsockopt(socket.IPPROTO_TCP, option) for option in options]
         return values == [1, 5, 1, 5000] and \
             connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
