@@ -301,7 +301,7 @@ def test_shipped_file_is_good() -> None:
 
 def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
     network = load(path, 'Mode,Store_Forward', 'Radio,"1-3, 7, 255"')
-    assert (network.duplex, network.line.store_forward) == (Duplex.FULL, (1, 2, 3, 7, 255))
+    assert (network.duplex, network.line.store_forward) == (Duplex.RADIO, (1, 2, 3, 7, 255))
     assert not network.line.avoids_collisions
     assert load(path, 'Mode,Collision_Avoidance', 'Radio,yes').line.avoids_collisions
     assert not load(path, 'Mode,Collision_Avoidance', 'Peer,Yes').line.avoids_collisions
