@@ -198,7 +198,6 @@ class FallbackRow:
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
         """Take note how a message of the row ended that had the line (rule 7)."""
-        self.is_held_up = False
         self.due = -math.inf
         self.has_failed = outcome is not Outcome.WRITTEN
         if outcome is Outcome.WRITTEN:

@@ -144,6 +144,7 @@ class Interlocks:
         self._due = self.next_expiry = math.inf
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
+        self._held_up: list[FallbackRow] = []
         self._messages: dict[str, float] = {}
         self._executor = -math.inf
         self._has_begun = False
@@ -240,9 +241,9 @@ class Interlocks:
                 self._look_again(beat)
 
     def is_overruled(self, write: Write) -> bool:
-        """Tell whether a message was published before a fallback of its row went out (rule 9)."""
+        """Tell whether a message comes after the end, or before a fallback of its row (5, 9)."""
         row = self._by_mapping.get(id(write.mapping))
-        return row is not None and write.requested <= row.sent
+        return row is not None and (self._are_all_due or write.requested <= row.sent)
 
     def message_ended(self, write: Write, outcome: Outcome) -> None:
         """Take note how a message ended that had the line."""
@@ -255,6 +256,13 @@ class Interlocks:
         """Take note that a message was too old to have the line: nobody waits for it any more."""
         row = self._by_mapping.get(id(write.mapping))
         if row is not None:
+            self._look_again(row)
+
+    def _release(self) -> None:
+        """Let fallbacks go whose words nobody writes any more: they may be another row's, too."""
+        for row in [row for row in self._held_up if not self._writing.is_held_up(row.mapping)]:
+            self._held_up.remove(row)
+            row.is_held_up = False
             self._look_again(row)
 
     def _look_again(self, row: OwnRow) -> None:
@@ -272,6 +280,7 @@ class Interlocks:
     def next(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:  # noqa: A003
         """Return what has to be written next, None for nothing."""
         self.expire(now)
+        self._release()
         if now < self._due:
             return None
         best: tuple[TurnRank, _Plc, OwnRow] | None = None
@@ -291,8 +300,9 @@ class Interlocks:
         due = [row for row in plc.fallbacks
                if row.due <= now and row.judge(now, youngest.get(id(row.mapping), -math.inf))]
         held_up = [row for row in due if self._writing.is_held_up(row.mapping)]
-        for row in held_up:  # by a message that is under way (rule 9)
+        for row in held_up:  # by a message that is under way (rule 9); _release ends it
             row.is_held_up, row.due = True, math.inf
+            self._held_up.append(row)
         why = self._why_held(plc) if plc.heartbeats else ''
         beats = [beat for beat in plc.heartbeats if beat.judge(
             now, why or self._missing(beat, now), self._executor, self._messages)]
@@ -444,10 +454,11 @@ class Interlocks:
         self._plan(self._ours)
 
     def _make_all_due(self, now: float) -> None:
+        messages = self._writes.youngest()
         for row in self.fallbacks:
-            if row.cause is None and not row.stands:
+            is_followed = id(row.mapping) in messages or self._writing.is_held_up(row.mapping)
+            if row.cause is None and (is_followed or not row.stands):
                 row.make_due(FallbackCause.END, now)
-                row.is_held_up = False
         for beat in self.heartbeats:
             beat.due = now
         self._are_all_due = True

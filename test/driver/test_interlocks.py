@@ -336,6 +336,25 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     assert cell.results()[-2:] == ['not written: refused: this node ends', END]
 
 
+@pytest.mark.parametrize('moment', ['waits', 'on the line', 'executed'])
+def test_rule_5_message_after_a_fallback_that_stands_does_not_outlive_the_end(moment: str) -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed, run=1.95)
+    driver = cell.bench.driver
+    cell.bench.write(speed, [42])
+    if moment == 'executed':
+        cell.bench.run_until(lambda: cell.word('N7:0') == 42)
+    elif moment == 'on the line':
+        cell.bench.run_until(lambda: bool(driver.interlocks._writes.youngest()))
+        assert cell.word('N7:0') == 7
+    assert cell.results() == [START]
+    driver.wind_down()
+    cell.bench.line.wake(driver.machine)
+    cell.bench.run_until(lambda: driver.interlocks.is_over)
+    assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+    assert driver.interlocks.unconfirmed() == []
+
+
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), run=1.0)
     cell.refused = {'N10:0'}
@@ -492,6 +511,21 @@ def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
     cell.run(1.0)
     assert cell.written('N7:0') == [7]
     assert cell.results() == ['not written: not sent: fallback', START]
+
+
+def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time_only() -> None:
+    recipe = speed_row(None, length=200, tag='recipe')  # of several packets
+    speed = speed_row()
+    cell = Cell(recipe, speed, run=1.0)
+    cell.bench.write(speed, [3])
+    cell.run(AFTER - 0.01)
+    assert cell.word('N7:0') == 3
+    cell.bench.write(recipe, [4] * 200)  # under way when the fallback is due
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.bench.run_until(lambda: row.is_held_up)
+    cell.run(0.5)
+    assert cell.results()[-1] == TIMEOUT
+    assert cell.word('N7:0') == 7
 
 
 def test_rule_10_fallback_is_tried_until_it_is_confirmed() -> None:

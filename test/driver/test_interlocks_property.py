@@ -181,6 +181,17 @@ class World:
                 self.publish(row)
             self.line.run_for(STEP)
 
+    def end(self) -> None:
+        """End in order at any moment, often with messages that wait or are under way (rule 5)."""
+        self.driver.interlocks.executor_ran(self.line.now)
+        self.line.run_for(self.dice.choice([0.0, 0.3, AFTER + 0.3]))
+        for row in self.rows:
+            self.publish(row)
+        self.line.run_for(self.dice.uniform(0.0, 0.1))
+        self.driver.wind_down()
+        self.line.wake(self.driver.machine)
+        self.line.run(lambda: self.driver.interlocks.is_over, 2.0)
+
     def _end_trouble(self) -> None:
         self.plc.faults.silent = self.refuses = False
         self.refuses_messages = self.swallows_replies = False
@@ -258,6 +269,8 @@ def test_whatever_happens_no_beat_vouches_for_it_and_no_output_stands(
     afterwards = world.listener.results[len(outcomes):]
     assert {result.mapping for result in afterwards if result.outcome is Outcome.WRITTEN} \
         == {*world.rows}
+    world.end()
+    assert world.words() == [SAFE, SAFE, 0]
     outcomes = [result.outcome for result in world.listener.results]
     asked = len(world.published)
     told = len([outcome for outcome in outcomes if outcome is not Outcome.FALLBACK])
