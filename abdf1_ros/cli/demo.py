@@ -44,14 +44,14 @@ from abdf1_ros.cli.terminal import (
     number_option,
 )
 from abdf1_ros.paths import config_file
-from abdf1_ros.ros.messages import MESSAGES
+from abdf1_ros.ros.messages import latched_qos, MESSAGES
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 _PATIENCE = 30.0
@@ -148,8 +148,7 @@ class Watcher(Node):
             if mapping.reads:
                 self.create_subscription(
                     MESSAGES[mapping.message_type], f'/abdf1/read/{mapping.topic}',
-                    self._taker(mapping), QoSProfile(
-                        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+                    self._taker(mapping), latched_qos())
         self.create_subscription(
             DiagnosticStatus, '/abdf1/write_results', self._result, 10)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)

@@ -31,6 +31,7 @@ from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.settings.heartbeats import READS_IN_TIME
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
@@ -40,9 +41,6 @@ MODE_PERIOD = 2.0
 
 # So many answers about the mode have to fit into the stale time of a row (rule 13).
 ANSWERS_IN_TIME = 3
-
-# A counter has to be read so often within its Heartbeat_Timeout (rule 14).
-_READS_IN_TIME = 3
 
 # After so many heartbeats and fallbacks in a row a read has its turn (rule 11).
 OWN_IN_A_ROW = 7
@@ -315,8 +313,8 @@ def guard_faults(mappings: Sequence[Mapping], planner: Planner) -> Iterator[tupl
     expected = forecast.intervals(blocks, forecast.USUAL_RESPONSE_TIME)
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():
-        needed = _READS_IN_TIME * found.get(tag, 0.0)
+        needed = READS_IN_TIME * found.get(tag, 0.0)
         if timeout / 1000 < needed:
             yield mapping, (
-                f'Heartbeat_Timeout {timeout} ms is shorter than {_READS_IN_TIME} reads of {tag} '
+                f'Heartbeat_Timeout {timeout} ms is shorter than {READS_IN_TIME} reads of {tag} '
                 f'on this line; {needed * 1000:.0f} ms would do')

@@ -88,9 +88,7 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
     subscriber with deadline or liveliness QoS is told after that time that values have stopped.
     A topic that is published on change only, or when a PLC writes, cannot promise this.
     """
-    profile = QoSProfile(
-        depth=1, reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    profile = latched_qos()
     if mapping.publish is Publish.ALWAYS and math.isfinite(stale_time):
         time = Duration(seconds=stale_time)
         profile.lifespan = profile.deadline = profile.liveliness_lease_duration = time

@@ -38,6 +38,9 @@ DEFAULT_PERIOD = 1000
 RUN = 'RUN'
 """What Publish_While says for the mode of the processor."""
 
+READS_IN_TIME = 3
+"""So often a counter has to be read within its Heartbeat_Timeout (rule 14)."""
+
 _PERIODS = (100, 60_000)
 _FALLBACK_AFTER = (200, 60_000)
 _TIMEOUTS = (100, 3_600_000)

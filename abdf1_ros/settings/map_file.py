@@ -25,12 +25,9 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.columns import COLUMNS, NEEDED
 from abdf1_ros.settings.csv_table import read_table, Row, shown
-from abdf1_ros.settings.heartbeats import counts
+from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
-
-# Reads of a counter that its timeout has to allow for (docs/heartbeats.md, rule 14).
-_LEAST_PERIODS = 3
 
 Clash = Callable[[str, Mapping, str], None]
 """Takes column, other row, and what is wrong with both."""
@@ -90,10 +87,10 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFau
         elif text := _no_counter(mapping, counter, mappings):
             yield mapping, CellFault('Publish_While', f'"{shown(condition.tag)}" {text}')
         elif counter.period and condition.timeout \
-                and condition.timeout < _LEAST_PERIODS * counter.period:
+                and condition.timeout < READS_IN_TIME * counter.period:
             yield mapping, CellFault(
                 'Heartbeat_Timeout', f'Heartbeat_Timeout {condition.timeout} is less than '
-                f'{_LEAST_PERIODS} x {counter.period} ms, the Period of {shown(counter.tag)}')
+                f'{READS_IN_TIME} x {counter.period} ms, the Period of {shown(counter.tag)}')
 
 
 def _no_topic(topic: str, mappings: Sequence[Mapping]) -> str:
