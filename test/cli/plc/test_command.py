@@ -579,7 +579,7 @@ def test_commands_work_over_a_tcp_connection(
     with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:
         url = process.wait_for('socket://').partition(' on ')[2].partition(',')[0]
         assert call(main, capsys, 'read', 'N7:0', '--port', url).lines == ['N7:0 1200']
-        said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', *FAST)
+        said = call(main, capsys, 'detect', '--port', url, '--parity', 'Even', *PATIENT)
     assert said.lines[1].endswith(f'--port {url} --baud 9600 --check CRC --parity Even')
 
 
