@@ -283,3 +283,23 @@ def test_peer_has_one_plc_whatever_number_a_guest_gives_it() -> None:
     mapping = make_mapping('N7:0', station=3, plc='SLC')
     peer = DriverBench([mapping], network=Network(mode='Peer'))
     assert peer.driver._station_of_guest(77) == 3
+
+
+def test_message_of_a_peer_to_the_number_of_a_guest_is_one_to_us() -> None:
+    served = make_mapping('N20:0', 'Serve', station=5, plc='SLC')
+    bench = DriverBench([make_mapping('N7:0', station=1, plc='SLC'), served],
+                        network=Network(mode='Peer', plc_type='SLC', baud=19200, timeout=200))
+    plc = bench.plc(1, 'SLC', ('N7:0', 20))
+    bench.open()
+    program = Program(bench, src=9)
+    program.ask(READ_N7)
+    bench.run(1.0)
+    said: list[str] = []
+    for address in ('N7:5', 'N20:0'):
+        plc.send(make_mapping(address, plc='SLC').address, [7], 9, said.append)
+    bench.line.wake(bench.far)
+    bench.run(2.0)
+    assert program.statuses == [0]
+    assert [text[:6] for text in said] == ['STS 10', 'confir']
+    assert bench.listener.values(served)[-1] == [7]
+    assert bench.driver.counters.invalid_messages == 2
