@@ -360,7 +360,7 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
     settings = RadioSettings(first.station, checksum, also=[plc.station for plc in others])
     return Machine(
         lambda machine: RadioNode(machine, settings, ActiveStationList(), serve).run(first),
-        checksum=checksum, duplex=Duplex.FULL, timing=timing, counters=first.counters)
+        checksum=checksum, duplex=Duplex.RADIO, timing=timing, counters=first.counters)
 
 
 def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThread,

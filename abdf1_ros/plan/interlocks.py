@@ -305,6 +305,20 @@ def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
                    f'{_ms(period)} takes {part:.0%} of the time')
 
 
+def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:
+    """Yield what has to be so that the bounds of a line hold, and is not in its settings."""
+    own = any((mapping.heartbeat or mapping.fallback) and not mapping.serves
+              for mapping in mappings)
+    if network.mode != 'Radio' or not own:
+        return
+    yield ('bounds by radio: NAK_Retries makes up for lost commands. It does not for lost replies '
+           'of a PLC that drops repetitions, as SLC and MicroLogix do: that PLC then counts as '
+           'silent until it answers a probe')
+    if network.store_forward:
+        yield ('bounds by radio: a node that stores and forwards drops repetitions, so behind one '
+               'no bound holds after a lost packet')
+
+
 def guard_faults(mappings: Sequence[Mapping], planner: Planner) -> Iterator[tuple[Mapping, str]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
     counters = {mapping: (condition.text, condition.timeout) for mapping in mappings

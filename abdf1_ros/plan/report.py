@@ -140,6 +140,7 @@ class Report:
         """Return what somebody should know, and what is not odd at all."""
         found = list(interlocks.costs(
             self.network, self.mappings, self.default_period, self.response_time))
+        found += interlocks.conditions(self.network, self.mappings)
         bits = [mapping for mapping in self.mappings if mapping.command is Command.READ
                 and mapping.type is ValueType.BOOL]
         silent = [mapping for mapping in bits if mapping.publish is Publish.CHANGE]

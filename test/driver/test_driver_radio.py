@@ -19,20 +19,14 @@ from __future__ import annotations
 from dataclasses import replace
 from random import Random
 
-from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import LineTiming, Machine
-from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.radio import RadioNode, RadioSettings
-from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.points import Outcome
 from abdf1_ros.plan.interlocks import Times
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 import pytest
-from support.driver_bench import DriverBench, simulated_plc, store, stored
+from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
-from support.virtual_line import char_time, VirtualLine
 
 FIRST, SECOND = 1, 2
 NETWORK = Network(station=200, mode='Radio', baud=19200, cmd_timeout=500, nak_retries=1)
@@ -51,29 +45,16 @@ class RadioBench(DriverBench):
         rows = [*self.read, self.beat, self.speed]
         super().__init__(rows, network=network, start=False)
         self.loss = 0.0
-        self._random = Random(1)
-        self.plcs = {number: simulated_plc(number, 'SLC', self.clock, ('N7:0', 4), ('N10:0', 4))
+        self.plcs = {number: self.plc(number, 'SLC', ('N7:0', 4), ('N10:0', 4))
                      for number in numbers}
-        settings = RadioSettings(FIRST, also=numbers)
-        self.modem = Machine(
-            lambda machine: RadioNode(machine, settings, ActiveStationList(), self._serve,
-                                      random=self._random).run(self.plcs[FIRST]),
-            checksum=network.checksum, duplex=Duplex.FULL, timing=LineTiming(char_time(19200)))
-        assert isinstance(self.driver.link, RadioNode)
-        self.driver.link._random = self._random
-        self.line = VirtualLine(self.driver.machine, self.modem, baud=19200, chunk=1000)
         self.line.noise = self
         self.bound = next(bound for bound in Times(network, rows).bounds()
                           if bound.mapping is self.speed)
-        self.line.start()
+        self.open()
 
     def damage(self, data: bytes, random: Random) -> bytes:
         """Return a packet, or nothing."""
         return b'' if random.random() < self.loss else data
-
-    def _serve(self, command: Packet) -> Packet | None:
-        plc = self.plcs[command.dst]
-        return None if plc.faults.silent else plc.serve(command)
 
 
 @pytest.mark.parametrize('loss', [0.0, 0.2])

@@ -18,7 +18,14 @@ from dataclasses import replace
 import math
 
 from abdf1_ros.plan.forecast import line_model, longest_transaction
-from abdf1_ros.plan.interlocks import guard_faults, own_load, remarks, Times, write_time
+from abdf1_ros.plan.interlocks import (
+    conditions,
+    guard_faults,
+    own_load,
+    remarks,
+    Times,
+    write_time,
+)
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -139,6 +146,16 @@ def test_rule_16_says_which_setting_shortens_the_times_most(network: Network, wa
     assert len(advice) == bool(way)
     assert all(text.startswith(f'{way} would shorten the longest of these times most, from ')
                for text in advice)
+
+
+@pytest.mark.parametrize('forwards, count', [('', 1), ('1,2', 2)])
+def test_rule_16_conditions_of_bounds_by_radio_are_told(forwards: str, count: int) -> None:
+    network = replace(QUICK, mode='Radio', store_forward=forwards)
+    for row in (speed(), beat()):
+        told = [note for note in make_report(network, [row], 0.1).notes() if 'by radio' in note]
+        assert len(told) == count
+    assert list(conditions(network, [make_mapping('N7:0')])) == []
+    assert list(conditions(QUICK, [speed()])) == []
 
 
 def test_rule_16_period_shorter_than_a_scan_is_warned_of() -> None:

@@ -17,11 +17,13 @@
 from collections.abc import Callable, Sequence
 import heapq
 import itertools
+from random import Random
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.radio import RadioNode, RadioSettings
 from abdf1_ros.df1.slave import multidrop, Responder
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver, Listener
@@ -132,19 +134,30 @@ class _FarEnd(Machine):
     """All stations of the line; what they hear and say goes through two filters."""
 
     def __init__(self, stations: Sequence[Responder], network: Network) -> None:
+        is_radio = network.mode == 'Radio'
+
         def run_peer(machine: Machine) -> Procedure:
-            plc, = stations
-            assert isinstance(plc, SimulatedPlc)
-            settings = PeerSettings(network.checksum)
+            plcs = {plc.station: plc for plc in stations if isinstance(plc, SimulatedPlc)}
+            first = next(iter(plcs.values()))
 
-            def serve(command: Packet) -> Packet:
-                return plc.serve(command)  # as it is then: a test may put its own
+            def serve(command: Packet) -> Packet | None:
+                plc = plcs[command.dst] if is_radio else first
+                # As it is then: a test may put its own.
+                return None if is_radio and plc.faults.silent else plc.serve(command)
 
-            return FullDuplexPeer(machine, settings, ActiveStationList(), serve).run(plc)
+            if is_radio:
+                settings = RadioSettings(
+                    first.station, network.checksum, also=plcs, cmd_timeout=self.answers_again,
+                    avoids_collisions=network.line.avoids_collisions)
+                node = RadioNode(machine, settings, ActiveStationList(), serve, random=Random(1))
+                return node.run(first)
+            return FullDuplexPeer(machine, PeerSettings(network.checksum), ActiveStationList(),
+                                  serve).run(first)
 
         super().__init__(multidrop(stations) if network.duplex is Duplex.HALF else run_peer,
                          checksum=network.checksum, duplex=network.duplex,
                          timing=LineTiming(network.timing.char_time))
+        self.answers_again = 1.0  # by radio: half of it after a command; never if infinite
         self.hear: Callable[[bytes], bytes] = bytes
         self.say: Callable[[bytes], bytes] = bytes
 
@@ -162,7 +175,7 @@ class DriverBench:
     """
     The driver on one end of a line, stations on the other, whole frames at a time.
 
-    In Mode Peer there is one PLC.
+    In Mode Peer there is one PLC; in Mode Radio all are behind one modem.
     ``far.hear`` and ``far.say`` stand in the line: they return what comes through of a frame.
     ``chunk`` bytes are handed over together.
     """
@@ -193,7 +206,7 @@ class DriverBench:
     def plc(self, station: int, plc: str, *areas: tuple[str, int]) -> SimulatedPlc:
         """Put a PLC on the line."""
         made = simulated_plc(station, plc, self.clock, *areas, checksum=self.network.error_code)
-        if self.network.duplex is Duplex.FULL:
+        if self.network.duplex is not Duplex.HALF:
             made.be_full_duplex()
         self.connect(made)
         return made
@@ -201,11 +214,13 @@ class DriverBench:
     def connect(self, station: Responder) -> None:
         """Put any station on the line."""
         self._stations.append(station)
-        if self.network.duplex is Duplex.FULL:
+        if self.network.duplex is not Duplex.HALF:
             self.far.start(self.line.now)
 
     def open(self, run: float = 0.0) -> None:  # noqa: A003
         """Open the port; let so many seconds pass."""
+        if isinstance(self.driver.link, RadioNode):
+            self.driver.link._random = Random(1)
         self.driver.machine.start(self.line.now)
         self.line.wake(self.driver.machine)
         if run:

@@ -31,7 +31,8 @@ DEFAULTS = Network(timeout=300)
 # PLCs mostly have small numbers, and 1 is asked where nobody says which.
 _FIRST_SPARE = 10
 
-MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer', 'radio': 'Radio'}
+MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer',
+         Duplex.RADIO.name.lower(): 'Radio'}
 
 # Options that stand for a column of the net CSV.
 _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
