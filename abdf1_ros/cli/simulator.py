@@ -61,7 +61,8 @@ from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, Tcp
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.settings.network import BAUD_RATES, make_network, Network, URLS
+from abdf1_ros.settings import BAUD_RATES
+from abdf1_ros.settings.network import make_network, Network, URLS
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
 from abdf1_ros.simulator.gateway import stations_of

@@ -54,7 +54,8 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.problems import Problem
-from abdf1_ros.settings.network import BAUD_RATES, Network, URLS
+from abdf1_ros.settings import BAUD_RATES, PARITIES
+from abdf1_ros.settings.network import Network, URLS
 from abdf1_ros.sniffer.capture import Chunk
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry
@@ -226,7 +227,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
                         help=f'of the ports (default: {_DEFAULT_BAUD}); for a file, to know '
                              'the load of the line')
-    parser.add_argument('--parity', choices=('None', 'Even', 'Odd'), default='None',
+    parser.add_argument('--parity', choices=PARITIES, default='None',
                         help='of the ports (default: %(default)s)')
     parser.add_argument('--check', type=str.lower, choices=(*_CHECKS, _AUTO), default=_AUTO,
                         help='default: found by itself')

@@ -34,8 +34,9 @@ from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast, interlocks
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
+from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
-from abdf1_ros.settings.network import BAUD_RATES, Network
+from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import first

@@ -13,3 +13,6 @@
 # limitations under the License.
 
 """Both CSV files, the line and its mappings, and the values in them."""
+
+BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+PARITIES = ('None', 'Even', 'Odd')

@@ -33,6 +33,7 @@ from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.problems import ConfigurationError, Place, Problem
+from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.csv_table import read_table, Row, shown
 from abdf1_ros.settings.hints import hint
 from abdf1_ros.settings.share import share_places
@@ -46,7 +47,6 @@ _MODE_WORDS = {
     'df1radiomodem': 'Radio', 'radiomodem': 'Radio'}
 POLLING_MODES = ('Message', 'Standard')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
-BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 _WITHOUT_SHARE = {'Slave': "a slave cannot send a guest's commands",
                   'Radio': 'in Mode Radio it has not been tried'}
 # Schemes of the URLs of device servers; each has a module in ``ports``.
@@ -154,7 +154,7 @@ class Network:
     data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
     parity: str = _net(
-        'Parity', 'None', 'parity bit per character', choices=('None', 'Even', 'Odd'),
+        'Parity', 'None', 'parity bit per character', choices=PARITIES,
         also={'-': 'None'})  # as S0 prints the default
     timeout: int = _net(
         'Timeout', 1000, 'ms to wait for each answer of a station', low=0, high=360000)

@@ -24,13 +24,14 @@ from urllib.parse import parse_qsl
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.numbers import whole_number
+from abdf1_ros.settings import BAUD_RATES, PARITIES
 
 _LOOPBACK = '127.0.0.1'
 _MOST_PLACES = 16
 _RIGHT = ('pty:/a/name, tcp:PORT, tcp:ADDRESS:PORT, or a serial device such as '
           '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even')
-_OPTIONS = {'baud': ('1200', '2400', '4800', '9600', '19200', '38400', '57600', '115200'),
-            'check': ('BCC', 'CRC'), 'parity': ('None', 'Even', 'Odd')}
+_OPTIONS = {'baud': [*map(str, BAUD_RATES)], 'check': [check.value for check in Checksum],
+            'parity': PARITIES}
 
 
 @dataclass(frozen=True, slots=True)

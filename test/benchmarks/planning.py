@@ -49,8 +49,9 @@ from abdf1_ros.plan.forecast import line_model  # noqa: E402
 from abdf1_ros.plan.line_model import ReadRequest  # noqa: E402
 from abdf1_ros.plan.partition import Span  # noqa: E402
 from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
+from abdf1_ros.settings import BAUD_RATES  # noqa: E402
 from abdf1_ros.settings.mapping import Mapping  # noqa: E402
-from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
+from abdf1_ros.settings.network import Network  # noqa: E402
 from support.mappings import make_mapping  # noqa: E402
 
 PERIODS = (100, 100, 250, 500, 1000, 1000, 5000)

@@ -52,8 +52,9 @@ from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402
 from abdf1_ros.pccc.values import Values  # noqa: E402
 from abdf1_ros.ports.descriptor import DescriptorPort  # noqa: E402
 from abdf1_ros.ports.link_thread import LinkThread  # noqa: E402
+from abdf1_ros.settings import BAUD_RATES  # noqa: E402
 from abdf1_ros.settings.mapping import Mapping  # noqa: E402
-from abdf1_ros.settings.network import BAUD_RATES, Network  # noqa: E402
+from abdf1_ros.settings.network import Network  # noqa: E402
 from paced_line import (  # noqa: E402
     answering_socket,
     BareLine,

@@ -20,8 +20,8 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.messages import Severity
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import (
-    BAUD_RATES,
     FIELDS,
     load_network,
     make_network,

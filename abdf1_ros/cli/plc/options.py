@@ -28,7 +28,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import ValueType, WordOrder
-from abdf1_ros.settings.network import BAUD_RATES
+from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.station_lists import parse_stations
 
 DEFAULT_STATION = 1

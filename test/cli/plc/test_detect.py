@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 import threading
 
+from abdf1_ros import settings
 from abdf1_ros.cli.plc import detect
 from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
 from abdf1_ros.cli.plc.init import net_csv
@@ -31,7 +32,6 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.settings import network as network_module
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
@@ -76,7 +76,7 @@ def _everybody_sends(plc: SimulatedPlc, checksum: Checksum,
 
 def test_usual_baud_rates_come_first_and_none_is_left_out() -> None:
     assert BAUD_RATES[:3] == (19200, 9600, 38400)
-    assert sorted(BAUD_RATES) == sorted(network_module.BAUD_RATES)
+    assert sorted(BAUD_RATES) == sorted(settings.BAUD_RATES)
 
 
 def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
