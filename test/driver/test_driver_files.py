@@ -22,6 +22,7 @@ from abdf1_ros.driver.transactions import REWRITTEN
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.cases import for_all
@@ -111,21 +112,21 @@ class OldPlc(SimulatedPlc):
         return super().serve(command)
 
 
-def old_plc(bench: DriverBench) -> OldPlc:
-    """Put an old PLC on the line."""
+def old_bench(mapping: Mapping) -> tuple[DriverBench, OldPlc]:
+    """Return a bench with an old PLC on the line."""
+    bench = DriverBench([mapping])
     table = DataTable(PlcType.SLC)
     plc = OldPlc(1, table, bench.network.checksum, bench.clock)
     for text, words in (('N7:0', 256), ('B3:0', 8)):
         table.create(make_mapping(text, plc='SLC').address, words)
     bench.connect(plc)
-    return plc
+    return bench, plc
 
 
 def test_old_slc_is_read_and_written_in_packets_of_82_bytes() -> None:
     mapping = make_mapping('N7:0', 'ReadWrite', plc='SLC', length=200, processor='5/02')
     values = list(range(200))
-    bench = DriverBench([mapping])
-    plc = old_plc(bench)
+    bench, plc = old_bench(mapping)
     bench.write(mapping, values, run=2.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(mapping)[-1] == values
@@ -134,8 +135,8 @@ def test_old_slc_is_read_and_written_in_packets_of_82_bytes() -> None:
 
 def test_packets_of_a_5_03_are_too_long_for_an_old_slc_and_become_shorter() -> None:
     mapping = make_mapping('N7:0', plc='SLC', length=100)
-    bench = DriverBench([mapping])
-    store(old_plc(bench), 'N7:0', list(range(100)))
+    bench, plc = old_bench(mapping)
+    store(plc, 'N7:0', list(range(100)))
     bench.run(1.0)
     assert bench.listener.values(mapping)[-1] == list(range(100))
     assert bench.listener.reasons == []
@@ -144,8 +145,7 @@ def test_packets_of_a_5_03_are_too_long_for_an_old_slc_and_become_shorter() -> N
 
 def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:
     mapping = make_mapping('B3:1/4', 'ReadWrite', plc='SLC', processor='5/01')
-    bench = DriverBench([mapping])
-    plc = old_plc(bench)
+    bench, plc = old_bench(mapping)
     store(plc, 'B3:1', [0x8001])
     bench.write(mapping, [1], run=0.5)
     result, = bench.listener.results
@@ -158,8 +158,7 @@ def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:
 
 def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() -> None:
     mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/01')
-    bench = DriverBench([mapping])
-    plc = old_plc(bench)
+    bench, plc = old_bench(mapping)
 
     def interfere(function: int) -> None:
         if function == slc.LOGICAL_WRITE:
@@ -171,38 +170,26 @@ def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() ->
     assert stored(plc, 'B3:1') == bytes.fromhex('10 00')
 
 
-def test_writing_back_without_a_reply_leaves_it_unknown() -> None:
+@pytest.mark.parametrize(('lost', 'outcome', 'words'), [
+    (slc.LOGICAL_READ, Outcome.NOT_SENT, '00 00'),
+    (slc.LOGICAL_WRITE, Outcome.UNKNOWN, '10 00')])  # it was written, in this case
+def test_reply_lost_while_reading_is_not_written_and_while_writing_back_unknown(
+        lost: int, outcome: Outcome, words: str) -> None:
     mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='ML1000')
-    bench = DriverBench([mapping])
-    plc = old_plc(bench)
+    bench, plc = old_bench(mapping)
 
     def fall_silent(function: int) -> None:
-        plc.faults.silent = function == slc.LOGICAL_WRITE
+        plc.faults.silent = function == lost
 
     plc.meanwhile = fall_silent
     bench.write(mapping, [1], run=5.0)
-    assert bench.listener.outcomes() == [Outcome.UNKNOWN]
-    assert stored(plc, 'B3:1') == bytes.fromhex('10 00')  # it was, in this case
-
-
-def test_reading_for_it_without_a_reply_means_not_written() -> None:
-    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='ML1000')
-    bench = DriverBench([mapping])
-    plc = old_plc(bench)
-
-    def fall_silent(function: int) -> None:
-        plc.faults.silent = function == slc.LOGICAL_READ
-
-    plc.meanwhile = fall_silent
-    bench.write(mapping, [1], run=5.0)
-    assert bench.listener.outcomes() == [Outcome.NOT_SENT]
-    assert stored(plc, 'B3:1') == bytes(2)
+    assert bench.listener.outcomes() == [outcome]
+    assert stored(plc, 'B3:1') == bytes.fromhex(words)
 
 
 def test_bit_refused_by_a_processor_that_has_masked_writes_is_a_failure() -> None:
     mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/03')
-    bench = DriverBench([mapping])
-    plc = old_plc(bench)
+    bench, plc = old_bench(mapping)
     bench.write(mapping, [1], run=0.5)
     assert bench.listener.outcomes() == [Outcome.FAILED]
     assert stored(plc, 'B3:1') == bytes(2)

@@ -154,6 +154,12 @@ class Cell:
             self.run(run)
 
 
+def speed_cell() -> tuple[Cell, Mapping]:
+    """Return a cell with one Write row, whose first fallback has been written, and the row."""
+    speed = speed_row()
+    return Cell(speed, run=1.0), speed
+
+
 @pytest.mark.parametrize('polling', POLLING_MODES)
 def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> None:
     cell = Cell(beat_row(), speed_row(), polling=polling)
@@ -378,8 +384,7 @@ def test_rule_6_pause_of_the_process_lets_no_beat_out_that_vouches_for_the_past(
 
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
-    speed = speed_row()
-    cell = Cell(speed, run=1.0)
+    cell, speed = speed_cell()
     cell.bench.driver.write([speed], [3], cell.now - 0.3)
     cell.bench.line.wake(cell.bench.driver.machine)
     begun = cell.now
@@ -401,8 +406,7 @@ def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
 
 @pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
 def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
-    speed = speed_row()
-    cell = Cell(speed, run=1.0)
+    cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)
     cell.refused, cell.spared = {'N7:0'}, 7
     cell.publish(speed, 99, times=round(2.0 / gap), gap=gap)
@@ -414,8 +418,7 @@ def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: f
 
 
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
-    speed = speed_row()
-    cell = Cell(speed, run=1.0)
+    cell, speed = speed_cell()
     cell.bench.driver.write([speed], [3], cell.now - 0.6)
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.0)
@@ -487,8 +490,7 @@ def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None
 
 
 def test_rule_8_message_that_stands_is_not_written_over() -> None:
-    speed = speed_row()
-    cell = Cell(speed, run=1.0)
+    cell, speed = speed_cell()
     cell.publish(speed, 3, times=200, run=19.0)
     assert cell.written('N7:0').count(7) == 1
     cell.run(2.0)
@@ -549,8 +551,7 @@ def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
 
 
 def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
-    speed = speed_row()
-    cell = Cell(speed, run=1.0)
+    cell, speed = speed_cell()
     say, cell.bench.far.say = cell.bench.far.say, lambda data: b''
     cell.publish(speed, 3, run=0.05)
     cell.run(1.0)
@@ -949,8 +950,7 @@ def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
-    speed = speed_row()
-    cell = Cell(speed, run=1.0)
+    cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)
     cell.refused = {'N7:0'}
     cell.run(4.0)

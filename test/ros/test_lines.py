@@ -156,8 +156,8 @@ class Plant:
         write_csv(self.folder / f'{name}_map.csv',
                   'Tag,Command,Address,Station,PLC_Type,Length', [row])
 
-    def start(self, *arguments: str) -> None:
-        """Run the process."""
+    def start(self, *arguments: str, reads: str = '') -> None:
+        """Run the process; see that these lines read."""
         text = ''.join(
             f'/hall/{name}:\n  ros__parameters:\n'
             f'    net_file: {self.folder}/{name}_net.csv\n'
@@ -165,6 +165,7 @@ class Plant:
         given = ['lines', '--ros-args', '--params-file', yaml_file(self.folder, text), *arguments]
         self._thread = threading.Thread(target=lambda: setattr(self, 'status', main(given)))
         self._thread.start()
+        assert [self.speeds(name) for name in reads] == [[7, 8]] * len(reads)
 
     def speeds(self, name: str) -> list[float] | str:
         """Return the next value of a line."""
@@ -217,8 +218,7 @@ def line_status(plant: Plant, level: bytes) -> dict[str, str]:
 
 
 def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
-    plant.start()
-    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    plant.start(reads='abc')
     assert get_parameters(plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
     assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
@@ -234,15 +234,13 @@ def test_process_may_open_as_many_files_as_the_system_allows(
     limits: list[tuple[int, int]] = []
     monkeypatch.setattr(resource, 'getrlimit', lambda number: (1024, 5000))
     monkeypatch.setattr(resource, 'setrlimit', lambda number, pair: limits.append(pair))
-    plant.start('-p', 'lines:=[a]')
-    assert plant.speeds('a') == [7, 8]
+    plant.start('-p', 'lines:=[a]', reads='a')
     assert limits == [(5000, 5000)]
 
 
 def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
-    plant.start()
-    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    plant.start(reads='ac')
     values = line_status(plant, ERROR)
     assert values['running'] == '2'
     assert values['/hall/b'].startswith(f'{plant.folder}/b_net.csv:2:1 (Baud): Baud = "9601"')
@@ -255,8 +253,7 @@ def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None
 
 def test_line_whose_name_ros_refuses_is_told_and_the_others_run(plant: Plant) -> None:
     plant.plcs['b-1'] = plant.plcs.pop('b')
-    plant.start()
-    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    plant.start(reads='ac')
     values = line_status(plant, ERROR)
     assert values['running'] == '2'
     assert 'must not contain characters other than alphanumerics' in values['/hall/b-1']
@@ -270,8 +267,7 @@ def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:
 
 
 def test_lines_that_are_named_run_alone(plant: Plant) -> None:
-    plant.start('-p', 'lines:=[c]')
-    assert plant.speeds('c') == [7, 8]
+    plant.start('-p', 'lines:=[c]', reads='c')
     assert line_status(plant, OK)['lines'] == '1'
 
 
@@ -279,15 +275,13 @@ def test_two_lines_on_one_port_are_not_two_masters(plant: Plant) -> None:
     other_name = plant.folder / 'other_name'
     other_name.symlink_to(plant.plcs['a'].port)
     plant.write_net('b', str(other_name))
-    plant.start()
-    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    plant.start(reads='ac')
     assert line_status(plant, ERROR)['/hall/b'] == f'port: {other_name} is the port of /hall/a'
 
 
 def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
         plant: Plant) -> None:
-    plant.start('-p', 'lines:=[a, b]')
-    assert [plant.speeds(name) for name in 'ab'] == [[7, 8]] * 2
+    plant.start('-p', 'lines:=[a, b]', reads='ab')
     taken, free = plant.plcs['a'].port, plant.plcs['c'].port
 
     plant.write_net('b', taken)
@@ -318,8 +312,7 @@ def test_internal_error_at_the_start_of_a_line(
         return plant.make_node(name, **named)
 
     monkeypatch.setattr(module, 'BridgeNode', make)
-    plant.start()
-    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    plant.start(reads='abc')
     assert made[1] - made[0] >= 0.5
     assert line_status(plant, OK)['restarts'] == '1'
     assert "begins again: AttributeError('a bug')" in capfd.readouterr().err
@@ -335,8 +328,7 @@ def test_line_that_ends_slowly_does_not_hold_up_the_others(
         assert ended.wait(PATIENCE)
         node.link.stop()
 
-    plant.start()
-    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    plant.start(reads='abc')
     monkeypatch.setattr(BridgeNode, 'stop', stop)
     plant.fail('b')
     plant.observer.until(slow.is_set, 'the end of a line')
@@ -351,8 +343,7 @@ def test_internal_error_restarts_its_line_only(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str], broken: str) -> None:
     monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
-    plant.start()
-    assert [plant.speeds(name) for name in 'abc'] == [[7, 8]] * 3
+    plant.start(reads='abc')
     before = {**plant.nodes}
     plant.fail(broken)
     plant.observer.until(lambda: plant.nodes[broken] is not before[broken], 'another node')
@@ -371,8 +362,7 @@ def test_end_of_a_line_that_fails_is_told(
         node.link.stop()
         raise KeyError('a bug')
 
-    plant.start('-p', 'lines:=[a]')
-    assert plant.speeds('a') == [7, 8]
+    plant.start('-p', 'lines:=[a]', reads='a')
     monkeypatch.setattr(BridgeNode, 'stop', stop)
     assert plant.end() == 0
     assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
@@ -397,8 +387,7 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
 
     monkeypatch.setattr('socket.getaddrinfo', resolve)
     plant.write_net('b', 'socket://device.server:4001')
-    plant.start()
-    assert [plant.speeds(name) for name in 'ac'] == [[7, 8]] * 2
+    plant.start(reads='ac')
     began = time.monotonic()
     assert plant.end() == 0
     assert time.monotonic() - began < 5
