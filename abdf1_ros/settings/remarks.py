@@ -45,6 +45,11 @@ def network_remarks(network: Network) -> Iterator[str]:
                'nearly every message fails')
     if network.mode in ('Master', 'Peer'):
         yield from _time_remarks(network)
+    if network.mode != 'Radio':
+        for column, value in (('Store_Forward', network.store_forward),
+                              ('Collision_Avoidance', network.collision_avoidance == 'Yes')):
+            if value:
+                yield f'{column} is for Mode Radio; in Mode {network.mode} it does nothing'
     yield from share_remarks(share_places(network.share))
 
 

@@ -103,6 +103,16 @@ def bench(make_bench: Callable[..., Bench]) -> Bench:
     return make_bench()
 
 
+@pytest.mark.parametrize('mode, expected', [('Master', None), ('Radio', '2')])
+def test_counters_of_a_radio_modem_port_without_a_number_are_shown(
+        make_bench: Callable[..., Bench], mode: str, expected: str | None) -> None:
+    bench = make_bench(mode=mode)
+    bench.driver.counters.unsent_messages = bench.driver.counters.refused_for_memory = 2
+    values = {entry.key: entry.value for entry in bench.status('link').values}
+    for name in ('undelivered for lack of handshake', 'refused for lack of memory'):
+        assert values.get(f'messages {name}') == expected
+
+
 def test_names_and_hardware_ids(bench: Bench) -> None:
     assert [(status.name, status.hardware_id)
             for status in bench.diagnostics.statuses(NOW)] == [

@@ -47,8 +47,12 @@ GOOD = Network(timeout=300)
     (Network(timeout=300, tx_delay=1000, mode='Peer'), [
         'TX_Delay 1000 ms comes once before a reply can come, which is all of Cmd_Timeout 1000 '
         'ms']),
-    (Network(timeout=0, tx_delay=5000, mode='Slave'), [])])
-def test_times_that_leave_no_room(network: Network, expected: list[str]) -> None:
+    (Network(timeout=0, tx_delay=5000, mode='Slave'), []),
+    (Network(mode='Radio', store_forward='1,2', collision_avoidance='Yes'), []),
+    (Network(store_forward='1,2', collision_avoidance='Yes'), [
+        'Store_Forward is for Mode Radio; in Mode Master it does nothing',
+        'Collision_Avoidance is for Mode Radio; in Mode Master it does nothing'])])
+def test_settings_that_leave_no_room_or_do_nothing(network: Network, expected: list[str]) -> None:
     assert list(network_remarks(network)) == expected
 
 
