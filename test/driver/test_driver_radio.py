@@ -20,9 +20,10 @@ from dataclasses import replace
 from random import Random
 
 from abdf1_ros.driver.points import Outcome
+from abdf1_ros.plan.forecast import longest_transaction
 from abdf1_ros.plan.interlocks import Times
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import DriverBench, store, stored
@@ -80,6 +81,28 @@ def test_radios_that_avoid_collisions_carry_several_commands_as_forecast() -> No
         assert 0.6 < cycle / make_report(bench.network, bench.read, 0.1, 0.2).poll_cycle < 1.6
         cycles.append(cycle)
     assert cycles[0] > 3 * cycles[1]
+
+
+@pytest.mark.parametrize('several', ['No', 'Yes'])
+@pytest.mark.parametrize('loss', [0.0, 0.3])
+def test_guarded_value_ends_with_the_program_of_its_plc(several: str, loss: float) -> None:
+    network = replace(NETWORK, collision_avoidance=several)
+    alive = make_mapping('N11:3', plc='SLC', station=FIRST, tag='alive', period=500)
+    level = make_mapping('N7:0', plc='SLC', station=FIRST, tag='level', period=500,
+                         publish_while=PublishWhile('alive', 3000))
+    bench = DriverBench([alive, level], network=network, start=False)
+    plc = bench.plc(FIRST, 'SLC', ('N7:0', 4), ('N11:0', 4))
+    dice = Random(1)
+    bench.far.hear = bench.far.say = lambda data: b'' if dice.random() < loss else data
+    bench.open()
+    for count in range(1, 150):
+        store(plc, 'N11:3', [count])
+        bench.run(0.2)
+    published = len(bench.listener.times(level))
+    stopped = bench.clock()
+    bench.run(60.0)
+    assert published >= 10
+    assert bench.listener.times(level)[-1] <= stopped + 3.0 + longest_transaction(network)
 
 
 def test_write_is_confirmed_by_its_reply() -> None:
