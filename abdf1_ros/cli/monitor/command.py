@@ -274,10 +274,8 @@ def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) 
 def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Ending) -> int:
     _spin(plant, options.wait, lambda: has_ended() or bool(plant.lines()))
     _spin(plant, _COMPLETION, has_ended)  # diagnostics come every second
-    _print(lambda width: render_plant(plant.lines(), time.monotonic(), width))
-    while not options.once and not has_ended():
-        _spin(plant, options.period, has_ended)
-        _print(lambda width: render_plant(plant.lines(), time.monotonic(), width))
+    _print_pictures(plant, lambda width: render_plant(plant.lines(), time.monotonic(), width),
+                    options, has_ended)
     return 0 if plant.lines() else EXIT_NOT_FOUND
 
 
@@ -332,16 +330,13 @@ def _not_found(watch: NodeWatch, seconds: float) -> str:
 
 
 def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> None:
-    if options.once:
-        _complete(watch, has_ended)
-        _print_node(watch)
-    elif _is_screen():
+    if not options.once and _is_screen():
         curses.wrapper(_draw, watch, has_ended)
-    else:
-        _complete(watch, has_ended)
-        while not has_ended():
-            _print_node(watch)
-            _spin(watch, options.period, has_ended)
+        return
+    # Some time for the values that topics have promised.
+    _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
+    _print_pictures(watch, lambda width: render(watch.snapshot(), time.monotonic(), width),
+                    options, has_ended)
 
 
 def _is_screen() -> bool:
@@ -380,19 +375,20 @@ def _toggle(screen: _Screen, watch: NodeWatch) -> None:
         screen.ask('not written: the bridge does not listen; Return goes on ')
 
 
-def _complete(watch: NodeWatch, has_ended: _Ending) -> None:
-    """Wait some time for the values that topics have promised."""
-    _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
-
-
 def _spin(watch: NodeWatch | PlantWatch, seconds: float, is_enough: Callable[[], bool]) -> None:
     end = time.monotonic() + seconds
     while not is_enough() and (left := end - time.monotonic()) > 0:
         watch.spin(min(left, 0.1))
 
 
-def _print_node(watch: NodeWatch) -> None:
-    _print(lambda width: render(watch.snapshot(), time.monotonic(), width))
+def _print_pictures(watch: NodeWatch | PlantWatch, picture: Callable[[int], list[TextLine]],
+                    options: argparse.Namespace, has_ended: _Ending) -> None:
+    """Print a picture, and another after each period until the end."""
+    _print(picture)
+    while not options.once and not has_ended():
+        _spin(watch, options.period, has_ended)
+        if not has_ended():
+            _print(picture)
 
 
 def _print(picture: Callable[[int], list[TextLine]]) -> None:
