@@ -40,19 +40,18 @@ def message_acknowledged(end: PeerEnd) -> None:
 
 @case('A message with a wrong check is answered with DLE NAK.', 'M 4-7 to 4-9', _PEER)
 def bad_check_refused(end: PeerEnd) -> None:
-    frame = codec.message(end.command(), end.wire.check)
-    _answer(end, codec.damaged(frame), SymbolKind.NAK)
+    _answer(end, codec.damaged(end.frame(end.command())), SymbolKind.NAK)
 
 
 @case('A message of fewer than six bytes is answered with DLE NAK.', 'M 4-4, 4-7 to 4-9', _PEER)
 def short_message_refused(end: PeerEnd) -> None:
-    _answer(end, codec.message(end.command()[:5], end.wire.check), SymbolKind.NAK)
+    _answer(end, end.frame(end.command()[:5]), SymbolKind.NAK)
 
 
 @case('DLE ENQ inside a message ends it; the answer is DLE NAK.', 'M 4-7 to 4-9', _PEER)
 def broken_message_refused(end: PeerEnd) -> None:
     end.ask(0x06, b'\x00')  # so that the last response is DLE ACK
-    begun, rest = codec.divided(codec.message(end.command(), end.wire.check))
+    begun, rest = codec.divided(end.frame(end.command()))
     _answer(end, begun + codec.ENQ, SymbolKind.NAK)
     end.wire.send(rest)
     symbol = end.wire.hear()
@@ -68,7 +67,7 @@ def enquiry_after_ack(end: PeerEnd) -> None:
 
 @case('DLE ENQ has the last response repeated: DLE NAK.', 'M 4-5, 4-13', _PEER)
 def enquiry_after_nak(end: PeerEnd) -> None:
-    _answer(end, codec.damaged(codec.message(end.command(), end.wire.check)), SymbolKind.NAK)
+    _answer(end, codec.damaged(end.frame(end.command())), SymbolKind.NAK)
     _answer(end, codec.ENQ, SymbolKind.NAK)
 
 
@@ -137,7 +136,7 @@ def embedded_response(end: PeerEnd) -> None:
     first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
     end.deliver(first)
     check_reply(first, end.collect(acknowledge=False))
-    begun, rest = codec.divided(codec.message(second, end.wire.check))
+    begun, rest = codec.divided(end.frame(second))
     for part in (begun, codec.ACK, rest):
         end.wire.send(part)
     end.wire.expect(SymbolKind.ACK, 'DLE ACK for a message with an embedded response')

@@ -116,6 +116,16 @@ def test_slave_behind_an_adapter_that_echoes(
     assert 'leave out --echo' in capsys.readouterr().err
 
 
+def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    port = str(tmp_path / 'plc')
+    options = ('--port', port, '--answer-time', '0.5', '--only')
+    with running_simulator('--pty', port, '--radio'):
+        assert main(['radio', *options, 'broadcast-unanswered', '--only', 'read-words']) == 0
+        assert '2 passed, 0 failed, 0 skipped' in capsys.readouterr().out
+        assert main(['peer', *options, 'message-acknowledged']) == 1
+
+
 @pytest.mark.parametrize(('args', 'text'), [
     (['slave', '--port', '/nowhere/at/all'], 'No such file'),
     (['slave'], '--port'),

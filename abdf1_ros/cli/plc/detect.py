@@ -145,13 +145,11 @@ class Search:
         """Tell whether replies come without any symbol, though we give none either."""
         self._show(f'trying {settings}, station {station}')
         with Session(self._with(settings)) as session:
-            counters, end = session.counters, time.monotonic() + _ENQ_TIME
             if not all(understands(session, station) for _ in range(_RADIO_ECHOES)):
                 return False
-            while not (symbols := counters.acks_received + counters.naks_received
-                       + counters.enqs_received) and time.monotonic() < end:
-                time.sleep(0.1)
-        return not symbols
+            time.sleep(_ENQ_TIME)
+            seen = session.counters
+            return not seen.acks_received + seen.naks_received + seen.enqs_received
 
     def _with(self, settings: LineSettings) -> Network:
         return replace(self._network, baud=settings.baud, mode=settings.mode,
