@@ -158,7 +158,8 @@ class UnheardForAWhile(Unheard):
 
 @pytest.mark.parametrize('kind', [Unheard, UnheardForAWhile])
 def test_full_duplex_port_whose_acks_are_lost_is_not_radio(
-        tmp_path: Path, kind: type[Unheard]) -> None:
+        tmp_path: Path, kind: type[Unheard], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detect, '_ENQ_TIME', 1.5)  # it asks after 1 s
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, kind) as network:
         found = Search(network, [1]).run([9600])
     assert found is not None
