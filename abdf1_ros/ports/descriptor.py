@@ -126,6 +126,9 @@ class DescriptorPort:
             raise OSError('the other end has closed the connection')
         return data
 
+    def fileno(self) -> int:
+        return self._descriptor
+
     def write(self, data: bytes) -> None:
         give_up = math.inf
         while data:
