@@ -34,9 +34,11 @@ from support.mappings import make_mapping
 _US = 5
 _NETWORKS = [
     Network(mode=mode, polling=polling, station=_US, error_code=check, timeout=50, baud=115200,
-            tx_delay=delay, nak_retries=1, enq_retries=1)
-    for mode, polling in (('Master', 'Message'), ('Master', 'Standard'), ('Peer', 'Message'),
-                          ('Slave', 'Message'))
+            tx_delay=delay, nak_retries=1, enq_retries=1, **radio)
+    for mode, polling, radio in (
+        ('Master', 'Message', {}), ('Master', 'Standard', {}), ('Peer', 'Message', {}),
+        ('Slave', 'Message', {}), ('Radio', 'Message', {'store_forward': '1 2 255'}),
+        ('Radio', 'Message', {'collision_avoidance': 'Yes'}))
     for check in ('CRC', 'BCC') for delay in (0, 40)]
 _MAPPINGS = [
     make_mapping('N7:0', 'ReadWrite', station=1, plc='PLC5', length=4, period=50),
