@@ -45,7 +45,10 @@ def test_sample_is_what_the_process_has() -> None:
     ({'a': (110, 10), 'b': (57, 7)}, 0), ({'a': (111, 10), 'b': (57, 7)}, 1),
     ({'a': (110, 10), 'b': (53, 7)}, 4)])
 def test_counters_are_compared_since_the_last_round(after: Counts, expected: int) -> None:
-    assert difference({'a': (100, 99), 'b': (50, 3)}, after) == expected
+    before = {'a': (100, 99), 'b': (50, 3)}
+    assert difference(before, after) == (expected, 0)
+    again = 'CNT_ENQ_RETRIES'
+    assert difference({**before, again: (4, 0)}, {**after, again: (6, 0)}) == (expected, 2)
 
 
 def test_growth_leaves_the_first_quarter_out() -> None:
