@@ -302,8 +302,8 @@ def test_rule_19_second_bridge_takes_control_away_and_does_not_keep_it_alive(
             plc.advance()
             return ladder.is_on(Lamp.IN_CONTROL)
 
-        cell.until(is_in_control, 'a reset that is accepted')
-        cell.until(lambda: cell.word('N11:2') == 800, 'the speed')
+        # On a busy host control may be lost once more, and be taken again.
+        cell.until(lambda: is_in_control() and cell.word('N11:2') == 800, 'control, and the speed')
         arguments = ros_args(f'net_file:={tmp_path / "net.csv"}', f'map_file:={rows}',
                              f'port:={port}')
         with Process('node', *arguments, '-r', '__node:=second') as other:

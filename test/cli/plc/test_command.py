@@ -140,7 +140,8 @@ def test_own_station_is_not_taken_for_one_that_nobody_named(plc: Plc) -> None:
 
 
 def test_scan_asks_a_plc_that_has_our_number(plc: Plc) -> None:
-    assert plc('scan', '0-2', '--own-station', '2').lines[-1] == '2 of 3 stations answer'
+    said = plc('scan', '0-2', '--own-station', '2', *PATIENT)
+    assert said.lines[-1] == '2 of 3 stations answer'
 
 
 def test_write_to_an_input_is_told(plc: Plc) -> None:
