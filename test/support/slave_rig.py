@@ -43,6 +43,8 @@ STATIONS = {'Master': 5, 'Slave': 9}
 # the topics of the dead is lost.
 _NUMBERS = count(1)
 
+TOO_LATE = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+
 
 class LineBox(FaultBox):
     """
@@ -150,10 +152,14 @@ class Line:
         self.until_well()
 
     def works(self) -> None:
-        """Let each end write to the other."""
+        """Let each end write to the other; on a busy host a reply may come too late."""
         for writer, reader in ((self.master, self.slave), (self.slave, self.master)):
-            value = next(self.values)
-            assert writer.write(value) == 'written'
+            for _ in range(3):
+                value = next(self.values)
+                outcome = writer.write(value)
+                if not outcome.endswith(TOO_LATE):
+                    break
+            assert outcome == 'written', outcome
             self.observer.until(lambda reader=reader, value=value: reader.was_told(value),
                                 'what was written')
             assert reader.was_told(value) == 1

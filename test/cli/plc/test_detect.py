@@ -58,7 +58,7 @@ def plc_on(path: Path, check: str, duplex: Duplex,
     link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
     link.start()
     try:
-        yield Network(com_port=str(path), timeout=250)
+        yield Network(com_port=str(path), timeout=600)
     finally:
         link.stop()
         line.close()
