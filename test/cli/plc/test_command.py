@@ -68,7 +68,7 @@ def line(simulator: Process, files: Files) -> str:
 
 @pytest.fixture
 def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
-    return lambda *args: call(main, capsys, *args, '--port', line, *FAST)
+    return lambda command, *args: call(main, capsys, command, '--port', line, *FAST, *args)
 
 
 @pytest.mark.parametrize('station, address, options, lines', [
@@ -340,7 +340,7 @@ def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:
 
 
 def test_watch_tells_why_there_is_no_value(plc: Plc) -> None:
-    said = plc('watch', 'N99:0', 'N7:0', '--period', '0.05', '--count', '2')
+    said = plc('watch', 'N99:0', 'N7:0', '--period', '0.05', '--count', '2', *PATIENT)
     assert said.status == 1
     assert any('N99:0 no value: STS F0' in line for line in said.lines)
     assert any(line.endswith('N7:0 1200') for line in said.lines)
