@@ -81,9 +81,10 @@ class WordRangeService(Generic[_Place]):
         words = self._words(start, request.offset, request.size, request.total,
                             self.codes.read_past_end)
         whole = self.table.read(start, request.total)
-        asked = {start.offset + n: whole[2 * n:2 * n + 2] for n in range(request.total)}
-        return b''.join(asked[word.offset] if word.offset in asked else self.table.read(word, 1)
-                        for word in words)
+        places = [word.offset - start.offset for word in words]
+        return b''.join(
+            whole[2 * at:2 * at + 2] if 0 <= at < request.total else self.table.read(word, 1)
+            for at, word in zip(places, words, strict=True))
 
     def _write(self, reader: Reader) -> bytes:
         request = WordRangeWrite.read(reader, self.read_address)

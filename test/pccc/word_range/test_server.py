@@ -45,6 +45,14 @@ def test_floats_have_their_high_word_first() -> None:
     assert words_at(memory, 'F8:0', 4) == '00 00 7A 44 00 01 20 41'
 
 
+def test_each_word_of_a_float_can_be_read_alone() -> None:
+    memory = table(PLC5, F8_0='01 00 02 00 03 00 04 00')
+    assert ask(memory, '01 00 00 01 00 06 08 00 02') == (0, '02 00')
+    assert ask(memory, '01 00 00 01 00 0E 08 00 01 02') == (0, '01 00')
+    assert ask(memory, '01 01 00 02 00 06 08 00 02') == (0, '01 00')
+    assert ask(memory, '01 01 00 02 00 0E 08 00 01 02') == (0, '04 00')
+
+
 def test_structures_are_words_in_the_order_of_storage() -> None:
     memory = table(PLC5, T4_0=counting(9))
     assert ask(memory, '01 00 00 06 00 06 04 01 0C') == (0, '03 00 04 00 05 00 06 00 07 00 08 00')
