@@ -38,7 +38,7 @@ import time
 _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE.parent
 
-_MODES = ('Message', 'Standard', 'Peer', 'Slave')
+_MODES = ('Message', 'Standard', 'Peer', 'Slave', 'Radio')
 
 
 @dataclass(slots=True)
@@ -102,11 +102,12 @@ def parts(work: Path) -> dict[str, Part]:
             'fuzz/run.py', f'--seconds={left:.0f}', f'--work={work / "fuzz"}'),
             {'inputs': r'(?m)^\w+ +([\d,]+)[ \d,]+  '}),
         'noise': Part(0.1, lambda seed, left: script(
-            'noise/run.py', _MODES[seed % 4], f'--check={("CRC", "BCC")[seed // 4 % 2]}',
-            f'--seed={seed}', '--hours=0.3'),
+            'noise/run.py', _MODES[seed % len(_MODES)],
+            f'--check={("CRC", "BCC")[seed // len(_MODES) % 2]}', f'--seed={seed}',
+            '--hours=0.3'),
             {'values': r'(?m)^ *\w+ +(?:CRC|BCC) +\w+ +\S+ +\S+ +\S+ +(\d+) '}),
         'soak': Part(0.1, lambda seed, left: script(
-            'soak/day.py', _MODES[seed % 4], f'--seed={seed}', '--hours=2'),
+            'soak/day.py', _MODES[seed % len(_MODES)], f'--seed={seed}', '--hours=2'),
             {'faults': r'hour  2: .* ([\d,]+) faults', 'writes': r'hour  2: .* ([\d,]+) writes'}),
         'bridge': Part(0.2, lambda seed, left: script(
             'soak/long_run.py', f'--seed={seed}', f'--minutes={max(3.0, left / 60):.1f}'),

@@ -24,11 +24,9 @@ from collections.abc import Callable, Container, Sequence
 from random import Random
 
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.radio import longest_transaction, RadioNode
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
@@ -44,15 +42,19 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from noise.judge import content_of, Ear, Judge
 from noise.wire import Kind, LISTED, Wire
+from support.driver_bench import FarEnd
 from support.mappings import make_mapping
-from support.virtual_line import char_time, VirtualLine
-
-MODES = ('Message', 'Standard', 'Peer', 'Slave')
+from support.virtual_line import VirtualLine
 
 # Slow lines and long hours: each byte costs the same processor time, and each gap none.
 BAUD = 1200
 US, FAR = 5, 1
 WORDS = 6
+_MANY = {1: PlcType.PLC5, 2: PlcType.SLC, 16: PlcType.PLC5}
+# The PLCs of each mode; in Slave there is a master instead.
+_STATIONS = {'Message': _MANY, 'Standard': _MANY, 'Peer': {FAR: PlcType.SLC}, 'Slave': {},
+             'Radio': {1: PlcType.SLC, 2: PlcType.SLC}}
+MODES = tuple(_STATIONS)
 _CODEC = Codec(ValueType.INT16, WORDS)
 _POLL_TIMEOUT = 60.0
 _RETRIES = 3
@@ -223,16 +225,15 @@ class Rig:
         self.wire = Wire(kinds)
         self.recoveries: list[float] = []
         self.network = Network(
-            station=US, mode=mode if mode in ('Peer', 'Slave') else 'Master', baud=BAUD,
+            station=US, mode=mode if mode in ('Peer', 'Slave', 'Radio') else 'Master', baud=BAUD,
             polling='Standard' if mode == 'Standard' else 'Message', error_code=error_code,
             nak_retries=_RETRIES, enq_retries=_RETRIES,
-            plc_type='SLC' if mode == 'Peer' else 'PLC5')
+            plc_type='SLC' if mode in ('Peer', 'Radio') else 'PLC5')
         self._serial = 0
         self._plcs: list[_WatchedPlc] = []
         self._ends: list[DriverEnd] = []
         self._actions: list[Callable[[], None]] = []
-        make_far = {'Peer': self._peer_far, 'Slave': self._slave_far}
-        far = make_far.get(mode, self._master_far)()
+        far = self._slave_far() if mode == 'Slave' else self._plc_far()
         self.end = self._ends[0]
         self.line = VirtualLine(
             self.end.driver.machine, far, baud=BAUD, chunk=1000, noise=self.wire, seed=seed)
@@ -261,42 +262,29 @@ class Rig:
         head = self._serial.to_bytes(4, 'little')
         return list(_CODEC.decode(head + self.bytes_of(2 * WORDS - 4)))
 
-    def _master_far(self) -> Machine:
-        stations = {1: PlcType.PLC5, 2: PlcType.SLC, 16: PlcType.PLC5}
-        mappings = []
-        for number, kind in stations.items():
+    def _plc_far(self) -> Machine:
+        """Return PLCs, from each of which a driver reads some words and writes others."""
+        mappings: list[Mapping] = []
+        for number, kind in _STATIONS[self.mode].items():
             cells = {'station': number, 'plc': kind.value}
             mappings += [
                 make_mapping('N7:0', length=10, **cells), make_mapping('B3:2', **cells),
                 make_mapping('N9:0', 'ReadWrite', length=WORDS, **cells)]
-        self._add_driver(self.network, mappings)
+        if self.mode == 'Peer':
+            mappings.append(make_mapping('N20:0', 'Serve', station=US, plc='SLC', length=WORDS))
+        link = self._add_driver(self.network, mappings).driver.link
+        if isinstance(link, RadioNode):
+            link._random = self.random
         self._plcs = [_WatchedPlc(number, kind, mappings, self)
-                      for number, kind in stations.items()]
-        far = Machine(multidrop(self._plcs), checksum=self.network.checksum)
-        self._hear_as_plcs(far, Duplex.HALF)
+                      for number, kind in _STATIONS[self.mode].items()]
+        far = FarEnd(self._plcs, self.network)
+        ear = self.listen(far, self.network.duplex)
+        for plc in self._plcs:
+            plc.ear = ear
+            if self.mode == 'Peer':
+                plc.be_full_duplex()
+                self._actions.append(lambda plc=plc: self._push(plc, far))
         return far
-
-    def _peer_far(self) -> Machine:
-        cells = {'station': FAR, 'plc': 'SLC'}
-        mappings = [
-            make_mapping('N7:0', length=10, **cells), make_mapping('B3:2', **cells),
-            make_mapping('N9:0', 'ReadWrite', length=WORDS, **cells),
-            make_mapping('N20:0', 'Serve', station=US, plc='SLC', length=WORDS)]
-        self._add_driver(self.network, mappings)
-        plc = _WatchedPlc(FAR, PlcType.SLC, mappings, self)
-        plc.be_full_duplex()
-        self._plcs = [plc]
-        settings = PeerSettings(self.network.checksum)
-        far = Machine(
-            lambda machine: self._run_peer(machine, settings, plc), duplex=Duplex.FULL,
-            checksum=self.network.checksum, timing=LineTiming(char_time(BAUD)))
-        self._hear_as_plcs(far, Duplex.FULL)
-        self._actions.append(lambda: self._push(plc, far))
-        return far
-
-    @staticmethod
-    def _run_peer(machine: Machine, settings: PeerSettings, plc: SimulatedPlc) -> Procedure:
-        return FullDuplexPeer(machine, settings, ActiveStationList(), plc.serve).run(plc)
 
     def _push(self, plc: SimulatedPlc, far: Machine) -> None:
         """Let the PLC write to us; what becomes of it, the judge sees at our end."""
@@ -338,11 +326,6 @@ class Rig:
         self._actions.append(lambda: end.ask(self.random.choice(written)))
         return end
 
-    def _hear_as_plcs(self, far: Machine, duplex: Duplex) -> None:
-        ear = self.listen(far, duplex)
-        for plc in self._plcs:
-            plc.ear = ear
-
     @property
     def bound(self) -> float:
         """Return the longest time (s) that a command may take."""
@@ -352,6 +335,8 @@ class Rig:
         one = 2 * tries * wait + limit + 2 * _LONGEST_MESSAGE
         if self.mode == 'Standard':  # while the other stations have their turns
             return 4 * one
+        if self.mode == 'Radio':
+            return longest_transaction(network.line)
         if self.mode == 'Slave':
             return _POLL_TIMEOUT + one
         return one + (tries + 2) * wait

@@ -26,7 +26,6 @@ from random import Random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
@@ -40,11 +39,11 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from soak.hostile import DEAD, hostile_message, LIAR, Liar, OTHER, PLC, SLC, US
 from soak.memory import container_lengths
-from support.driver_bench import simulated_plc
+from support.driver_bench import FarEnd, simulated_plc
 from support.mappings import make_mapping
 from support.virtual_line import Noise, QUIET, VirtualLine
 
-MODES = ('Message', 'Standard', 'Peer', 'Slave')
+MODES = ('Message', 'Standard', 'Peer', 'Slave', 'Radio')
 BAUD = 9600
 FLOOD = 1500  # to each mapping, which is more than are kept
 
@@ -114,9 +113,9 @@ class FaultyLine:
     """
     A line with a driver in one of ``MODES``, and its faults.
 
-    Masters have two PLCs, a liar and a dead station; a peer and a slave have another driver at
-    the far end, as peer and as master. The line is quiet for ``pause`` s at most from one fault
-    to the next.
+    Masters have two PLCs, a liar and a dead station, by radio two dead ones and no liar; a peer
+    and a slave have another driver at the far end, as peer and as master. The line is quiet for
+    ``pause`` s at most from one fault to the next.
     """
 
     def __init__(self, mode: str, seed: int = 1, pause: float = 20.0) -> None:
@@ -136,18 +135,18 @@ class FaultyLine:
         self.kinds = {
             'noise': self._noise, 'babble': self._babble, 'hostile frames': self._hostile,
             'lost port': self._unplug, 'flood of writes': self._flood}
+        if mode not in ('Peer', 'Slave'):
+            self.kinds |= {'stations that come and go': self._flap, 'error replies': self._refuse}
         if mode in ('Message', 'Standard'):
-            self.kinds |= {'lies': self._lie, 'stations that come and go': self._flap,
-                           'error replies': self._refuse}
+            self.kinds['lies'] = self._lie
         self.far = self._far_end(mode)
         self.line = VirtualLine(self.driver.machine, self.far, baud=BAUD, chunk=1000, seed=seed)
         self.line.start()
         self.run(30.0)
 
     def _far_end(self, mode: str) -> Machine:
-        if mode in ('Message', 'Standard'):
-            return Machine(
-                multidrop([*self._plcs, self._liar]), checksum=self.driver.network.checksum)
+        if mode not in ('Peer', 'Slave'):
+            return FarEnd([*self._plcs, self._liar], self.driver.network)
         network = Network(mode='Peer' if mode == 'Peer' else 'Master', station=OTHER, baud=BAUD,
                           timeout=300)
         asks = [make_mapping('N20:0', 'Read', station=US, plc='PLC5', length=5, period=700),
@@ -257,7 +256,8 @@ MOST_KEPT = 1100
 
 def _network(mode: str) -> Network:
     modes = {'Message': ('Master', 'Message'), 'Standard': ('Master', 'Standard'),
-             'Peer': ('Peer', 'Message'), 'Slave': ('Slave', 'Message')}
+             'Peer': ('Peer', 'Message'), 'Slave': ('Slave', 'Message'),
+             'Radio': ('Radio', 'Message')}
     name, polling = modes[mode]
     return Network(mode=name, polling=polling, station=US, baud=BAUD, timeout=300)
 

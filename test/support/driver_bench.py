@@ -130,8 +130,12 @@ def stored(plc: SimulatedPlc, text: str, words: int = 1) -> bytes:
     return plc.table.read(parse_address(text, plc.table.plc_type), words)
 
 
-class _FarEnd(Machine):
-    """All stations of the line; what they hear and say goes through two filters."""
+class FarEnd(Machine):
+    """
+    All stations of the line; what they hear and say goes through two filters.
+
+    In Mode Peer there is one PLC; in Mode Radio all PLCs are behind one modem.
+    """
 
     def __init__(self, stations: Sequence[Responder], network: Network) -> None:
         is_radio = network.mode == 'Radio'
@@ -175,7 +179,6 @@ class DriverBench:
     """
     The driver on one end of a line, stations on the other, whole frames at a time.
 
-    In Mode Peer there is one PLC; in Mode Radio all are behind one modem.
     ``far.hear`` and ``far.say`` stand in the line: they return what comes through of a frame.
     ``chunk`` bytes are handed over together.
     """
@@ -189,7 +192,7 @@ class DriverBench:
         self.driver = Driver(
             self.network, mappings, settings or DriverSettings(), listener or self.listener)
         self._stations: list[Responder] = []
-        self.far = _FarEnd(self._stations, self.network)
+        self.far = FarEnd(self._stations, self.network)
         self.line = VirtualLine(self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], None]]] = []
         self._count = itertools.count()
