@@ -19,6 +19,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 import re
 
+# The beginning of a cell is enough to find it.
+_SHOWN = 100
+
 
 def printable(text: str) -> str:
     """
@@ -42,6 +45,11 @@ def value_text(value: float) -> str:
 def cut(text: str, width: int) -> str:
     """Return ``text`` in at most ``width`` characters; a longer one ends with "..."."""
     return text if len(text) <= width else text[:max(width - 3, 0)] + '...'[:width]
+
+
+def shown(cell: str) -> str:
+    """Return a cell as errors show it, a long one without its end."""
+    return cell if len(cell) <= _SHOWN else f'{cell[:_SHOWN]}...'
 
 
 def first(names: Sequence[str], most: int = 5) -> str:

@@ -34,6 +34,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Addressing, AddressRangeError, AddressSyntaxError, BITS
 from abdf1_ros.pccc.address_advice import advice
 from abdf1_ros.pccc.file_types import FileType, FUNCTION_FILES
+from abdf1_ros.text import shown
 
 _FORM = re.compile(
     r'[#$]?(?P<type>[A-Z]{1,3})(?P<file>\d{1,9})?'
@@ -208,7 +209,7 @@ def _with_member(address: Address, name: str) -> Address:
                 f'the length is part of the string; read {address}, which is as long as that')
         known = ', '.join(members) or 'none'
         raise AddressSyntaxError(
-            f'{name} is not a member; members of {address.file_type.value} files: {known}')
+            f'{shown(name)} is not a member; members of {address.file_type.value} files: {known}')
     return replace(address, word=member.word, bit=member.bit)
 
 

@@ -37,6 +37,7 @@ import re
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.hints import hint, is_spreadsheet_error
+from abdf1_ros.text import shown
 
 _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'
@@ -46,8 +47,6 @@ _SEPARATOR_LINE = re.compile(r'"?sep=\W*', re.IGNORECASE)
 _LARGEST = 10_000_000
 # The limit of csv.reader for one cell.
 _LONGEST_LINE = 131_072
-# The beginning of a cell is enough to find it.
-_SHOWN = 100
 # From which similarity (0 to 1) on a wrong name is taken for a mistyped column.
 _ALIKE = 0.7
 # The first bytes of other files that were renamed to .csv: zip archives, old Excel files.
@@ -94,11 +93,6 @@ class Table:
     def is_usable(self) -> bool:
         """Tell whether its rows can be trusted; where most are bad the others may be shifted."""
         return not self.faults and len(self.row_faults) <= len(self.rows)
-
-
-def shown(cell: str) -> str:
-    """Return a cell as errors show it, a long one without its end."""
-    return cell if len(cell) <= _SHOWN else f'{cell[:_SHOWN]}...'
 
 
 def looks_like_address(text: str) -> bool:

@@ -31,6 +31,7 @@ from typing import Protocol
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.text import shown
 
 DEFAULT_PERIOD = 1000
 """Of a heartbeat (ms)."""
@@ -103,8 +104,9 @@ def number_in(row: Row, column: str, limits: tuple[int, int], fault: ReportFault
     value = whole_number(text)
     if value is not None and limits[0] <= value <= limits[1]:
         return value
-    fault(column, f'{column} = "{text}" should be ms from {limits[0]} to {limits[1]}' if text
-          else f'{column} is missing: ms from {limits[0]} to {limits[1]}')
+    right = f'ms from {limits[0]} to {limits[1]}'
+    fault(column, f'{column} = "{shown(text)}" should be {right}' if text
+          else f'{column} is missing: {right}')
     return None
 
 
@@ -168,8 +170,8 @@ def _fallback_values(row: Row, kind: ValueType, length: int, limits: tuple[float
     for text in texts:
         value = decimal_number(text)
         if value is None or not low <= value <= high:
-            fault('Fallback', f'Fallback "{text}" should be a number from {low:.10g} to '
-                              f'{high:.10g}')
+            fault('Fallback', f'Fallback "{shown(text)}" should be a number from {low:.10g} '
+                              f'to {high:.10g}')
         elif kind is ValueType.BOOL and value:
             fault('Fallback', 'a bool falls back to 0: a 1 may be the pulse that starts something')
         else:
@@ -198,8 +200,8 @@ def read_publish_while(row: Row, command: str, publishes_always: bool,
                                    'counter needs a Heartbeat_Timeout')
         else:
             fault('Heartbeat_Timeout', 'Heartbeat_Timeout is missing: ms that the counter '
-                  f'"{condition}" may stand still; for the mode of the processor Publish_While '
-                  f'is {RUN}')
+                  f'"{shown(condition)}" may stand still; for the mode of the processor '
+                  f'Publish_While is {RUN}')
         return PublishWhile(condition, None)
     if timeout:
         fault('Heartbeat_Timeout', 'RUN has no Heartbeat_Timeout: the age of the mode is bounded '

@@ -19,6 +19,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from abdf1_ros.text import shown
+
 # Letters of other scripts, dashes and quotes that look like a character of ASCII.
 _ALIKE = str.maketrans(
     'АВЕКМНОРСТХІЅаеорсухіѕΑΒΕΖΗΙΚΜΝΟΡΤΥΧο‐‑‒–—−‘’“”⁄∕',
@@ -43,7 +45,8 @@ def hint(text: str) -> str:
         if not ' ' <= character <= '~':
             return f'; character {number} is {_name(character)}'
     if match := _WRAPPED.fullmatch(text):
-        return f'; signs that only a spreadsheet needs: write {match["formula"] or match["text"]}'
+        return ('; signs that only a spreadsheet needs: write '
+                f'{shown(match["formula"] or match["text"])}')
     if _TIME.fullmatch(text):
         return ('; a spreadsheet may have made a date or time of it: give the column the format '
                 '"text", and write the cell again')

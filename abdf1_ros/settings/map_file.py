@@ -24,10 +24,11 @@ from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.columns import COLUMNS, NEEDED
-from abdf1_ros.settings.csv_table import read_table, Row, shown
+from abdf1_ros.settings.csv_table import read_table, Row
 from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.text import shown
 
 Clash = Callable[[str, Mapping, str], None]
 """Takes column, other row, and what is wrong with both."""

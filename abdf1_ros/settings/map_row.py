@@ -35,7 +35,7 @@ from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import NEEDED
-from abdf1_ros.settings.csv_table import Row, shown
+from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.heartbeats import (
     DEFAULT_PERIOD,
     heartbeat_type_fault,
@@ -49,6 +49,7 @@ from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.text import shown
 
 MAX_PERIOD = 86_400_000  # ms
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
@@ -229,7 +230,7 @@ class RowReader:
             return default
         value = decimal_number(text.replace(',', '.'))
         if right := two_readings(text):
-            self._bad_value(column, f'could be two numbers; write {right}')
+            self._bad_value(column, f'could be two numbers; write {shown(right)}')
         elif value is None:
             self._bad_value(column, 'should be a number')
         return default if value is None else value

@@ -34,10 +34,11 @@ from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
-from abdf1_ros.settings.csv_table import read_table, Row, shown
+from abdf1_ros.settings.csv_table import read_table, Row
 from abdf1_ros.settings.hints import hint
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.settings.station_lists import octal_remarks, parse_stations
+from abdf1_ros.text import shown
 
 MODES = ('Master', 'Slave', 'Peer', 'Radio')
 _MODE_WORDS = {

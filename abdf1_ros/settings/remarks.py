@@ -32,6 +32,7 @@ from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places, share_remarks
 from abdf1_ros.settings.station_lists import octal_remarks
+from abdf1_ros.text import shown
 
 _ACK_SIZE = 2
 _SHORT_PERIOD = 10  # ms; what is less was meant as seconds
@@ -108,7 +109,8 @@ def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     text = row.get(column)
     if text != mapping.topic:
         below = ', below ~/read/ and ~/write/' if text.startswith('/') else ''
-        yield _at(row, column, f'{column} "{text}" becomes the topic {mapping.topic}{below}')
+        yield _at(row, column, f'{column} "{shown(text)}" becomes the topic '
+                               f'{mapping.topic}{below}')
 
 
 def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:

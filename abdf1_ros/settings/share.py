@@ -25,6 +25,7 @@ from urllib.parse import parse_qsl
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.settings import BAUD_RATES, PARITIES
+from abdf1_ros.text import shown
 
 _LOOPBACK = '127.0.0.1'
 _MOST_PLACES = 16
@@ -63,7 +64,7 @@ def share_places(text: str) -> list[SharePlace]:
     names = [place.text.partition('?')[0] for place in places]
     for name in names:
         if names.count(name) > 1:
-            raise ValueError(f'"{name}" is there twice; each guest has a place of its own')
+            raise ValueError(f'"{shown(name)}" is there twice; each guest has a place of its own')
     if len(places) > _MOST_PLACES:
         raise ValueError(f'{len(places)} places; the most are {_MOST_PLACES}')
     return places
@@ -76,7 +77,7 @@ def _place(text: str) -> SharePlace:
         if value not in _OPTIONS.get(name, ()):
             right = '; '.join(f'{option}={"|".join(values)}'
                               for option, values in _OPTIONS.items())
-            raise ValueError(f'"{text}": after "?" may come {right}')
+            raise ValueError(f'"{shown(text)}": after "?" may come {right}')
     kind, _, name = where.partition(':')
     if where.startswith('/'):
         kind, name = 'serial', where
@@ -84,9 +85,9 @@ def _place(text: str) -> SharePlace:
     if kind == 'tcp':
         host, port = _host_and_port(name, text)
     elif kind not in ('pty', 'serial') or not name.startswith('/'):
-        raise ValueError(f'"{text}" should be {_RIGHT}')
+        raise ValueError(f'"{shown(text)}" should be {_RIGHT}')
     if kind != 'serial' and {'baud', 'parity'} & set(options):
-        raise ValueError(f'"{text}": only a serial device has baud and parity')
+        raise ValueError(f'"{shown(text)}": only a serial device has baud and parity')
     baud, check = options.get('baud'), options.get('check')
     return SharePlace(text, kind, name, host, port, int(baud) if baud else None,
                       Checksum(check) if check else None, options.get('parity'))
@@ -100,7 +101,7 @@ def _host_and_port(name: str, text: str) -> tuple[str, int]:
     except ValueError:
         port = None  # a name may stand for any interface
     if port is None or not 0 < port < 65536:
-        raise ValueError(f'"{text}" should be tcp:PORT (for this machine only) or '
+        raise ValueError(f'"{shown(text)}" should be tcp:PORT (for this machine only) or '
                          'tcp:ADDRESS:PORT, with the address of an interface')
     return host, port
 
@@ -109,5 +110,5 @@ def share_remarks(places: list[SharePlace]) -> Iterator[str]:
     """Yield which places are open to other machines."""
     for place in places:
         if place.is_open_to_others:
-            yield (f'Share {place.text}: whoever reaches {place.host}:{place.port} over the '
-                   'network can send commands to the PLC; nothing asks who it is')
+            yield (f'Share {shown(place.text)}: whoever reaches {place.host}:{place.port} over '
+                   'the network can send commands to the PLC; nothing asks who it is')

@@ -23,6 +23,7 @@ from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.text import shown
 
 _LEADING_ZERO = re.compile(r'0[0-7]+')
 
@@ -35,7 +36,7 @@ def parse_stations(text: str, most: int = MAX_STATION) -> tuple[tuple[int, ...],
         first, dash, last = map(str.strip, part.partition('-'))
         low, high = whole_number(first), whole_number(last if dash else first)
         if low is None or high is None or not 0 <= low <= high <= most:
-            faults.append(f'"{part}" should be a station from 0 to {most}, '
+            faults.append(f'"{shown(part)}" should be a station from 0 to {most}, '
                           'or a range such as 3-5; put commas between them')
         else:
             stations += range(low, high + 1)

@@ -52,6 +52,7 @@ from abdf1_ros.pccc.values import Codec, types_of, ValueType
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import read_rows, Row
 from abdf1_ros.simulator.ladder import Ladder
+from abdf1_ros.text import shown
 
 COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Period', 'Via',
            'Processor')
@@ -364,8 +365,8 @@ def _natural_codec(address: Address, length: int) -> Codec:
 def _number(row: Row, column: str, low: int, high: int) -> int:
     value = whole_number(row.get(column))
     if value is None or not low <= value <= high:
-        raise Problem(row.where(column), f'{column} = "{row.get(column)}" should be a whole '
-                                         f'number from {low} to {high}')
+        raise Problem(row.where(column), f'{column} = "{shown(row.get(column))}" should be a '
+                                         f'whole number from {low} to {high}')
     return value
 
 
@@ -373,7 +374,7 @@ def _choice(row: Row, column: str, choices: dict[str, _Choice]) -> _Choice:
     for name, choice in choices.items():
         if name.lower() == row.get(column).lower():
             return choice
-    raise Problem(row.where(column), f'{column} = "{row.get(column)}" should be one of '
+    raise Problem(row.where(column), f'{column} = "{shown(row.get(column))}" should be one of '
                                      f'{", ".join(filter(None, choices))}')
 
 
@@ -396,6 +397,6 @@ def numbers(texts: Sequence[str]) -> list[float]:
         whole = whole_number(text)
         value = decimal_number(text) if whole is None else whole
         if value is None:
-            raise ValueError(f'"{text}" should be a number')
+            raise ValueError(f'"{shown(text)}" should be a number')
         values.append(value)
     return values

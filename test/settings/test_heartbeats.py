@@ -128,6 +128,18 @@ def test_rule_12_what_a_fallback_cannot_be(cells: dict[str, str], text: str) -> 
     assert text in fault(**WRITE | cells)
 
 
+@pytest.mark.parametrize('cells', [
+    WRITE | {'Fallback': 'x' * 5000, 'Fallback_After': '500'},
+    WRITE | {'Fallback': '0', 'Fallback_After': 'x' * 5000},
+    COUNTER | {'Publish_While': 'x' * 5000},
+    BEAT | {'Requires': 'speed', 'Requires_Timeout': '9' * 5000}])
+def test_long_cell_is_shown_without_its_end(cells: dict[str, str]) -> None:
+    longest = max(cells.values(), key=len)
+    found = faults(row(**cells))
+    assert f'"{longest[:100]}..."' in found[0]
+    assert all(len(text) < 500 for text in found)
+
+
 def test_rule_12_a_fallback_owns_its_words() -> None:
     own = WRITE | {'Fallback': '0', 'Fallback_After': '500'}
     assert 'has its words for itself' in faults(

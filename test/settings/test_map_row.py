@@ -152,6 +152,17 @@ def test_long_cell_is_shown_without_its_end(column: str, texts: list[str]) -> No
     assert len(shown) < 500
 
 
+@pytest.mark.parametrize('cells', [
+    {'Length': "'" + '9' * 5000}, {'Min': f'"{"1" * 5000},000"'}, {'Address': f'T4:0.{"x" * 5000}'}])
+def test_advice_on_a_long_cell_is_without_its_end(cells: dict[str, str]) -> None:
+    assert len(fault(**cells)) < 600
+
+
+def test_remark_on_a_long_cell_is_without_its_end() -> None:
+    remark, = one(Topic='a' + ' ' * 5000 + 'b').remarks
+    assert len(str(remark)) < 500
+
+
 @pytest.mark.parametrize('column', ['Tag', 'Command', 'Address', 'Station', 'PLC_Type'])
 def test_needed_cell_that_is_empty_is_told_as_missing(column: str) -> None:
     assert fault(**{column: ''}) == \

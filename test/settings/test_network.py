@@ -174,6 +174,15 @@ def test_long_cell_is_shown_without_its_end(path: Path, column: str) -> None:
     assert len(fault) < 500
 
 
+@pytest.mark.parametrize(('column', 'text'), [
+    ('Share', 'x' * 5000), ('Share', f'tcp:{"1" * 5000}'), ('Share', f'pty:/{"x" * 5000}?x=1'),
+    ('Share', f'pty:/{"x" * 5000}?baud=9600'), ('Share', ' '.join(2 * [f'pty:/{"x" * 5000}'])),
+    ('Store_Forward', '1' * 5000), ('Baud', f"'{'9' * 5000}")])
+def test_fault_of_a_long_cell_is_short(path: Path, column: str, text: str) -> None:
+    fault, = faults(path, column, text)
+    assert len(fault) < 500
+
+
 def test_every_numbered_fault_is_critical(path: Path) -> None:
     row = ','.join(['300', 'Boss', 'PLC4', 'XOR', '11', '11', '1'])
     header = 'Station,Mode,PLC_Type,Error_Code,NAK_Retries,ENQ_Retries,Cmd_Timeout'

@@ -57,6 +57,14 @@ def faults(path: Path, *rows: str) -> list[str]:
     return [str(problem).split('simulator.csv:')[1] for problem in caught.value.problems]
 
 
+@pytest.mark.parametrize('row', [
+    '{},PLC5,N7:0', '1,{},N7:0', '1,PLC5,T4:0.{}', '1,PLC5,N7:0,{}', '1,PLC5,N7:0,1,{}',
+    '1,PLC5,N7:0,1,0,{}', '1,SLC,N7:0,1,0,,,,{}'])
+def test_fault_of_a_long_cell_is_short(path: Path, row: str) -> None:
+    fault, = faults(path, row.format('x' * 5000))
+    assert len(fault) < 300
+
+
 class Master:
     """Sends commands to a PLC, frame by frame."""
 

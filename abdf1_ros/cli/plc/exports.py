@@ -36,7 +36,7 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import is_export_of_kepserver, looks_like_address, Row
 from abdf1_ros.settings.map_row import RowReader
-from abdf1_ros.text import printable
+from abdf1_ros.text import printable, shown
 
 _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max', 'Description')
 
@@ -156,8 +156,8 @@ def _of_kepserver(record: Cells) -> Cells:
             length *= int(size)
     kind = kind.removesuffix(' array')
     if kind not in _TYPES or access not in _ACCESS:
-        what = f'Data Type "{record.get("data type")}"' if kind not in _TYPES else \
-            f'Client Access "{record.get("client access")}"'
+        what = f'Data Type "{shown(record.get("data type", ""))}"' if kind not in _TYPES else \
+            f'Client Access "{shown(record.get("client access", ""))}"'
         raise ValueError(f'{what} has no counterpart')
     command = _ACCESS[access]
     unit = record.get('eng units') or record.get('engineering units', '')
@@ -179,7 +179,7 @@ def _scaling(record: Cells, command: str) -> Cells:
     if mode in ('', 'none'):
         return {'Scale': '-1'} if sign < 0 else {}
     if mode != 'linear':
-        raise ValueError(f'Scaling "{record["scaling"]}" has no counterpart; Linear has')
+        raise ValueError(f'Scaling "{shown(record["scaling"])}" has no counterpart; Linear has')
     ends = [decimal_number(record.get(name, '').replace(',', '.')) for name in (
         'raw low', 'raw high', 'scaled low', 'scaled high')]
     raw_low, raw_high, low, high = ends

@@ -100,6 +100,8 @@ def test_tag_of_kepserver_becomes_a_row(
      'Raw Low, Raw High, Scaled Low and Scaled High should be numbers, and both raw ones differ'),
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
     ('"Word","N7:0",Word,1,never,100,,,,,,,,,,"",', 'Client Access "never" has no counterpart'),
+    (f'"Word","N7:0",{"x" * 5000},1,RO,100,,,,,,,,,,"",',
+     f'Data Type "{"x" * 100}..." has no counterpart'),
     ('"Meter","400101",Word,1,RO,100,,,,,,,,,,"",',
      'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
     ('"Empty","",Word,1,RO,100,,,,,,,,,,"",', 'Address is missing'),
