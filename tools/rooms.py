@@ -87,7 +87,7 @@ ROOMS = (
     Room(('share',), 'the line shared with other programs: a place for each guest',
          ('errors', 'df1', 'pccc', 'settings', 'driver', 'ports'), is_pure=False),
     Room(('simulator',), 'simulated PLCs and the commands that they take',
-         (*_BASE, 'problems', 'numbers', 'df1', 'pccc', 'settings')),
+         (*_BASE, 'problems', 'numbers', 'text', 'df1', 'pccc', 'settings')),
     Room(('conform',), 'cases of the manual, played against the other end of a line', ()),
     Room(('client.py',), 'a blocking client for programs without ROS or files',
          ('errors', 'counters', 'df1', 'pccc', 'driver.requests', 'ports'), is_pure=False),

@@ -153,7 +153,8 @@ def test_long_cell_is_shown_without_its_end(column: str, texts: list[str]) -> No
 
 
 @pytest.mark.parametrize('cells', [
-    {'Length': "'" + '9' * 5000}, {'Min': f'"{"1" * 5000},000"'}, {'Address': f'T4:0.{"x" * 5000}'}])
+    {'Length': "'" + '9' * 5000}, {'Min': f'"{"1" * 5000},000"'},
+    {'Address': f'T4:0.{"x" * 5000}'}])
 def test_advice_on_a_long_cell_is_without_its_end(cells: dict[str, str]) -> None:
     assert len(fault(**cells)) < 600
 
