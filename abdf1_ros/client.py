@@ -93,6 +93,7 @@ class OpenLine:
         self._requests = Requests(line, absent, random.randrange(0x10000), routes, plc_type)
         self._link = LinkThread(
             self._requests.machine, opened(port), on_state=self._port_changed)
+        self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nobody to stop it
         self._link.start()
 
     def __enter__(self) -> Self:

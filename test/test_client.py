@@ -16,6 +16,8 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+import subprocess
+import sys
 import time
 
 from abdf1_ros.client import Client
@@ -32,6 +34,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
+from support.ptys import PATIENCE
 
 FILES = (('N7:0', 250), ('B3:0', 4), ('F8:0', 8), ('T4:0', 9), ('ST9:0', 42), ('A10:0', 4))
 
@@ -185,6 +188,14 @@ def test_example_of_the_page_runs(peer: str, capsys: pytest.CaptureFixture[str])
     exec(example.replace('/dev/ttyUSB0', peer), names)  # noqa: S102
     assert names['speeds'] == [0] * 10 and names['level'] == 0.0
     assert capsys.readouterr().out == 'SLC 5/03 series A revision 1, REM RUN\n'
+
+
+def test_program_that_breaks_off_without_closing_ends(port: str) -> None:
+    program = ('import sys; from abdf1_ros.client import Client; '
+               'here = Client(sys.argv[1]); raise KeyboardInterrupt')
+    said = subprocess.run([sys.executable, '-c', program, port], text=True, capture_output=True,
+                          timeout=PATIENCE, check=False)
+    assert said.stderr.endswith('KeyboardInterrupt\n')
 
 
 class Nothing:

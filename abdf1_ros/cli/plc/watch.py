@@ -89,8 +89,8 @@ class Watch:
 
         A failed read counts too. Returns how many addresses have no value at the end.
         """
-        self._link.start()
         try:
+            self._link.start()  # inside, as the thread would keep the process alive
             while not self._link.has_failed and not self._is_done(count):
                 self._has_news.wait(_GLANCE)
                 self._has_news.clear()

@@ -16,6 +16,7 @@
 
 from array import array
 from collections.abc import Iterator
+from contextlib import suppress
 import io
 import os
 from pathlib import Path
@@ -23,6 +24,7 @@ import threading
 
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.pccc.values import Values
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.testing import Plcs
@@ -100,6 +102,21 @@ def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str])
     assert Watch(network_on(plcs), [SPEED], 0.01).run(2) == 1
     assert shown(capsys) == [
         'N7:0  no value: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
+
+
+def test_interrupt_of_the_start_leaves_no_thread(
+        plcs: Plcs, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Interrupted(LinkThread):
+        def start(self) -> None:
+            self.daemon = True  # or a thread that is left would hold up the end of all tests
+            super().start()
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch.LinkThread', Interrupted)
+    watch = Watch(network_on(plcs), [SPEED], 0.01)
+    with suppress(KeyboardInterrupt):
+        watch.run(1)
+    assert not watch._link.is_alive()
 
 
 class Terminal(io.StringIO):
