@@ -506,8 +506,11 @@ def main(args: Sequence[str] | None = None) -> int:
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
-    with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
-        return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
+    try:
+        with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
+            return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
+    except KeyboardInterrupt:  # before the first step, or after the last
+        return 0
 
 
 def _tell(demo: Demo, seconds: float) -> int:

@@ -140,11 +140,11 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     prepare_output()
     options = _parse(args)
-    with interruptible():
-        try:
+    try:
+        with interruptible():
             return _run(options)
-        except KeyboardInterrupt:  # so early that nothing has to be ended
-            return 0
+    except KeyboardInterrupt:  # so early that nothing has to be ended, or after that
+        return 0
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -195,8 +195,11 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     prepare_output()
     options = _parse(args)
-    with interruptible():
-        return _decode(options)
+    try:
+        with interruptible():
+            return _decode(options)
+    except KeyboardInterrupt:  # before there was anything to sum up, or after all was told
+        return 0
 
 
 def _decode(options: argparse.Namespace) -> int:
@@ -211,8 +214,6 @@ def _decode(options: argparse.Namespace) -> int:
         return _listen(options, output)
     except OSError as error:
         return 0 if has_reader_left(error, _say) else EXIT_USAGE
-    except KeyboardInterrupt:  # before there was anything to sum up
-        return 0
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:

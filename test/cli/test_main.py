@@ -90,3 +90,16 @@ def test_every_command_tells_its_version(
         import_module(COMMANDS[name]).main()
     assert end.value.code == 0
     assert capsys.readouterr().out.startswith('abdf1_ros ')
+
+
+@pytest.mark.parametrize(('name', 'args', 'status'), [
+    ('plc', ['ports'], 130), ('conform', ['slave', '--port', 'x'], 130), ('sniff', ['x'], 0),
+    ('simulator', [], 0), ('demo', [], 0)])
+def test_signal_where_nothing_is_under_way_ends_quietly(
+        name: str, args: list[str], status: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    module = import_module(COMMANDS[name])
+    monkeypatch.setattr(module, 'interruptible', interrupted)
+    assert module.main(args) == status

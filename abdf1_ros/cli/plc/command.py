@@ -82,8 +82,11 @@ def main(args: Sequence[str] | None = None) -> int:
     """Carry out one command; the exit statuses are those of --help."""
     prepare_output()
     options = make_parser(__doc__).parse_args(args)
-    with interruptible():
-        return _run(options)
+    try:
+        with interruptible():
+            return _run(options)
+    except KeyboardInterrupt:  # out of telling an error too
+        return EXIT_INTERRUPTED
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -104,8 +107,6 @@ def _run(options: argparse.Namespace) -> int:
     except PortLost as error:
         _complain(str(error))
         return EXIT_FAILED
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
 
 
 def _cells(options: argparse.Namespace, command: Command, length: int | str) -> dict[str, str]:
