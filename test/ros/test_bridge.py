@@ -17,9 +17,11 @@
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 import re
 import signal
+from statistics import median
 import time
 from typing import Any
 
@@ -40,6 +42,7 @@ from support.ros import (
     Observer,
     OK,
     Process,
+    stamp,
     until_status,
     values_in,
     WARN,
@@ -88,8 +91,7 @@ class Bridge:
         finally:
             self.simulator.say(f'normal {station}')
             self.diagnostics.clear()
-            until_status(self.diagnostics, 'mappings', OK)
-            until_status(self.diagnostics, 'link', OK)
+            self.diagnostics.until_well()
             self.diagnostics.clear()
 
     def write(self, tag: str, values: list[float] | str,
@@ -153,7 +155,9 @@ def test_topics_are_those_of_the_map_and_no_others(bridge: Bridge) -> None:
 
 
 def read_qos(bridge: Bridge, tag: str) -> Any:
-    (endpoint,) = bridge.observer.node.get_publishers_info_by_topic(f'/abdf1/read/{tag}')
+    (endpoint,) = bridge.observer.until(
+        lambda: bridge.observer.node.get_publishers_info_by_topic(f'/abdf1/read/{tag}'),
+        'the publisher')
     return endpoint.qos_profile
 
 
@@ -185,7 +189,9 @@ def test_topic_published_on_change_promises_no_heartbeat(bridge: Bridge) -> None
 
 @pytest.mark.parametrize('tag', sorted(WRITES))
 def test_write_topic_takes_nothing_sent_before_its_time(bridge: Bridge, tag: str) -> None:
-    (endpoint,) = bridge.observer.node.get_subscriptions_info_by_topic(f'/abdf1/write/{tag}')
+    (endpoint,) = bridge.observer.until(
+        lambda: bridge.observer.node.get_subscriptions_info_by_topic(f'/abdf1/write/{tag}'),
+        'the subscription')
     assert endpoint.qos_profile.reliability is ReliabilityPolicy.RELIABLE
     assert endpoint.qos_profile.durability is DurabilityPolicy.VOLATILE
 
@@ -196,7 +202,7 @@ def test_values_are_a_heartbeat_unless_published_on_change(bridge: Bridge) -> No
     always.first()
     bridge.observer.until(lambda: len(always) > 5, 'six values of a topic that never changes')
     assert all(values_in(message) == [-17] for message in always)
-    assert len(change) == 1
+    assert len(change) < len(always)  # once more after each outage
     bridge.observer.forget(always)
     bridge.observer.forget(change)
 
@@ -211,10 +217,11 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=stale_time))
     plain = bridge.listen('speeds')
     careful.first()
-    bridge.observer.until(lambda: careful.liveliness, 'the publisher to be alive')
-    assert careful.liveliness[-1].alive_count == 1
-    assert not careful.deadlines
+    bridge.observer.until(lambda: careful.liveliness and careful.liveliness[-1].alive_count == 1,
+                          'the publisher to be alive')
+    careful.deadlines.clear()
     bridge.active.values([0b110] + 15 * [0])
+    bridge.active.clear()
     with bridge.fault('silent 2'):
         # The subscriber that asked for it is told.
         bridge.observer.until(lambda: careful.deadlines, 'a missed deadline')
@@ -229,8 +236,8 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         status = until_status(bridge.diagnostics, 'link', WARN)
         assert status.message == 'WARN: port open, 1 of 2 stations do not answer'
         status = until_status(bridge.diagnostics, 'mappings', ERROR,
-                              lambda status: details(status)['failed'] == '12'
-                              and details(status)['late'] == '0')
+                              lambda status: [details(status)[key] for key in (
+                                  'failed', 'late', 'stale')] == ['12', '0', '0'])
         assert re.fullmatch(
             r'failed: C5:2\.ACC at station 2, last read \d+\.\d s ago; '
             r'2509 ERR_INACTIVE_STATION: Slave Station \(2\) Inactive',
@@ -258,10 +265,10 @@ def test_active_stations_are_latched_and_published_on_change_only(bridge: Bridge
     assert values_in(late.first()) == [0b110] + 15 * [0]
     with bridge.fault('silent 1', station=1):
         late.values([0b100] + 15 * [0])
-    late.until(lambda message: message.data[0] == 0b110, 'station 1 again')
+    bridge.observer.until(lambda: late[-1].data[0] == 0b110, 'station 1 again')
     heartbeat = bridge.listen('heartbeat')
     bridge.observer.until(lambda: len(heartbeat) > 1, 'values')
-    assert [message.data[0] for message in late] == [0b110, 0b100, 0b110]
+    assert all(one.data != other.data for one, other in pairwise(late))
     bridge.observer.forget(late)
     bridge.observer.forget(heartbeat)
 
@@ -271,14 +278,13 @@ def test_first_good_read_after_an_outage_is_published_even_on_change_only(bridge
     recipe.first()
     with bridge.fault('silent 2'):
         until_status(bridge.diagnostics, 'station 2', ERROR)
-        assert len(recipe) == 1
-    bridge.observer.until(lambda: len(recipe) == 2, 'the value after the outage')
+        count = len(recipe)
+    bridge.observer.until(lambda: len(recipe) > count, 'the value after the outage')
     bridge.observer.forget(recipe)
 
 
 def counter(bridge: Bridge, name: str) -> int:
-    bridge.diagnostics.clear()
-    return int(details(find_status(bridge.diagnostics.first(), 'counters'))[name])
+    return int(details(find_status(bridge.diagnostics.fresh(), 'counters'))[name])
 
 
 def test_slow_station_costs_polls_but_no_values(bridge: Bridge) -> None:
@@ -289,7 +295,7 @@ def test_slow_station_costs_polls_but_no_values(bridge: Bridge) -> None:
         bridge.observer.until(lambda: len(parts) > 3, 'values of a slow station')
         assert all(values_in(message) == [-17] for message in parts)
         assert counter(bridge, 'CNT_EOTS_RCVD') >= eots + 9
-        assert find_status(bridge.diagnostics.first(), 'station 2').level == OK
+        until_status(bridge.diagnostics, 'station 2', OK)
     bridge.observer.forget(parts)
 
 
@@ -467,10 +473,10 @@ def test_statuses_have_names_order_and_words(bridge: Bridge) -> None:
 
 def test_every_status_comes_with_every_period(bridge: Bridge) -> None:
     bridge.diagnostics.clear()
-    bridge.observer.until(lambda: len(bridge.diagnostics) > 4, 'five diagnostics')
-    times = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9
-             for array in bridge.diagnostics]
-    assert (times[4] - times[0]) / 4 == pytest.approx(0.25, rel=0.5)
+    bridge.observer.until(lambda: len(bridge.diagnostics) > 8, 'nine diagnostics')
+    # Half of the pauses: a busy host makes some longer, and news come at once.
+    assert median(later - earlier for earlier, later in pairwise(
+        stamp(array) for array in bridge.diagnostics)) < 0.375
     assert {len(array.status) for array in bridge.diagnostics} == {len(STATUSES)}
 
 
@@ -478,12 +484,12 @@ def test_link_status_tells_of_port_and_load(bridge: Bridge) -> None:
     bridge.diagnostics.clear()
     bridge.diagnostics.first()
     status = until_status(bridge.diagnostics, 'link', OK,
-                          lambda status: details(status)['poll cycle'] != 'unknown')
+                          lambda status: details(status)['poll cycle'] != 'unknown'
+                          and float(details(status)['transactions per second']) > 1)
     said = details(status)
     assert status.message == 'OK: port open, 2 of 2 stations have answered'
     assert said['port'] == 'open'
     assert said['settings'] == '115200 baud, CRC'
-    assert float(said['transactions per second']) > 1
     assert re.fullmatch(r'[1-9]\d* %', said['line load'])
     assert re.fullmatch(r'[1-9]\d* ms', said['poll cycle'])
 
@@ -500,8 +506,7 @@ def test_station_status_tells_of_its_answers(bridge: Bridge) -> None:
 
 
 def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Bridge) -> None:
-    bridge.diagnostics.clear()
-    before = details(find_status(bridge.diagnostics.first(), 'counters'))
+    before = details(find_status(bridge.diagnostics.fresh(), 'counters'))
     assert list(before) == COUNTERS
     assert len(COUNTERS) == 29
     for name in ('CNT_MSG_PACKETS_SENT', 'CNT_CMD_MSGS_SENT', 'CNT_REPLY_MSGS_RCVD',
@@ -510,8 +515,7 @@ def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Br
         assert int(before[name]) > 0, name
     response = bridge.observer.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
     assert response.success
-    bridge.diagnostics.clear()
-    after = details(find_status(bridge.diagnostics.first(), 'counters'))
+    after = details(find_status(bridge.diagnostics.fresh(), 'counters'))
     assert list(after) == COUNTERS
     assert 0 <= int(after['CNT_CMD_MSGS_SENT']) < int(before['CNT_CMD_MSGS_SENT'])
     assert int(after['CRD_CHAR_SENT']) < int(before['CRD_CHAR_SENT'])

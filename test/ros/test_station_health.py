@@ -254,6 +254,7 @@ def test_link_counters_are_read_by_the_service(bridge: Bridge) -> None:
     first, second = response.message.split('; ')
     assert first.startswith('station 1: modem lines none on, messages sent ')
     assert second.startswith('station 2: modem lines none on, messages sent ')
+    bridge.diagnostics.fresh()
     values = bridge.until(OK, 'OK: station 2 active')
     assert f'messages sent {values["link counter messages sent"]},' in second
     assert int(values['link counter polls received']) > 0

@@ -172,6 +172,23 @@ class Inbox(testing.Messages):
         self.clear()
         return self.first()
 
+    def fresh(self) -> DiagnosticArray:
+        """
+        Wait for diagnostics that were made after now.
+
+        What DDS still holds is older than a clear(), and a stamp comes after what it stamps; so
+        they are the second with a later stamp.
+        """
+        self.clear()
+        now = time.time()
+        return self._observer.until(
+            lambda: [array for array in self if stamp(array) > now][1:], 'new diagnostics')[0]
+
+    def until_well(self) -> None:
+        """Wait until the last diagnostics say that every mapping is read."""
+        self._observer.until(lambda: self and all(
+            find_status(self[-1], name).level == OK for name in ('mappings', 'link')), 'all well')
+
     def values(self, expected: Sequence[float] | str) -> Any:
         """Wait for a message with these values."""
         return self.until(lambda message: values_in(message) == expected, f'{expected}')
@@ -234,6 +251,11 @@ def get_parameters(observer: Observer, *names: str, node: str = '/abdf1') -> lis
         GetParameters, f'{node}/get_parameters', GetParameters.Request(names=names))
     assert len(response.values) == len(names)
     return [parameter_value_to_python(value) for value in response.values]
+
+
+def stamp(array: DiagnosticArray) -> float:
+    """Return the time in the header of an array, in s."""
+    return array.header.stamp.sec + array.header.stamp.nanosec / 1e9
 
 
 def find_status(array: DiagnosticArray, name: str) -> DiagnosticStatus:
