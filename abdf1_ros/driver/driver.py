@@ -60,6 +60,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
 _NOT_OPEN = 'the port is not open'
+ENDS = 'this node ends'
 
 
 class Listener(ValueListener, Protocol):
@@ -98,6 +99,7 @@ class Driver:
             _routes(network, mappings), longest_probe(network))
         self.machine = make_machine(network.line, self._run, self.counters)
         self.machine.background = self
+        self.stations.woke = lambda: self.machine.woke
         self.is_online = False
         self._is_ending = False
         self._settings = settings
@@ -193,7 +195,7 @@ class Driver:
         if not self.is_online:
             return _NOT_OPEN
         if self._is_ending:
-            return 'this node ends'
+            return ENDS
         waiting = len(self._inbox) + len(self._writes)
         return 'too many writes are waiting' if waiting + count > MAX_WAITING_WRITES else ''
 
@@ -278,15 +280,15 @@ class Driver:
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""
-        timeout = self._settings.write_timeout
         for write in self._inbox.take():
+            timeout = self._writes.patience_of(write.mapping)
             if self.interlocks.is_overruled(write):
                 self._end_write(write, Outcome.NOT_SENT, 'fallback')
                 continue
             self.interlocks.message_came(write)
             if not write.mapping.serves:
                 self._writes.add(write, now)
-            elif now - write.requested > timeout:
+            elif now - write.requested >= timeout:
                 self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
             else:
                 self._served.store(write.mapping, write.raw)

@@ -378,7 +378,7 @@ class Lines:
         began = time.monotonic()
         nodes = [line.node for line in self.lines if line.node is not None]
         for node in nodes:
-            node.session.begin_end()
+            node.begin_end()
         for node in nodes:
             node.session.finish_end(began + END_LIMIT, 'ends')  # for all of them together
         for line in self.lines:

@@ -25,7 +25,7 @@ from functools import partial
 import time
 from typing import Any
 
-from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.driver import Driver, ENDS
 from abdf1_ros.driver.writes import MAX_WAITING_WRITES
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -100,7 +100,7 @@ class BridgeNode(Node):
                  graph: Graph | None = None, port_owners: PortOwners | None = None,
                  **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
-        self._is_stuck = False
+        self._is_stuck = self._is_ending = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
@@ -181,6 +181,11 @@ class BridgeNode(Node):
         self.link.start()
         self.session.start_guests()
 
+    def begin_end(self) -> None:
+        """Begin the end, as ``Session`` does; no request takes it back."""
+        self._is_ending = True
+        self.session.begin_end()
+
     def tell_plcs(self, what: str = 'ends') -> None:
         """Have heartbeats set to 0 and fallbacks written, and wait for it (rule 5)."""
         self.session.begin_end()
@@ -194,6 +199,7 @@ class BridgeNode(Node):
         that is stuck.
         """
         if self.link.is_alive():
+            self._is_ending = True
             self.tell_plcs()
         self.link.stop()
         self.session.stop_guests()
@@ -219,6 +225,9 @@ class BridgeNode(Node):
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Use the files as they are now, or go on as before where these have faults."""
+        if self._is_ending:
+            response.message = ENDS
+            return response
         try:
             configuration = read_again(self, self.session.configuration.parameters)
             self._hold_ports(self.port, configuration.port)
@@ -246,6 +255,8 @@ class BridgeNode(Node):
             return False
         before.end()
         self.session.begin()
+        if self._is_ending:  # since then
+            self.session.begin_end()
         self.session.start_guests()
         declare_again(self, configuration)
         self._hold_ports(self.port)
@@ -254,7 +265,9 @@ class BridgeNode(Node):
     def _set_polling(self, request: SetBool.Request,
                      response: SetBool.Response) -> SetBool.Response:
         """Leave the port to others, or take it again."""
-        if request.data:
+        if self._is_ending:
+            response.message = ENDS
+        elif request.data:
             self.driver.resume()
             self.link.take()
             response.success, response.message = True, f'{self.port} is being opened'

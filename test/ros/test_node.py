@@ -46,6 +46,7 @@ from std_msgs.msg import (  # noqa: I101
     UInt8MultiArray,
     UInt16MultiArray,
 )
+from std_srvs.srv import SetBool, Trigger
 from support.ptys import wait_until
 from support.ros import (
     details,
@@ -495,6 +496,16 @@ def test_stop_ends_all_threads_and_gives_the_port_back(
     assert status.message == 'ERROR: closed'
     make_bench(SPEED)  # the port is free for another one
     speed.next()
+
+
+def test_end_is_not_taken_back_by_a_request(make_bench: Benches, observer: Observer) -> None:
+    bench = make_bench(SPEED)
+    bench.node.begin_end()
+    polling = observer.call(SetBool, '/abdf1/polling', SetBool.Request(data=True))
+    assert (polling.success, polling.message) == (False, 'this node ends')
+    reload = observer.call(Trigger, '/abdf1/reload', Trigger.Request())
+    assert (reload.success, reload.message) == (False, 'this node ends')
+    assert bench.node.driver.interlocks._is_ending
 
 
 def test_internal_errors_are_told_and_the_third_is_the_end(
