@@ -107,6 +107,10 @@ _NOTHING = Silence()
 # Timeout = 0, which S0 allows, means "as short as the equipment can do".
 MIN_RESPONSE_TIME = 0.02
 
+# Whoever is called so many seconds after a deadline has not run meanwhile: this process, or its
+# host, was paused, and nobody knows how long what comes then has lain in a buffer.
+MOST_LATE = 0.2
+
 # What an operating system or a device server may hold bytes of a frame back (s).
 HELD_BACK = 0.1
 
@@ -187,7 +191,8 @@ class Machine:
     do with Embedded Responses = Auto-detect. ``rate`` is what the line has shown of its speed.
     ``send_before`` is the clock value (s) after which ``withdraw`` is due in place of
     ``data_to_send``. ``late`` is the sum of the seconds by which it was called after a deadline of
-    its procedure: so long this process, or its host, has not run.
+    its procedure: so long this process, or its host, has not run. ``woke`` is the clock value (s)
+    at which it went on after the last pause of more than ``MOST_LATE``.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -201,6 +206,7 @@ class Machine:
         self.unsent: Callable[[], int] = lambda: 0
         self.background: Background | None = None
         self.late = 0.0
+        self.woke = -math.inf
         self.position = 0
         self.embeds = False
         self.send_before = math.inf
@@ -352,6 +358,8 @@ class Machine:
         if self.deadline is None or now < self.deadline:
             return
         self.late += now - self.deadline
+        if now - self.deadline > MOST_LATE:
+            self.woke = now
         if self._pending is not None:
             self._transmit(self._pending)
         else:

@@ -28,6 +28,9 @@ from abdf1_ros.settings.mapping import Mapping
 # A fallback value that the PLC refuses is written again after so many seconds.
 _PAUSE_AFTER_REFUSAL = 1.0
 
+# At an orderly end the second write of rule 10 comes after so many seconds: there are two in all.
+_SETTLE_AT_END = 1.0
+
 # One that stands is written again after so many seconds at least (rule 8).
 _LEAST_REFRESH = 5.0
 
@@ -104,7 +107,8 @@ class FallbackRow:
         self._counts_from = -math.inf
         self.has_failed = False
         self._values = mapping.fallback.values
-        self._settle_time = 2 * cmd_timeout
+        self._cmd_timeout = cmd_timeout
+        self._is_ending = False
         self._due_since = 0.0
         self._next_try = -math.inf
         # Whether a write has ended as unknown since the last message or fallback was confirmed.
@@ -122,16 +126,39 @@ class FallbackRow:
         return self.state is FallbackState.STANDS
 
     def make_due(self, cause: FallbackCause, now: float) -> None:
-        """Make the fallback due; the first cause is the one that is told."""
+        """Make the fallback due at once; the first cause is the one that is told."""
         if self.cause is None:
             self.cause, self._due_since = cause, now
+        self._due_since = min(self._due_since, now)  # a message may have put it off
         self._go(FallbackEvent.DUE)
         self._next_try = self.due = now
+
+    def end(self, *, is_ending: bool) -> None:
+        """Take note that there is an end, in which little time is left, or that there is none."""
+        self._is_ending = is_ending
+        if self._again_at < math.inf:
+            self._again_at = min(self._again_at, self.tried + self._settle_time)
+            self.due = -math.inf
+
+    @property
+    def _settle_time(self) -> float:
+        """Return the seconds after which a gateway holds nothing any more."""
+        return min(2 * self._cmd_timeout, _SETTLE_AT_END if self._is_ending else math.inf)
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Tell whether nothing is left to be written of what is due."""
+        return self.cause is None and not (self.stands and self._again_at < math.inf)
 
     @property
     def is_first_try(self) -> bool:
         """Tell whether the fallback is due and was not sent since."""
         return self.cause is not None and self.sent < self._due_since
+
+    @property
+    def may_be_first_try(self) -> bool:
+        """Tell whether the next look at it may find a first try."""
+        return self.is_first_try or self.cause is None and not self.stands
 
     def is_fresh(self, now: float) -> bool:
         """Tell whether the last confirmed message is young enough."""
@@ -180,7 +207,8 @@ class FallbackRow:
         """
         Take note how it ended; return the seconds that it was due, None where none is reported.
 
-        It is written once more where a gateway may still hold a message of the row (rule 10).
+        It is written once more where a gateway may still hold a message of the row (rule 10), and
+        where it has become due since this write began.
         """
         self.is_under_way = False
         self.due = now
@@ -192,6 +220,8 @@ class FallbackRow:
         self._again_at = now + self._settle_time if self._is_unconfirmed else math.inf
         self._is_unconfirmed = False
         self.refresh_at = now + max(self.after, _LEAST_REFRESH)
+        if self.cause is not None and self.tried < self._due_since:
+            return None
         was_due, self.cause = self.cause is not None, None
         self._go(FallbackEvent.FALLBACK_WRITTEN)
         return now - self._due_since if was_due else None

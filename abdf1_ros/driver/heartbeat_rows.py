@@ -30,8 +30,11 @@ LARGEST = 32_767
 
 _LEAST_LIFE_SIGN = 1.0  # s
 
-# At first contact 0 stands for so long (s) at least: a PLC sees a word once in a scan (rule 2).
+# 0 stands for so long (s) at least: a PLC sees a word once in a scan (rule 2).
 _LEAST_ZERO = 0.5
+
+# A 0 that the PLC has not confirmed is written again after so many seconds, or a Period.
+_REPEAT_ZERO = 1.0
 
 # A stopped executor does not wake the link, so the link looks by itself every so many seconds.
 _GLANCE = 0.1
@@ -167,10 +170,9 @@ class HeartbeatRow:
         self.reason = why_held
         if self.state is BeatState.SHOWN and now >= self._next:
             self._go(BeatEvent.SEEN)
-        if self.state is BeatState.COUNTS and why_held:
-            self._go(BeatEvent.HOLD)
-            self.is_first_try = True
-        elif self.state is BeatState.HELD and not why_held:
+        if why_held:
+            self.hold()
+        elif self.state is BeatState.HELD and self.is_at_rest:  # the PLC has to see the 0
             self._go(BeatEvent.RELEASE)
         if self.is_under_way:
             self.due = math.inf
@@ -184,6 +186,17 @@ class HeartbeatRow:
         else:
             self.due = min(self._next, self.topics_until(messages)) if self.value else self._next
         return self.due <= now and self.state is not BeatState.SHOWN
+
+    def hold(self) -> None:
+        """Write 0 at once, if it counts (rule 3)."""
+        if self.state is BeatState.COUNTS:
+            self._go(BeatEvent.HOLD)
+            self.is_first_try = True
+
+    @property
+    def may_be_first_try(self) -> bool:
+        """Tell whether the next look at it may find a first try."""
+        return self.is_first_try
 
     def read_back(self, value: int, started: float, now: float) -> str:
         """
@@ -226,7 +239,9 @@ class HeartbeatRow:
         elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
             before = self.value or self._before_first
             self.value, self._is_confirmed = before % LARGEST + 1, False
-        self._next = now + self._period
+        # Another writer has to see our 0 between two of its own.
+        is_urgent = self.wants_zero and self.state is not BeatState.CONFLICT
+        self._next = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
         return Write(self.mapping, [self.value], now)
 
     def ended(self, outcome: Outcome, now: float) -> None:
@@ -236,7 +251,8 @@ class HeartbeatRow:
         if outcome is not Outcome.WRITTEN:
             return
         self._is_confirmed, self.confirmed = True, now
-        if self.value == 0 and self.state is BeatState.CONTACT:
-            self._go(BeatEvent.ZERO_CONFIRMED)
+        if self.value == 0 and self.state is not BeatState.CONFLICT:
             self._next = now + max(self._period, _LEAST_ZERO) + self._extra_zero
             self._extra_zero = 0.0
+        if self.value == 0 and self.state is BeatState.CONTACT:
+            self._go(BeatEvent.ZERO_CONFIRMED)

@@ -80,8 +80,8 @@ class _Plc:
     The rows of one station, and how it has answered our own writes.
 
     ``due`` is when its rows have to be looked at (clock value in s), infinite while it is
-    inactive. ``failures`` counts the last ones that it has not answered; from the second on it is
-    left alone up to ``pause_end``.
+    inactive, ``first_due`` that for first tries, which no pause holds up. ``failures`` counts the
+    last ones that it has not answered; from the second on it is left alone up to ``pause_end``.
     """
 
     def __init__(self, station: int) -> None:
@@ -89,7 +89,7 @@ class _Plc:
         self.heartbeats: list[HeartbeatRow] = []
         self.fallbacks: list[FallbackRow] = []
         self.rows: list[OwnRow] = []
-        self.due = math.inf
+        self.due = self.first_due = math.inf
         self.failures = 0
         self.pause_end = -math.inf
         self.is_running: bool | None = None
@@ -102,6 +102,8 @@ class _Plc:
     def plan(self) -> None:
         """Look at its rows again when the first of them wants it."""
         self.due = min([row.due for row in self.rows], default=math.inf)
+        self.first_due = min([row.due for row in self.rows if row.may_be_first_try],
+                             default=math.inf)
 
 
 class Interlocks:
@@ -150,6 +152,7 @@ class Interlocks:
         self._has_begun = False
         self._is_ending = False
         self._are_all_due = False
+        self._awaited: frozenset[int] = frozenset()  # stations that answered when the end began
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to write by ourselves."""
@@ -174,12 +177,14 @@ class Interlocks:
     def resume(self) -> None:
         """Take note that it was not the end: the next opening of the port is a first contact."""
         self._is_ending = self._are_all_due = False
+        for row in self.fallbacks:
+            row.end(is_ending=False)
 
     @property
     def is_over(self) -> bool:
-        """Tell whether all stations that answer have confirmed all writes of ``wind_down``."""
+        """Tell whether all stations that answered at ``wind_down`` have confirmed its writes."""
         return not self or self._are_all_due and not any(
-            self._stations[row.mapping.station].active for row in self._unconfirmed())
+            row.mapping.station in self._awaited for row in self._unconfirmed())
 
     def unconfirmed(self) -> list[str]:
         """Return the tags of the rows that are not confirmed yet at the end."""
@@ -187,7 +192,7 @@ class Interlocks:
 
     def _unconfirmed(self) -> Iterator[OwnRow]:
         yield from (row for row in self.heartbeats if not row.is_at_rest)
-        yield from (row for row in self.fallbacks if row.cause is not None)
+        yield from (row for row in self.fallbacks if not row.is_confirmed)
 
     def begin(self, now: float) -> None:
         """Take note that the port has been opened: a first contact with everybody (rule 2)."""
@@ -235,10 +240,12 @@ class Interlocks:
     def message_came(self, write: Write) -> None:
         """Take note of a message that was accepted (rule 3 d)."""
         topic = write.mapping.topic
-        self._messages[topic] = max(write.requested, self._messages.get(topic, -math.inf))
         for beat in self.heartbeats:
             if topic in beat.requires:
+                if beat.missing(self._messages, write.requested):
+                    beat.hold()  # before anybody looked: the line was busy all the time
                 self._look_again(beat)
+        self._messages[topic] = max(write.requested, self._messages.get(topic, -math.inf))
 
     def is_overruled(self, write: Write) -> bool:
         """Tell whether a message comes after the end, or before a fallback of its row (5, 9)."""
@@ -250,6 +257,8 @@ class Interlocks:
         row = self._by_mapping.get(id(write.mapping))
         if row is not None:
             row.message_ended(write.requested, outcome)
+            if self._are_all_due:
+                row.make_due(FallbackCause.END, self._writing.line.now)
             self._look_again(row)
 
     def message_expired(self, write: Write) -> None:
@@ -340,8 +349,9 @@ class Interlocks:
 
     def _free_from(self, plc: _Plc) -> float:
         """Return from when on more than first tries may be written to a PLC (clock value in s)."""
-        in_turn = -math.inf if self._is_ending else self._stations.next_message(plc.station)
-        return max(plc.pause_end, in_turn)
+        if self._is_ending:  # there is no later
+            return -math.inf
+        return max(plc.pause_end, self._stations.next_message(plc.station))
 
     def _begin(self, plc: _Plc, row: OwnRow, youngest: dict[int, float], now: float) -> OwnWrite:
         expires = math.inf
@@ -419,7 +429,8 @@ class Interlocks:
         if outcome is Outcome.UNKNOWN:
             plc.failures += 1
             if plc.is_lost:
-                share = _SHARE_OF_OTHERS * (now - own.begun) * is_behind_gateway
+                took = now - max(own.begun, self._writing.line.woke)
+                share = _SHARE_OF_OTHERS * took * is_behind_gateway
                 plc.pause_end = now + max(_LEAST_PAUSE, share)
         elif outcome is not Outcome.NOT_SENT:
             was_lost, plc.failures, plc.pause_end = plc.is_lost, 0, -math.inf
@@ -454,11 +465,13 @@ class Interlocks:
         self._plan(self._ours)
 
     def _make_all_due(self, now: float) -> None:
-        messages = self._writes.youngest()
         for row in self.fallbacks:
-            is_followed = id(row.mapping) in messages or self._writing.is_held_up(row.mapping)
-            if row.cause is None and (is_followed or not row.stands):
+            self._writes.drop('fallback', now, row.mapping)
+            row.end(is_ending=True)
+            if not row.stands or self._writing.is_held_up(row.mapping):
                 row.make_due(FallbackCause.END, now)
+        self._awaited = frozenset(
+            number for number in self._plcs if self._stations[number].active)
         for beat in self.heartbeats:
             beat.due = now
         self._are_all_due = True
@@ -469,6 +482,5 @@ class Interlocks:
         due = self._refreshes[0][0] if self._refreshes else math.inf
         for plc in self._plcs.values():
             if plc.due < due and self._stations[plc.station].active:
-                is_first = any(row.is_first_try and row.due <= plc.due for row in plc.rows)
-                due = min(due, plc.due if is_first else max(plc.due, self._free_from(plc)))
+                due = min(due, plc.first_due, max(plc.due, self._free_from(plc)))
         return due

@@ -39,6 +39,7 @@ class LineTime(Protocol):
 
     now: float
     late: float
+    woke: float
 
 
 class Job:

@@ -34,6 +34,7 @@ import heapq
 import itertools
 import math
 
+from abdf1_ros.df1.machine import MOST_LATE
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.points import ReadPoint
 from abdf1_ros.pccc.dialect import Steps
@@ -43,10 +44,6 @@ from abdf1_ros.plan.planner import Block
 
 _TURNS = 4
 _MOST_ENTRIES = 4  # for each read
-
-# A reply that comes so many seconds later than any reply can come may have old values: this
-# process or its host was paused, and nobody knows how long the reply has lain in a buffer.
-MOST_LATE = 0.2
 
 
 class ReadJob(Job):

@@ -18,7 +18,7 @@ Heartbeats, fallback values and guarded reads on a virtual line.
 The numbers in the names are those of the rules in docs/heartbeats.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 import math
@@ -82,6 +82,7 @@ class Cell:
         self.refusals = 0
         self.spared: int | None = None  # this value is taken all the same
         self.is_late = False  # commands are carried out, and no reply comes in time
+        self.is_undelivered: Callable[[Packet], bool] = lambda command: False  # by a gateway
         self.writes: list[tuple[float, str, int]] = []
         self._tick()
         if start:
@@ -99,7 +100,14 @@ class Cell:
             self.bench.driver.interlocks.executor_ran(self.now)
         self.bench.at(self.now + 0.1, self._tick)
 
+    def put_behind_gateway(self) -> None:
+        """Let station 5 answer for the PLC, and open the port."""
+        self.plc.slave, self.plc.station = HalfDuplexSlave(SlaveSettings(5), self._serve), 5
+        self.bench.open()
+
     def _serve(self, command: Packet) -> Packet:
+        if self.is_undelivered(command):
+            return command.reply(sts=0x02)
         before = self._words()
         is_spared = int.from_bytes(command.data[-2:], 'little') == self.spared
         if command.cmd == 0x0F and command.data[0] == 0x67 and not is_spared \
@@ -297,6 +305,58 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     assert expires(now + 9.0, now + 9.0) == now + 3.0  # of the fallback: a message waits
 
 
+@pytest.mark.parametrize(('period', 'lost'), [(100, 0.0), (100, 0.35), (200, 0.2), (500, 0.2)])
+def test_rule_3d_the_0_stands_for_half_a_second(period: int, lost: float) -> None:
+    speed = speed_row(None)
+    cell = Cell(beat_row(period, requires=(speed.topic,), timeout=600), speed)
+    cell.publish(speed, 3, times=20, run=1.95)
+    beat, = cell.bench.driver.interlocks.heartbeats
+    cell.bench.run_until(lambda: beat.state is BeatState.HELD)
+    hear, since = cell.bench.far.hear, cell.now
+    cell.bench.far.hear = lambda data: hear(data) if cell.now >= since + lost else b''
+    cell.publish(speed, 3, times=30, run=2.5)  # the topic is back at once
+    first = next(when for when, _, value in cell.writes if when >= since and value == 0)
+    after = next(when for when, name, value in cell.writes
+                 if when > first and name == 'N10:0' and value)
+    assert after >= first + 0.5
+    assert cell.word('N10:0') > 2
+
+
+def test_rule_3d_lapse_that_nobody_saw_is_0_as_well() -> None:
+    """Another station's 0 has the line until the topic is back."""
+    speed = speed_row(None)
+    beats = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=1000,
+                          heartbeat=Heartbeat((speed.topic,), 1000)) for number in (1, 2)]
+    line = Line([speed, *beats], (1, 2))
+    for number in range(40):
+        line.at(0.1 * number, lambda: line.write(speed, [3]))
+    line.run(4.88)
+    first, second = line.driver.interlocks.heartbeats
+    line._stations[0].faults.silent = True
+    before = second.value
+    for number in range(12, 30):
+        line.at(line.clock() + 0.01 * number, lambda: line.write(speed, [3]))
+    line.run(0.5)
+    assert before > 0
+    assert second.value == 0
+
+
+@pytest.mark.parametrize('is_end', [True, False])
+def test_rules_3_and_5_a_0_that_is_refused_is_written_again_before_a_long_period_is_over(
+        is_end: bool) -> None:
+    speed = speed_row(None)
+    cell = Cell(beat_row(5000, requires=(speed.topic,), timeout=2000), speed)
+    cell.publish(speed, 3, times=100, run=11.5 if is_end else 11.85)
+    assert cell.word('N10:0') > 0
+    cell.refused = {'N10:0'}
+    cell.bench.at(cell.now + 0.3, cell.refused.clear)
+    if is_end:
+        end(cell)
+    cell.run(1.3)
+    assert cell.refusals == 1
+    assert cell.word('N10:0') == 0
+
+
 def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
     speed = speed_row()
     cell = Cell(beat_row(requires=['speed'], timeout=5000), speed, run=2.0)
@@ -342,23 +402,96 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     assert cell.results()[-2:] == ['not written: refused: this node ends', END]
 
 
-@pytest.mark.parametrize('moment', ['waits', 'on the line', 'executed'])
-def test_rule_5_message_after_a_fallback_that_stands_does_not_outlive_the_end(moment: str) -> None:
+def end(cell: Cell, seconds: float = 2.0) -> None:
+    """End in order: within so many seconds all has to be confirmed, and then the port closes."""
+    driver = cell.bench.driver
+    driver.wind_down()
+    cell.bench.line.wake(driver.machine)
+    give_up = cell.now + seconds
+    while not driver.interlocks.is_over:
+        assert cell.now < give_up
+        cell.run(0.005)
+    cell.bench.lose_port()
+    cell.run(2.0)
+
+
+@pytest.mark.parametrize('moment', [
+    'waits', 'on the line', 'executed', 'after a fallback under way', 'after a refresh under way'])
+def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
     speed = speed_row()
     cell = Cell(beat_row(), speed, run=1.95)
     driver = cell.bench.driver
+    row, = driver.interlocks.fallbacks
+    if moment == 'after a fallback under way':
+        cell.publish(speed, 3, run=0.1)
+    if 'under way' in moment:
+        cell.bench.run_until(lambda: row.is_under_way)
+        assert row.stands is ('refresh' in moment)
+        cell.run(0.001)
     cell.bench.write(speed, [42])
+    if 'under way' in moment:
+        driver._sort_inbox(cell.now)
     if moment == 'executed':
         cell.bench.run_until(lambda: cell.word('N7:0') == 42)
     elif moment == 'on the line':
         cell.bench.run_until(lambda: bool(driver.interlocks._writes.youngest()))
         assert cell.word('N7:0') == 7
-    assert cell.results() == [START]
-    driver.wind_down()
-    cell.bench.line.wake(driver.machine)
-    cell.bench.run_until(lambda: driver.interlocks.is_over)
+    end(cell, 0.3)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
     assert driver.interlocks.unconfirmed() == []
+
+
+@pytest.mark.parametrize('event', ['end', 'RUN', 'port'])
+def test_rules_5_and_8_message_over_a_fallback_that_is_due_puts_none_off(event: str) -> None:
+    speed = speed_row(Fallback((7,), 20_000))
+    cell = Cell(beat_row(), speed, start=False)
+    cell.refused, cell.spared = {'N7:0'}, 42
+    cell.bench.open()
+    cell.run(0.3)  # refused once
+    cell.is_late = True
+    cell.bench.write(speed, [42])  # carried out, and nobody knows
+    cell.bench.run_until(lambda: cell.bench.driver.interlocks.fallbacks[0].has_failed)
+    cell.is_late, cell.refused = False, set()
+    assert cell.word('N7:0') == 42
+    if event == 'end':
+        end(cell)
+    elif event == 'RUN':
+        for is_running in (False, True):
+            cell.bench.driver.interlocks.mode_seen(1, is_running, cell.now)
+    else:
+        cell.bench.lose_port()
+        cell.bench.open()
+    cell.run(0.2)
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_5_end_waits_for_the_second_write_of_rule_10() -> None:
+    """A gateway delivers 0.9 s later what it has called undelivered."""
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    cell = Cell(speed, start=False)
+    cell.put_behind_gateway()
+    cell.run(6.0)
+
+    def is_held(command: Packet) -> bool:
+        if command.data[-2:] != b'\x2a\x00':
+            return False
+        cell.bench.at(cell.now + 0.9, lambda: cell.plc.serve(command))
+        return True
+
+    cell.is_undelivered = is_held
+    cell.publish(speed, 42, run=0.05)
+    end(cell)
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_5_end_waits_for_a_plc_that_does_not_answer_for_a_moment() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed)
+    cell.publish(speed, 42, times=20, run=1.95)
+    hear, since = cell.bench.far.hear, cell.now
+    cell.bench.far.hear = lambda data: hear(data) if cell.now > since + 0.7 else b''
+    end(cell)
+    assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
 
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
@@ -652,6 +785,58 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
 
 
+def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
+    speeds = [make_mapping(f'N7:{2 * number}', 'Write', tag=f'speed{number}', via=5,
+                           fallback=Fallback((7,), 500 + 100 * number)) for number in range(2)]
+    for offset in range(10):  # the pauses begin with the retries, a second before they end
+        cell = Cell(*speeds, start=False)
+        cell.put_behind_gateway()
+        cell.run(7.0 + 0.1 * offset)
+        for speed in speeds:
+            cell.bench.write(speed, [5])
+            cell.run(0.1)
+        _, second = cell.bench.driver.interlocks.fallbacks
+        cell.is_undelivered = lambda command: command.data[7:8] == b'\0'
+        cell.bench.run_until(lambda row=second: row.sent > row.refreshed)
+        assert second.sent < second.refreshed + second.after + 0.15
+
+
+def test_rule_10_pause_of_this_process_is_no_pause_of_a_gateway() -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    cell = Cell(speed, start=False)
+    cell.put_behind_gateway()
+    cell.run(6.0)
+    cell.publish(speed, 42, run=0.1)
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.is_undelivered = lambda command: True
+    cell.bench.run_until(lambda: not row.stands and row.tried > row.refreshed
+                         and not row.is_under_way)
+    cell.bench.run_until(lambda: row.is_under_way)  # the second try
+    cell.bench.line.pause(cell.bench.driver.machine, 600.0)
+    cell.run(601.0)
+    cell.is_undelivered = lambda command: False
+    cell.run(1.5)
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_10_pause_of_this_process_does_not_put_off_a_silent_plc() -> None:
+    rows = [make_mapping('N7:1', station=number, period=500) for number in (1, 2)]
+    speed = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
+    line = Line([*rows, speed], (1, 2))
+    line.run(2.0)
+    line.write(speed, [42])
+    line.run(0.1)
+    line._stations[1].faults.silent = True
+    line.run(4.0)
+    line.run_until(lambda: any(task.station == 2 for task in line.driver._tasks.under_way))
+    line.line.pause(line.driver.machine, 600.0)
+    line._stations[1].faults.silent = False
+    asked = len(line.asked)
+    line.run(603.0)
+    assert (2, 0) in [(station, word) for _, station, word in line.asked[asked:]]
+    assert line.driver.stations[2].active
+
+
 def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
     bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
     cell = Cell(beat_row(period=200), bit, read, run=1.0)
@@ -681,6 +866,16 @@ def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs
     assert not cell.bench.driver.stations[1].replies_in_time
     tried, = (when - begun for when, _, value in cell.writes if value == 7 and when > begun)
     assert 2.8 < tried < 2.9 + 0.5 + 1.0 + 0.1  # a heartbeat has the line, and a pause follows it
+
+
+def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
+    row = make_mapping('N7:0', 'Serve', station=0, fallback=FALLBACK)
+    bench = DriverBench([row])
+    bench.run(3.0)
+    bench.driver.write([row], [42], bench.clock() - 2 * AFTER)
+    bench.driver._sort_inbox(bench.clock())
+    assert bench.driver._served.words_of(row) == b'\7\0'
+    assert bench.listener.results[-1].outcome is Outcome.NOT_SENT
 
 
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
@@ -946,7 +1141,19 @@ def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -
                 {'N10:0'} if number % 2 else set()))
     cell.run(30.0)
     assert cell.bench.listener.foreign == []
-    assert cell.word('N10:0') > 5
+    assert cell.word('N10:0') > 3  # after each 0 it stands for half a second
+
+
+def test_rule_17_fallback_that_is_due_during_a_refresh_is_written_after_it() -> None:
+    cell = Cell(speed_row(), run=1.0)
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.bench.run_until(lambda: row.is_under_way)
+    since = cell.now
+    cell.run(0.001)
+    row.make_due(FallbackCause.RUN, cell.now)
+    cell.run(1.0)
+    assert cell.written('N7:0', since) == [7, 7]
+    assert cell.results() == [START, RUN]
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:

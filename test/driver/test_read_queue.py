@@ -47,7 +47,7 @@ def make_block(period: int, text: str, length: int) -> Block:
 class StillClock:
     """The time of a line, which stands still."""
 
-    now = late = 0.0
+    now = late = woke = 0.0
 
 
 def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:
