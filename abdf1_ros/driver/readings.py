@@ -174,7 +174,7 @@ class Readings:
         """Fail the points; after a refusal read smaller blocks."""
         job.interrupted()
         is_news = is_refusal and job in self.reads.jobs
-        change = self._refusals.refused(job.block) if is_news else None
+        change = self._refusals.refused(job.block, self.blocks) if is_news else None
         is_divided = change is not None and list(change.old) == [job.block]
         for point in self._affected(job.station, job.points):
             if is_divided:

@@ -25,6 +25,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 import math
 
 _ROUNDING = 1e-9  # a smaller saving is a rounding error
@@ -75,16 +76,15 @@ class CostModel:
         self.costs = costs
         self.limit = len(costs) - 1
         self.per_element = per_element
-        self._refused = sorted(refused, key=lambda span: span.end)
-        self._refused_ends = [span.end for span in self._refused]
+        by_end = sorted(refused, key=lambda span: span.end)
+        self._refused_ends = [span.end for span in by_end]
+        self._first_allowed = list(accumulate((span.first + 1 for span in by_end), max))
 
     def first_allowed(self, end: int) -> int:
         """Return the first word that a block up to ``end`` may begin with."""
         lowest = end - self.limit
-        if not self._refused:
-            return lowest
-        known = self._refused[:bisect_right(self._refused_ends, end)]
-        return max([lowest, *(span.first + 1 for span in known)])
+        known = bisect_right(self._refused_ends, end)
+        return max(lowest, self._first_allowed[known - 1]) if known else lowest
 
     def together(self, one: Span, other: Span) -> Span:
         """Return the shortest block that holds both."""

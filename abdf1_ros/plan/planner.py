@@ -208,13 +208,12 @@ class Planner:
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
                    poll_cycle: float) -> list[Block]:
         """Plan the mappings of one area."""
-        refused = self._refused[area]
-        model = self._cost_model(demands[0].mapping, refused)
+        model = self._cost_model(demands[0].mapping, self._refused[area])
         alone: defaultdict[Span, list[Mapping]] = defaultdict(list)
         together = []
         for demand in demands:
             if (demand.span.words > model.limit or (area, demand.span) in self._limits
-                    or any(map(demand.span.holds, refused))):
+                    or demand.span.first < model.first_allowed(demand.span.end)):
                 alone[demand.span].append(demand.mapping)
             else:
                 together.append(demand)

@@ -18,7 +18,7 @@ What to read instead of a block that a station refuses.
 A station refuses a whole block for one address that it does not have: of a mapping, or of a gap
 between mappings. The block is divided until each part is good or cannot be divided any more. A
 long mapping may also be refused because the processor takes only shorter packets than we expect:
-then it is tried in shorter ones. The planner keeps the result, and all mappings of the block are
+then it is tried in shorter ones. The planner keeps the result, and all mappings of the area are
 planned again: the good ones together, and never again with the bad ones.
 """
 
@@ -44,7 +44,6 @@ class _RefusalSearch:
     """The search for the refused words of one block."""
 
     def __init__(self, block: Block) -> None:
-        self.mappings = block.mappings
         self.parts = [block]
         self._open = 1
         self._divided: list[tuple[Span, Span]] = []  # what was refused, and where it was cut
@@ -85,12 +84,20 @@ class Refusals:
         self._planner = planner
         self._searches: dict[Block, _RefusalSearch] = {}
 
-    def refused(self, block: Block) -> Change | None:
-        """Take note that a station has refused a block; None: go on reading it."""
+    def refused(self, block: Block, blocks: Iterable[Block]) -> Change | None:
+        """
+        Take note that a station has refused a block; None: go on reading it.
+
+        ``blocks`` are all that are read.
+        """
         search = self._searches.pop(block, None)
         halves = self._planner.split(block)
         if not halves:
-            return self._settle(search, block, is_refused=True) if search else None
+            if search:
+                return self._settle(search, block, blocks, is_refused=True)
+            # So that no later plan puts it together with good ones.
+            self._planner.refuse(block.station_area, block.span)
+            return None
         search = search or _RefusalSearch(block)
         search.divide(block, halves)
         for half in halves:
@@ -101,11 +108,10 @@ class Refusals:
         """Take note of a good read after a bad one; ``blocks`` are all that are read."""
         search = self._searches.pop(block, None)
         if search is not None:
-            return self._settle(search, block, is_refused=False)
+            return self._settle(search, block, blocks, is_refused=False)
         if not self._planner.allow(block.station_area, block.span):
             return None
-        return self._planned_anew(
-            other for other in blocks if other.station_area == block.station_area)
+        return self._planned_anew(_of_the_area(block, blocks))
 
     def processor_told(self, station: int, processor: Processor | None,
                        blocks: Iterable[Block]) -> Change | None:
@@ -114,17 +120,25 @@ class Refusals:
             return None
         self._planner.processors[station] = processor
         change = self._planned_anew(block for block in blocks if block.station == station)
-        return None if set(change.old) == set(change.new) else change
+        return change if change.old else None
 
     def _planned_anew(self, blocks: Iterable[Block]) -> Change:
-        """Return what to read in place of ``blocks``, but for those that are being divided."""
-        old = [block for block in blocks if block not in self._searches]
-        return Change(old, self._planner.plan(
-            mapping for block in old for mapping in block.mappings))
+        """Return what to read in place of ``blocks``, but for parts of those being divided."""
+        parts = {part for search in self._searches.values() for part in search.parts}
+        old = {block for block in blocks if block not in parts}
+        new = set(self._planner.plan(sorted(
+            (mapping for block in old for mapping in block.mappings),
+            key=lambda mapping: mapping.item)))
+        return Change([*(old - new)], [*(new - old)])
 
-    def _settle(self, search: _RefusalSearch, block: Block, is_refused: bool) -> Change | None:
+    def _settle(self, search: _RefusalSearch, block: Block, blocks: Iterable[Block],
+                is_refused: bool) -> Change | None:
         if not search.settle(block, is_refused):
             return None
         for span in search.findings():
             self._planner.refuse(block.station_area, span)
-        return Change(search.parts, self._planner.plan(search.mappings))
+        return self._planned_anew(_of_the_area(block, blocks))
+
+
+def _of_the_area(block: Block, blocks: Iterable[Block]) -> Iterable[Block]:
+    return (other for other in blocks if other.station_area == block.station_area)

@@ -41,7 +41,9 @@ class Plc:
         self.missing = set(missing)
         self.packet = 118
         self.refused = 0
+        self.asked: list[Block] = []
         self.failed: set[str] = set()
+        self._mappings = mappings
         self._planner = Planner(LINE, 0.1)
         self._refusals = Refusals(self._planner)
         self.blocks = self._planner.plan(mappings)
@@ -53,11 +55,12 @@ class Plc:
 
     def read(self, block: Block) -> bool:
         """Read a block; return whether other blocks take its place."""
+        self.asked.append(block)
         tags = {mapping.tag for mapping in block.mappings}
         if self.refuses(block):
             self.refused += 1
             self.failed |= tags
-            change = self._refusals.refused(block)
+            change = self._refusals.refused(block, self.blocks)
         else:
             has_failed = not tags.isdisjoint(self.failed)
             self.failed -= tags
@@ -80,6 +83,10 @@ class Plc:
     def spans(self) -> list[tuple[int, int]]:
         """Return first word and end of the blocks."""
         return sorted((block.span.first, block.span.end) for block in self.blocks)
+
+    def is_as_planned(self) -> bool:
+        """Tell whether the blocks are those of a plan around all that was refused."""
+        return set(self.blocks) == set(self._planner.plan(self._mappings))
 
 
 def test_neighbours_of_a_bad_mapping_are_read_together_again() -> None:
@@ -162,6 +169,26 @@ def test_long_mapping_that_is_not_there_is_asked_for_in_the_shortest_packets() -
     assert not plc.failed
 
 
+def test_what_recovers_while_a_block_is_divided_leaves_its_parts_alone() -> None:
+    plc = Plc(words(*range(20)), 7)
+    plc.settle()
+    plc.missing = {12}
+    whole = next(block for block in plc.blocks if block.span.end == 20)
+    assert plc.read(whole)  # refused, and divided
+    for first in (14, 7):
+        plc.read(next(block for block in plc.blocks if block.span.first == first))
+    plc.settle()
+    assert plc.spans() == [(0, 12), (12, 13), (13, 20)]
+
+
+def test_word_that_was_refused_alone_is_not_read_with_others_after_a_search() -> None:
+    plc = Plc(words(*range(110), 115), 50, 115)
+    assert plc.spans() == [(0, 110), (115, 116)]
+    plc.settle()
+    assert plc.spans() == [(0, 50), (50, 51), (51, 110), (115, 116)]
+    assert all(block.words == 1 for block in plc.asked if block.span.end == 116)
+
+
 def test_single_mapping_that_is_refused_is_asked_for_again() -> None:
     plc = Plc(words(3), 3)
     plc.settle()
@@ -176,10 +203,11 @@ def test_single_mapping_that_is_refused_is_asked_for_again() -> None:
                 max_size=25), st.sets(st.integers(0, 90), max_size=6))
 def test_only_mappings_that_are_not_there_fail_and_the_rest_is_read_as_planned(
         places: list[tuple[int, int]], missing: set[int]) -> None:
-    mappings = [make_mapping(f'N7:{first}', length=length, tag=f'm{number}')
+    mappings = [make_mapping(f'N7:{first}', length=length, tag=f'm{number}', item=number)
                 for number, (first, length) in enumerate(places)]
     plc = Plc(mappings, *missing)
     plc.settle()
+    assert plc.is_as_planned()
     bad = {mapping.tag for mapping in mappings if missing.intersection(
         range(mapping.address.offset, mapping.address.offset + mapping.length))}
     assert plc.failed == bad
@@ -190,4 +218,4 @@ def test_only_mappings_that_are_not_there_fail_and_the_rest_is_read_as_planned(
             assert len({(mapping.address, mapping.length) for mapping in block.mappings}) == 1
     plc.missing.clear()
     plc.settle()
-    assert not plc.failed
+    assert not plc.failed and plc.is_as_planned()
