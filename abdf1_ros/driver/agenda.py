@@ -99,7 +99,9 @@ class Agenda:
                 and (write := self._write(now, busy)):
             return write
         guests = self._guests
-        has_guests = guests.has_news or guests.waiting
+        # A guest could write over a fallback that the end has confirmed already.
+        is_end = self._interlocks is not None and self._interlocks.is_ending
+        has_guests = (guests.has_news or guests.waiting) and not is_end
         if has_guests and self._since_guest >= MOST_BETWEEN_GUESTS \
                 and (guest := self._guest(now, busy)):
             return guest

@@ -115,7 +115,8 @@ class Interlocks:
     why a PLC does not take one, ``warn`` that a heartbeat is not ours. Heartbeats count from
     ``first_beat`` on: two bridges that began together would not see each other if both did from 1.
     Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
-    ``next_expiry`` is when a fallback of our own table is due (clock value in s).
+    ``next_expiry`` is when a fallback of our own table is due (clock value in s), ``is_ending``
+    tells of the end.
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
@@ -150,7 +151,7 @@ class Interlocks:
         self._messages: dict[str, float] = {}
         self._executor = -math.inf
         self._has_begun = False
-        self._is_ending = False
+        self.is_ending = False
         self._are_all_due = False
         self._awaited: frozenset[int] = frozenset()  # stations that answered when the end began
 
@@ -172,11 +173,11 @@ class Interlocks:
 
     def wind_down(self) -> None:
         """Write 0, then every fallback, and nothing after that (rule 5)."""
-        self._is_ending = True
+        self.is_ending = True
 
     def resume(self) -> None:
         """Take note that it was not the end: the next opening of the port is a first contact."""
-        self._is_ending = self._are_all_due = False
+        self.is_ending = self._are_all_due = False
         for row in self.fallbacks:
             row.end(is_ending=False)
 
@@ -216,6 +217,8 @@ class Interlocks:
                 row.make_due(FallbackCause.RUN, now)
             elif not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
+            else:  # a message that it waits for may be gone with the port
+                row.due = -math.inf
         self._plan(plc)
 
     def mode_seen(self, station: int, is_running: bool, now: float) -> None:
@@ -319,7 +322,7 @@ class Interlocks:
 
     def _why_held(self, plc: _Plc) -> str:
         """Return why no heartbeat of a PLC may count, empty if it may (rules 3 b, 5)."""
-        if self._is_ending:
+        if self.is_ending:
             return 'the bridge ends'
         due = next((row for row in plc.fallbacks if row.cause is not None), None)
         return f'the fallback of {due.mapping.tag} is not confirmed' if due else ''
@@ -349,7 +352,7 @@ class Interlocks:
 
     def _free_from(self, plc: _Plc) -> float:
         """Return from when on more than first tries may be written to a PLC (clock value in s)."""
-        if self._is_ending:  # there is no later
+        if self.is_ending:  # there is no later
             return -math.inf
         return max(plc.pause_end, self._stations.next_message(plc.station))
 
@@ -376,24 +379,27 @@ class Interlocks:
 
         It does not go before messages, and waits while one of its row does, if these are taken.
         """
-        while self._refreshes and self._refreshes[0][0] <= now:
-            when, _, row = self._refreshes[0]
-            station = row.mapping.station
-            if station in busy:
-                return None
-            heapq.heappop(self._refreshes)
+        passed_over = []
+        found = None
+        while found is None and self._refreshes and self._refreshes[0][0] <= now:
+            entry = heapq.heappop(self._refreshes)
+            when, _, row = entry
             if when != row.refresh_at or not row.stands:
+                continue
+            if row.mapping.station in busy:
+                passed_over.append(entry)
                 continue
             is_waiting = id(row.mapping) in self._writes.youngest()
             if row.is_under_way or is_waiting and not row.has_failed \
                     or self._writing.is_held_up(row.mapping) \
-                    or not self._stations[station].replies_in_time:
+                    or not self._stations[row.mapping.station].replies_in_time:
                 self._plan_refresh(row, now + row.after)
                 continue
-            write = row.refresh(now)
             row.due = math.inf
-            return OwnWrite(row, write, self._writing, self)
-        return None
+            found = OwnWrite(row, row.refresh(now), self._writing, self)
+        for entry in passed_over:
+            heapq.heappush(self._refreshes, entry)
+        return found
 
     def _plan_refresh(self, row: FallbackRow, when: float) -> None:
         row.refresh_at = when
@@ -451,7 +457,7 @@ class Interlocks:
         """Do what needs no line: begin the end, store overdue fallbacks of our own table."""
         if not self._has_begun:
             return
-        if self._is_ending and not self._are_all_due:
+        if self.is_ending and not self._are_all_due:
             self._make_all_due(now)
         if now < self.next_expiry:
             return

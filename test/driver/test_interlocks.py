@@ -28,6 +28,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.fallback_rows import FallbackCause, FallbackRow
 from abdf1_ros.driver.guards import CounterGuard, RunGuard
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.heartbeat_rows import BeatState, LARGEST
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
@@ -494,6 +495,19 @@ def test_rule_5_end_waits_for_a_plc_that_does_not_answer_for_a_moment() -> None:
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
 
 
+def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
+    cell = Cell(speed_row(), run=1.0)
+    driver, sts = cell.bench.driver, []
+    cell.refused = {'N7:0'}  # so that the end lasts
+    driver.wind_down()
+    command = Packet(1, 9, 0x0F, 0, 1, bytes.fromhex('67 00 00 01 00 07 00 07 00 42 2A 00'))
+    driver.guests.put(GuestCommand(Guest('pty:hmi', ShareAccess.ALL), command, cell.now,
+                                   lambda reply: sts.append(reply.sts)))
+    cell.bench.line.wake(driver.machine)
+    cell.run(1.0)
+    assert sts == [0x01]  # no room; the PLC would have answered 10
+
+
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), run=1.0)
     cell.refused = {'N10:0'}
@@ -620,6 +634,38 @@ def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None
     cell.run(20.0)
     assert len(cell.written('N7:0')) == 6 + 4  # of both: every 5 s, every 7 s
     assert cell.results() == [START, START]
+
+
+def test_rule_8_fallback_that_stands_does_not_wait_for_one_of_a_busy_station() -> None:
+    speeds = [make_mapping('N7:0', 'Write', station=number, fallback=FALLBACK)
+              for number in (1, 2)]
+    line = Line(speeds, (1, 2))
+    line.run(4.0)
+    interlocks = line.driver.interlocks
+    first, second = (interlocks.refresh(9.0, busy) for busy in ({1}, set()))
+    assert first is not None and first.row.mapping is speeds[1]
+    assert second is not None and second.row.mapping is speeds[0]
+
+
+def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
+    speed = speed_row(Fallback((7,), 5000))
+    recipe = make_mapping('N7:1', 'Write', length=150)
+    cell = Cell(speed, recipe, run=1.0)
+    cell.publish(speed, 3, run=0.5)
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.run(3.0)
+    hear, cell.bench.far.hear = cell.bench.far.hear, lambda data: b''
+    cell.bench.write(recipe, [1] * 150)
+    cell.bench.write(speed, [4])  # waits
+    cell.run(0.1)
+    assert row.judge(cell.now, cell.now) is False  # it is waited for
+    cell.bench.lose_port()
+    cell.bench.far.hear = hear
+    cell.bench.open()
+    cell.run(row.refreshed + 5.0 - cell.now - 0.05)
+    assert cell.word('N7:0') == 3
+    cell.run(0.1)
+    assert cell.word('N7:0') == 7
 
 
 def test_rule_8_message_that_stands_is_not_written_over() -> None:
