@@ -101,6 +101,11 @@ class Process:
         """Tell whether it has not ended."""
         return self._process.poll() is None
 
+    def catches(self, number: signal.Signals) -> bool:
+        """Tell whether it has a handler for a signal."""
+        status = Path(f'/proc/{self.number}/status').read_text(encoding='utf-8')
+        return bool(int(status.partition('SigCgt:')[2].split()[0], 16) >> number - 1 & 1)
+
     def _read(self, stream: Any) -> None:
         with stream:
             for line in stream:

@@ -38,7 +38,7 @@ from support.cases import for_all
 from support.commands import call, running_simulator, Said
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
-from support.ptys import Pty
+from support.ptys import Pty, wait_until
 from support.ros import Process, write_csv
 from support.simulator_process import Files, make_files
 
@@ -281,6 +281,7 @@ def test_write_broken_off_is_unknown(tmp_path: Path, count: int) -> None:
     with Process('plc', 'write', 'N7:0', '1', '--yes', '--plc-type', 'SLC', '--station', '1',
                  '--port', str(line.name), '--timeout', '9000') as process:
         line.read(10)  # the command is on its way
+        wait_until(lambda: process.catches(signal.SIGTERM))
         process.send(*[signal.SIGINT] * count)
         assert process.result() == 3
     line.close()
@@ -600,6 +601,7 @@ def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> 
     line = Pty(tmp_path / 'line')
     with Process('plc', 'status', '1', '--port', str(line.name), '--timeout', '9000') as process:
         line.read(5)
+        wait_until(lambda: process.catches(signal.SIGTERM))  # the bytes may be of another process
         process.send(number)
         assert process.result() == status
     line.close()
