@@ -72,7 +72,7 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
 
 def test_poll_that_is_answered_is_a_station_though_it_takes_no_command(tmp_path: Path) -> None:
     line = Pty(tmp_path / 'line')
-    network = Network(com_port=str(line.name), timeout=50, nak_retries=0)
+    network = Network(com_port=str(line.name), timeout=1000, nak_retries=0)
     answer = threading.Thread(target=lambda: (line.read(4), line.write(b'\x10\x04')))
     answer.start()
     presence, = scan(network, [1])
@@ -87,7 +87,7 @@ def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
     for plc in plcs:
         plc.via = 10
     with plc_line(tmp_path / 'line', *plcs) as name:
-        found = list(scan(Network(com_port=name, timeout=200), [1, 2, 3], via=10))
+        found = list(scan(Network(com_port=name, timeout=2000), [1, 2, 3], via=10))
     assert [presence.is_there for presence in found] == [True, True, False]
     assert [str(presence.identity)[:5] for presence in found[:2]] == ['PLC-5', 'SLC 5']
     assert 'STS 02' in str(found[2].error)
