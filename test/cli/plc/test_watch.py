@@ -20,7 +20,6 @@ from contextlib import suppress
 import io
 import os
 from pathlib import Path
-import threading
 
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.pccc.values import Values
@@ -62,7 +61,7 @@ class Counting(Watch):
         store(self._plcs[1], 'N7:0', [values[0] + 1])
         self._left -= 1
         if self._left == 0:
-            threading.Thread(target=self._plcs.lose).start()
+            self._plcs.lose()
 
 
 def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:
