@@ -53,7 +53,7 @@ def port(tmp_path: Path, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> Iterator[st
 
 def client(port: str, station: int = 1, plc_type: str | None = None) -> Client:
     return Client(port, plc_type=plc_type, station=station, duplex='half', baud=115200,
-                  timeout=0.3, cmd_timeout=0.5)
+                  timeout=1.0, cmd_timeout=1.0)
 
 
 @pytest.mark.parametrize(('station', 'plc_type'), [(1, 'SLC'), (1, None), (2, 'plc5'), (2, None)])

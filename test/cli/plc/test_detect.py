@@ -58,7 +58,7 @@ def plc_on(path: Path, check: str, duplex: Duplex,
     link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
     link.start()
     try:
-        yield Network(com_port=str(path), timeout=600)
+        yield Network(com_port=str(path), timeout=1500)
     finally:
         link.stop()
         line.close()
@@ -68,7 +68,9 @@ def _everybody_sends(plc: SimulatedPlc, checksum: Checksum,
                      kind: type[FullDuplexPeer | RadioNode]) -> Callable[[Machine], Procedure]:
     def run(machine: Machine) -> Procedure:
         if issubclass(kind, FullDuplexPeer):
-            return kind(machine, PeerSettings(checksum), ActiveStationList(), plc.serve).run(plc)
+            timeout = 0.1 if issubclass(kind, Unheard) else 1.0  # until it asks with ENQ
+            return kind(machine, PeerSettings(checksum, timeout=timeout), ActiveStationList(),
+                        plc.serve).run(plc)
         return RadioNode(
             machine, RadioSettings(1, checksum), ActiveStationList(), plc.serve).run(plc)
     return run
@@ -96,7 +98,9 @@ def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
     (Duplex.FULL, 'CRC', 'Peer', 1), (Duplex.FULL, 'BCC', 'Peer', 2),
     (Duplex.HALF, 'CRC', 'Master', 6), (Duplex.HALF, 'BCC', 'Master', 7)])
 def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check: str, mode: str,
-                                           tried: int) -> None:
+                                           tried: int, request: pytest.FixtureRequest) -> None:
+    if duplex is Duplex.HALF:
+        request.getfixturevalue('half_duplex_only')
     trying = Trying()
     with plc_on(tmp_path / 'line', check, duplex) as network:
         # In half duplex nobody is at 4; with the second check only who was heard is tried.
@@ -159,7 +163,7 @@ class UnheardForAWhile(Unheard):
 @pytest.mark.parametrize('kind', [Unheard, UnheardForAWhile])
 def test_full_duplex_port_whose_acks_are_lost_is_not_radio(
         tmp_path: Path, kind: type[Unheard], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(detect, '_ENQ_TIME', 1.5)  # it asks after 1 s
+    monkeypatch.setattr(detect, '_ENQ_TIME', 2.5)  # it asks after 0.1 s
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, kind) as network:
         found = Search(network, [1]).run([9600])
     assert found is not None
@@ -193,6 +197,7 @@ def test_flood_of_acks_is_no_plc(tmp_path: Path) -> None:
     assert len(search.traces) == 1
 
 
+@pytest.mark.usefixtures('half_duplex_only')
 def test_traces_of_the_wrong_settings(tmp_path: Path) -> None:
     with plc_on(tmp_path / 'line', 'BCC', Duplex.HALF) as network:
         search = Search(network, [1])

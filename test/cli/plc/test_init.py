@@ -31,6 +31,8 @@ import pytest
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
 
+PATIENT = ('--timeout', '2000')  # ms; for who is there, but may be late on a busy host
+
 Output = pytest.CaptureFixture[str]
 
 PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
@@ -47,9 +49,10 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield name
 
 
+@pytest.mark.usefixtures('half_duplex_only')
 def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys: Output) -> None:
     assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
-                 '--stations', '1-3']) == 0
+                 '--stations', '1-3', *PATIENT]) == 0
     said = capsys.readouterr().out
     assert 'station 1: PLC-5/40' in said and 'station 2: SLC 5/03' in said
     network = load_network(str(tmp_path / 'net.csv'))
@@ -61,10 +64,11 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
         ('status_1', 'PLC5', 1), ('status_2', 'SLC', 2)]
 
 
+@pytest.mark.usefixtures('half_duplex_only')
 def test_rows_that_are_only_comments_are_good_rows_too(
         port: str, tmp_path: Path, capsys: Output) -> None:
     assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
-                 '--stations', '1,2']) == 0
+                 '--stations', '1,2', *PATIENT]) == 0
     capsys.readouterr()
     path = tmp_path / 'map.csv'
     rows = [line.removeprefix('# ') if line.count(',') == 10 else line
@@ -79,19 +83,23 @@ def test_rows_that_are_only_comments_are_good_rows_too(
     assert guarded == ['interlocks_1', 'interlocks_2']
 
 
+@pytest.mark.usefixtures('half_duplex_only')
 def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) -> None:
     (tmp_path / 'net.csv').touch()  # as a pipe that failed leaves it
     with plc_line(tmp_path / 'plc', simulated_plc(5, 'SLC', time.monotonic, *SLC)) as name:
-        assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200']) == 0
+        assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200',
+                     '--stations', '5', *PATIENT]) == 0
         assert 'station 5: SLC 5/03' in capsys.readouterr().out
-        assert main(['read', 'N7:1', '--station', '5', '--port', name]) == 0
+        assert main(['read', 'N7:1', '--station', '5', '--port', name, *PATIENT]) == 0
     assert load_network(str(tmp_path / 'net.csv')).station != 5
 
 
+@pytest.mark.usefixtures('half_duplex_only')
 def test_plc_that_falls_silent_after_it_was_found(
         port: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', lambda *_: [])
-    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200']) == 0
+    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
+                 '--stations', '1', *PATIENT]) == 0
     assert 'watch S:0 --station 1 --net' in capsys.readouterr().out
     mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
     assert [mapping.station for mapping in mappings] == [1]  # not a map for nobody
