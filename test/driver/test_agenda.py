@@ -314,6 +314,7 @@ def test_topics_that_never_rest_share_the_line() -> None:
         write = bench.next_write(turn / 10)
         assert write is not None
         sent[str(write.mapping.address)] += 1
+    assert len(sent) == len(mappings)
     assert max(sent.values()) - min(sent.values()) <= 1
 
 
