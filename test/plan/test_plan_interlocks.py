@@ -50,6 +50,7 @@ def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mappin
 
 @pytest.mark.parametrize('network, seconds', [
     (Network(), 9.0), (Network(timeout=300, cmd_timeout=500), 2.9), (QUICK, 1.3),
+    (replace(QUICK, enq_retries=5), 2.1),
     # Two tries: Cmd_Timeout and what comes in then; before it, as often as there are turns, 2 s of
     # waiting, a frame of 0.14 s, and what comes in.
     (replace(QUICK, mode='Radio'), 2 * (0.5 + 0.25052 + 2 * (2.0 + 0.14010 + 0.25052))),
