@@ -219,16 +219,20 @@ def test_plc_holds_what_was_written_and_nothing_else_changes(
         plc: str, text: str, length: int, kind: str | None, natural: float) -> None:
     mapping = make_mapping(text, 'Write', plc=plc, length=length, kind=kind)
     machine = simulated_plc(1, plc, lambda: 0.0, (text, 300))
-    whole = 2 * (mapping.address.offset + 300)
+    start, whole = mapping.address.at_offset(0), 2 * (mapping.address.offset + 300)
+    machine.table.write(start, b'\xff' * whole)
     values = [natural if n % 2 else 0 for n in range(length)]
     _serve_all(machine.table, Write(mapping, values, 0.0))
     codec = mapping.codec
     words = machine.table.read(mapping.address, codec.words)
     assert list(codec.decode(words)) == values
-    everything = machine.table.read(mapping.address.at_offset(0), whole // 2)
+    everything = machine.table.read(start, whole // 2)
     at = 2 * mapping.address.offset
     outside = everything[:at] + everything[at + 2 * codec.words:]
-    assert not any(outside)
+    assert outside == b'\xff' * len(outside)
+    if mapping.address.bit is not None:
+        ours = (1 << length) - 1 << mapping.address.bit
+        assert int.from_bytes(words, 'little') | ours == (1 << 16 * codec.words) - 1
 
 
 def _serve_all(table: DataTable, write: Write) -> None:
@@ -372,9 +376,10 @@ def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
     assert Write(make_mapping(text, 'Write'), [1], 0.0).is_pulse is pulse
 
 
-def test_result_of_a_write() -> None:
-    write = Write(make_mapping(command='Write', length=2), [1, -2], 10.0)
-    result = write.result(Outcome.UNKNOWN, 'no reply', 12.5)
+def test_result_tells_value_latency_request_and_packets() -> None:
+    write = Write(make_mapping(command='Write', length=2), [1, -2], 10.0, 'r7')
+    result = write.result(Outcome.UNKNOWN, 'no reply', 12.5, 3)
+    assert (result.request, result.packets_done) == ('r7', 3)
     assert (result.value, result.latency, result.mapping) == ('[1, -2]', 2.5, write.mapping)
     assert str(result) == 'unknown whether written: no reply'
     assert str(write.result(Outcome.WRITTEN, '', 10.5)) == 'written'
