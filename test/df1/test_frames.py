@@ -206,7 +206,7 @@ def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
     assert decoder.last_byte == 0x77
 
 
-@pytest.mark.parametrize('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xFE])
+@pytest.mark.parametrize('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xF0, 0xFE])
 @pytest.mark.parametrize('chunk', [None, 1])
 def test_poll_of_any_station(station: int, chunk: int | None) -> None:
     assert decode(poll_frame(station), chunk=chunk) == [Poll(station, True)]
