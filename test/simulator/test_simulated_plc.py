@@ -142,15 +142,20 @@ def test_data_file_of_a_plc2_and_a_plc3(path: Path, clock: Clock) -> None:
     assert (three_master.number('N10:0'), three_master.number('T:1.ACC')) == (-1, 6)
 
 
-@pytest.mark.parametrize(('plc', 'text', 'cmd'), [('PLC2', '020', 0x08), ('PLC3', 'N7:0', 0x0F)])
-def test_message_of_a_plc2_and_a_plc3(plc: str, text: str, cmd: int, clock: Clock) -> None:
+@pytest.mark.parametrize(('plc', 'text', 'cmd', 'data'), [
+    ('PLC2', '020', 0x08, '20 00 07 00'),
+    ('PLC3', 'N7:0', 0x0F, '00 00 00 01 00 2C 05 07 00 07 00')])
+def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_confirmed(
+        plc: str, text: str, cmd: int, data: str, clock: Clock) -> None:
     machine = simulated_plc(4, plc, clock, (text, 1))
     said: list[str] = []
     machine.send(parse_address(text, machine.table.plc_type), [7], 5, said.append)
     sending = machine.next_task(0.0)
     assert sending is not None
-    assert (sending.command.cmd, sending.command.dst) == (cmd, 5)
-    sending.reply(sending.command.reply())
+    command = sending.command
+    assert (command.cmd, command.dst, command.src) == (cmd, 5, 4)
+    assert command.data == bytes.fromhex(data)
+    sending.reply(command.reply())
     assert said == ['confirmed']
 
 
@@ -422,12 +427,15 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
     direct, gateway = stations_of(plcs, Checksum.CRC)
     assert direct is plcs[2]
     assert isinstance(gateway, SimulatedGateway)
-    identify = Packet(2, 5, 0x06, 0, 9, b'\x03')
-    frame = Frame(identify.encode(), 10)
-    assert direct.handle(frame) == b''
-    assert gateway.handle(frame) == frames.ACK
-    reply = plcs[1].serve(identify)
-    assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.CRC)
+    for plc in plcs[:2]:
+        identify = Packet(plc.station, 5, 0x06, 0, plc.station, b'\x03')
+        frame = Frame(identify.encode(), 10)
+        assert direct.handle(frame) == b''
+        assert gateway.handle(frame) == frames.ACK
+        reply = plc.serve(identify)
+        assert gateway.handle(Poll(10, True)) == frames.message_frame(
+            reply.encode(), Checksum.CRC)
+        gateway.handle(ACKNOWLEDGED)
 
 
 @pytest.mark.parametrize(('row', 'text'), [
