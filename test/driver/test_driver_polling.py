@@ -79,7 +79,8 @@ def test_long_reply_is_not_looked_at_while_it_cannot_be_complete(
     assert len([size for size in sizes if size == 8]) <= 4  # the reply has more than 200 bytes
 
 
-def test_read_that_takes_several_commands() -> None:
+def test_read_of_several_commands_is_put_together_in_order_and_others_are_read_beside_it(
+        ) -> None:
     long, other = make_mapping('N7:0', length=300), make_mapping('N7:0', station=2)
     bench = DriverBench([long, other], network=STANDARD)
     plc = bench.plc(1, 'PLC5', ('N7:0', 300))
@@ -87,6 +88,7 @@ def test_read_that_takes_several_commands() -> None:
     store(plc, 'N7:0', list(range(300)))
     bench.run(2.0)
     assert {tuple(entry) for entry in bench.listener.values(long)} == {tuple(range(300))}
+    assert len(bench.listener.values(other)) > 5
 
 
 def test_write_is_confirmed_in_standard_polling() -> None:
