@@ -496,11 +496,14 @@ def test_serve_row_of_a_file() -> None:
     assert (mapping.topic, mapping.period, mapping.cell('Command')) == ('pushed', None, 'Serve')
 
 
-def test_serve_row_takes_read_and_write_topics() -> None:
+def test_topic_of_a_serve_row_has_no_other_reader_and_writers_of_its_length_only() -> None:
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Read,N7:0,1,PLC5,4,,x,,,,')
-    assert len(problems) == 1
+    assert problems == [
+        'Item: 2, read topic "x" is the topic of item 1 (line 2, tag "a")']
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,3,,x,,,,')
-    assert len(problems) == 1
+    assert problems == [
+        'Item: 2, write topic "x" needs the message type (int16) and Length (4) of item 1 '
+        '(line 2, tag "a")']
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,4,,x,,,,')
     assert problems == []
 
