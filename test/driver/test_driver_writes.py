@@ -247,6 +247,7 @@ def test_writes_of_several_packets_leave_reads_their_turns(
     times = bench.listener.times(read)
     assert len(times) > 40
     assert max(after - before for before, after in itertools.pairwise(times)) < 1.0
+    assert Outcome.WRITTEN in bench.listener.outcomes()
 
 
 def test_read_that_was_under_way_is_repeated_after_a_write() -> None:
