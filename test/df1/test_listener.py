@@ -83,14 +83,6 @@ def test_what_one_direction_has_found_holds_for_the_other() -> None:
     assert len(symbols(other, frame(Checksum.BCC, 3))) == 1
 
 
-def test_last_bcc_frame_is_not_lost() -> None:
-    decoder = ListeningDecoder(LineKind())
-    assert symbols(decoder, frame(Checksum.BCC)) == []
-    symbol = decoder.finish()
-    assert isinstance(symbol, Frame)
-    assert symbol.fault is None
-
-
 def test_half_of_a_crc_is_no_frame() -> None:
     decoder = ListeningDecoder(LineKind())
     assert symbols(decoder, frame(Checksum.CRC)[:-1]) == []

@@ -34,14 +34,6 @@ def test_names_are_those_of_the_map_file() -> None:
     assert USUAL is Processor('5/03')
 
 
-@pytest.mark.parametrize(('names', 'read', 'write'), [
-    ('5/01 5/02 ML1000', 82, 82), ('5/03 5/04 5/05', 236, 234),
-    ('ML1100 ML1200 ML1400 ML1500', 206, 206)])
-def test_largest_packets_are_those_of_the_processor(names: str, read: int, write: int) -> None:
-    for name in names.split():
-        assert (Processor(name).max_read, Processor(name).max_write) == (read, write)
-
-
 @pytest.mark.parametrize(('names', 'letters'), [
     ('5/01 5/02', {'F', 'ST', 'A', 'D', 'L', *FUNCTION}), ('5/03 5/04 5/05', {'L', *FUNCTION}),
     ('ML1100 ML1200 ML1400 ML1500', set())])
