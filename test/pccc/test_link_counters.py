@@ -111,29 +111,27 @@ def test_any_bytes_are_counters_or_a_format_error(data: bytes,
     assert all(name and value for name, value in counters.items())
 
 
-def test_own_counters_under_the_names_of_the_layout() -> None:
+@pytest.mark.parametrize(('layout', 'expected'), [
+    (COUNTERS, {'ENQ sent, or messages sent again': '11', 'NAK received': '16',
+                'ENQ received': '14', 'NAK sent': '12'}),
+    (FULL_DUPLEX_COUNTERS, {'ENQ sent': '5', 'NAK received': '16', 'ENQ received': '14',
+                            'messages refused for lack of memory': '15'}),
+    (MASTER_COUNTERS, {'messages sent again': '6'}),
+    (SLAVE_COUNTERS, {'messages sent again': '6', 'polls received': '8',
+                      'messages refused for lack of memory': '15'}),
+    (ML1000_COUNTERS, {'ENQ sent': '5', 'NAK received': '16', 'ENQ received': '14',
+                       'messages refused for lack of memory': '15'})])
+def test_own_counters_under_the_names_of_the_layout(
+        layout: CounterLayout, expected: dict[str, str]) -> None:
     counters = Counters(
         messages_sent=1, messages_received=2, nak_limit_exceeded=3, enq_limit_exceeded=4,
-        enq_retries=5, nak_retries=6, naks_received=7, polls_received=8, bcc_errors=9,
+        enq_retries=5, nak_retries=6, naks_received=16, polls_received=8, bcc_errors=9,
         crc_errors=10, invalid_messages=11, naks_sent=12, duplicate_messages=13,
         enqs_received=14, refused_for_memory=15)
-    shown = {layout: decode_counters(ServedCounters(counters, layout).encode(), layout)
-             for layout in LAYOUTS}
-    assert shown[SLAVE_COUNTERS]['messages sent again'] == '6'
-    assert shown[SLAVE_COUNTERS]['polls received'] == '8'
-    assert shown[FULL_DUPLEX_COUNTERS]['ENQ sent'] == '5'
-    assert shown[FULL_DUPLEX_COUNTERS]['ENQ received'] == '14'
-    assert shown[FULL_DUPLEX_COUNTERS]['messages refused for lack of memory'] == '15'
-    assert shown[SLAVE_COUNTERS]['messages refused for lack of memory'] == '15'
-    assert shown[COUNTERS]['ENQ received'] == '14'
-    assert shown[COUNTERS]['ENQ sent, or messages sent again'] == '11'
-    assert shown[COUNTERS]['NAK sent'] == '12'
-    for counts in shown.values():
-        assert (counts['messages sent'], counts['messages received']) == ('1', '2')
-        assert (counts['messages undelivered'], counts['bad messages received']) == ('7', '30')
-        assert counts['duplicate messages received'] == '13'
-    for layout in (FULL_DUPLEX_COUNTERS, COUNTERS, ML1000_COUNTERS):
-        assert shown[layout]['NAK received'] == '7'
+    shown = decode_counters(ServedCounters(counters, layout).encode(), layout)
+    assert {name: count for name, count in shown.items() if count not in ('0', 'none on')} == {
+        'messages sent': '1', 'messages received': '2', 'messages undelivered': '7',
+        'bad messages received': '30', 'duplicate messages received': '13'} | expected
 
 
 def test_own_counters_begin_again_behind_16_bits() -> None:
