@@ -190,17 +190,22 @@ def test_line_time_is_that_of_the_real_frames(
         mapping, mapping.address.offset, block.requests[0].words, checksum))
 
 
-def test_float_of_a_pid_is_read_alone_or_with_its_whole_element() -> None:
-    point, gain = make_mapping('PD9:1.SP'), make_mapping('PD9:1.KP')
-    mode, other = make_mapping('PD9:1/MO'), make_mapping('PD9:7.SP')
-    assert spans(plan(point)) == [('PD9:1.SP', 2)]
-    assert sorted(spans(plan(point, other))) == [('PD9:1.SP', 2), ('PD9:7.SP', 2)]
-    assert sorted(spans(plan(point, gain))) == [('PD9:1.KP', 2), ('PD9:1.SP', 2)]
-    assert spans(plan(point, make_mapping('PD9:1.SP', tag='again'))) == [('PD9:1.SP', 2)]
-    assert spans(plan(mode)) == [('PD9:1', 1)]
-    many = [make_mapping(f'PD9:1.{name}') for name in ('SP', 'KP', 'KI', 'KD', 'PV', 'ERR', 'OUT')]
-    assert spans(plan(*many)) == [('PD9:1', 82)]
-    assert spans(plan(make_mapping('PD9:1.SP', length=4))) == [('PD9:1', 82)]
+@for_all(('texts', 'length', 'expected'), [
+    ('1.SP', 1, [('PD9:1.SP', 2)]),
+    ('1.SP 7.SP', 1, [('PD9:1.SP', 2), ('PD9:7.SP', 2)]),
+    ('1.SP 1.KP', 1, [('PD9:1.KP', 2), ('PD9:1.SP', 2)]),
+    ('1.SP 1.SP', 1, [('PD9:1.SP', 2)]),
+    ('1.SP 1.KP 1.KI 1.KD 1.PV 1.ERR 1.OUT', 1, [('PD9:1', 82)]),
+    ('1.SP', 4, [('PD9:1', 82)])])
+def test_float_of_a_pid_is_read_alone_or_with_its_whole_element(
+        texts: str, length: int, expected: list[tuple[str, int]]) -> None:
+    rows = [make_mapping(f'PD9:{text}', length=length, tag=f'{number}')
+            for number, text in enumerate(texts.split())]
+    assert sorted(spans(plan(*rows))) == expected
+
+
+def test_bit_of_a_pid_is_read_as_its_word() -> None:
+    assert spans(plan(make_mapping('PD9:1/MO'))) == [('PD9:1', 1)]
 
 
 def test_halves_of_a_block_with_a_float_are_the_floats() -> None:
