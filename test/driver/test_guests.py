@@ -129,12 +129,12 @@ def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
     assert bench.driver.counters.commands_sent == sent
 
 
-@pytest.mark.parametrize(('kind', 'address', 'write', 'read', 'expected'), [
-    ('SLC', 'N7:0', WRITE_N7, READ_N7, '34 12'),
-    ('PLC5', 'N20:0', bytes.fromhex('67 00 00 01 00 06 14 00 93 09 42 34 12'),
-     bytes.fromhex('68 00 00 01 00 06 14 00 01 00'), '93 09 42 34 12')])
-def test_a_write_of_a_guest_is_read_again_at_once(
-        kind: str, address: str, write: bytes, read: bytes, expected: str) -> None:
+WRITE_N20 = bytes.fromhex('67 00 00 01 00 06 14 00 93 09 42 34 12')
+
+
+@pytest.mark.parametrize(('kind', 'address', 'write'), [
+    ('SLC', 'N7:0', WRITE_N7), ('PLC5', 'N20:0', WRITE_N20)])
+def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write: bytes) -> None:
     mapping = make_mapping(address, station=1, plc=kind, period=10000)
     bench = DriverBench([mapping])
     plc = bench.plc(1, kind, (address, 20))
@@ -147,6 +147,19 @@ def test_a_write_of_a_guest_is_read_again_at_once(
     assert stored(plc, address) == b'\x34\x12'
     assert bench.listener.values(mapping)[-1] == [0x1234]
     assert wrote == [(1, [mapping.extent])]
+
+
+@pytest.mark.parametrize(('kind', 'address', 'write', 'read', 'expected'), [
+    ('SLC', 'N7:0', WRITE_N7, READ_N7, '34 12'),
+    ('PLC5', 'N20:0', WRITE_N20, bytes.fromhex('68 00 00 01 00 06 14 00 01 00'),
+     '93 09 42 34 12')])
+def test_guest_reads_back_what_it_has_written(
+        kind: str, address: str, write: bytes, read: bytes, expected: str) -> None:
+    bench = DriverBench([make_mapping(address, station=1, plc=kind, period=10000)])
+    bench.plc(1, kind, (address, 20))
+    program = Program(bench, ShareAccess.WRITE)
+    program.ask(write)
+    bench.run(0.5)
     program.ask(read)
     bench.run(0.5)
     assert program.replies[-1][1].data.hex(' ') == expected
