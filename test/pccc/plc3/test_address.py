@@ -14,6 +14,8 @@
 
 """Addresses of a PLC-3."""
 
+from dataclasses import replace
+
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
@@ -51,9 +53,17 @@ def test_every_address_is_read_back(kind: FileType, file: int, data: st.DataObje
     word = data.draw(st.integers(0, 2)) if kind.is_structure else 0
     address = Address(ADDRESSING, kind, 0 if kind.is_structure else file, element, word, bit)
     assert parse_address(str(address), PLC3) == address
+
+
+@given(st.sampled_from(list(SECTIONS)), st.data(), st.one_of(st.none(), st.integers(0, 15)))
+def test_offset_leads_back_to_its_word(kind: FileType, data: st.DataObject,
+                                       bit: int | None) -> None:
+    element = data.draw(st.integers(0, ADDRESSING.last_element(kind)))
+    word = data.draw(st.integers(0, 2)) if kind.is_structure else 0
+    file = 0 if kind.is_structure else data.draw(st.integers(0, 999))
+    address = Address(ADDRESSING, kind, file, element, word, bit)
     assert address.offset < address.area_size
-    whole = Address(ADDRESSING, kind, address.file, element, word)
-    assert address.at_offset(address.offset) == whole
+    assert address.at_offset(address.offset) == replace(address, bit=None)
 
 
 def test_last_word_of_each_file_is_the_last_of_its_area() -> None:
