@@ -1044,7 +1044,8 @@ def test_reply_is_sent_again_like_a_command_and_given_up_without_a_failure() -> 
     entry for entry in MESSAGES
     if entry.duplex is Duplex.FULL and not entry.has_embedded_response])
 @for_all('chunk', [1, 3, 1000])
-def test_messages_of_the_vectors(entry: Vector, chunk: int) -> None:
+def test_messages_of_the_vectors_get_their_response_and_commands_are_served(
+        entry: Vector, chunk: int) -> None:
     peer = bench(entry.checksum)
     parts = [entry.frame[at:at + chunk] for at in range(0, len(entry.frame), chunk)]
     answer = peer.hear(*parts)

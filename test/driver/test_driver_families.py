@@ -96,7 +96,7 @@ def test_common_interface_file_of_an_slc() -> None:
     assert stored(station, 'N9:9', 2) == b'\0\0\0\x80'
 
 
-def test_long_transfer_to_a_plc3_carries_its_offset() -> None:
+def test_long_read_of_a_plc3_carries_its_offset() -> None:
     mapping = make_mapping('E3.1.8.10.0.0', plc='PLC3', length=342, period=60_000)
     bench = DriverBench([mapping])
     bench.plc(1, 'PLC3', *PLC3_FILES)

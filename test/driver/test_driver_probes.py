@@ -183,7 +183,7 @@ class LateBench(DriverBench):
 @given(late=st.integers(1, 6), cmd_timeout=st.integers(300, 3000))
 @example(late=1, cmd_timeout=3000)
 @example(late=4, cmd_timeout=500)
-def test_heartbeats_fallbacks_and_checks_of_late_stations_are_in_that_eighth(
+def test_heartbeats_fallbacks_and_checks_of_late_stations_get_an_eighth_of_the_line(
         via: int | None, late: int, cmd_timeout: int) -> None:
     bench = LateBench(late, cmd_timeout, via)
     unit = cmd_timeout / 1000

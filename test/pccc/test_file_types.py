@@ -130,8 +130,8 @@ def test_what_may_be_written(letters: str, family: PlcType, names: str) -> None:
     ('T', PLC5, 0, 3), ('MG', PLC5, 0, 15), ('MG', PLC5, 4, None), ('PD', PLC5, 1, 12),
     ('PD', PLC5, 50, None), ('PD', PLC5, 81, 0), ('PD', SLC, 10, None), ('PD', SLC, 17, None),
     ('MG', SLC, 16, 15), ('HSC', SLC, 5, None), ('PWM', SLC, 4, None)])
-def test_what_has_no_name_is_internal(letters: str, family: PlcType, word: int,
-                                      bit: int | None) -> None:
+def test_what_has_no_name_may_not_be_written(letters: str, family: PlcType, word: int,
+                                             bit: int | None) -> None:
     assert not layout_of(FileType(letters), family).may_write(word, bit)
 
 

@@ -72,7 +72,8 @@ def test_element_beyond_255_of_the_vectors() -> None:
     ('plc5_rmw', table(PLC5, B3_4='FF 00'), 'B3:4', 'F7 01'),
     ('slc_AB', table(SLC, B3_4='FF 00'), 'B3:4', 'F7 01'),
     ('slc_AA_T4_PRE', table(SLC, T4_0='01 00 02 00 03 00'), 'T4:0.PRE', '2C 01')])
-def test_writes_of_the_vectors(name: str, words: DataTable, place: str, value: str) -> None:
+def test_writes_of_the_vectors_are_stored(
+        name: str, words: DataTable, place: str, value: str) -> None:
     command, reply = pair(name)
     assert Server(words).serve(command) == reply
     assert words_at(words, place) == value

@@ -103,7 +103,7 @@ def test_rule_4_period_of_a_heartbeat(period: str) -> None:
     ({'Address': 'B3:0/4', 'Length': '2', 'Fallback': '0 0', 'Fallback_After': '500'},
      Fallback((0.0, 0.0), 500)),
     ({'Scale': '0.1', 'Fallback': '12.5', 'Fallback_After': '500'}, Fallback((12.5,), 500))])
-def test_rule_12_fallback_of_write_and_serve_rows(
+def test_rule_12_write_and_serve_rows_take_a_fallback(
         cells: dict[str, str], fallback: Fallback) -> None:
     mapping = one(**WRITE | cells)
     assert mapping.fallback == fallback

@@ -69,7 +69,7 @@ def test_two_readers_of_one_topic() -> None:
         '4:8 (Topic): Item: 2, read topic "x_y" is the topic of item 1 (line 2, tag "a")']
 
 
-def test_topic_that_is_the_tag_of_another_row() -> None:
+def test_read_topic_that_is_the_topic_of_another_row_by_its_tag_is_refused() -> None:
     assert faults(row(Tag='a'), row(Tag='b', Topic='a', Command='Read')) == [
         '3:8 (Topic): Item: 2, read topic "a" is the topic of item 1 (line 2, tag "a")']
 

@@ -258,7 +258,8 @@ def test_mapping_at_the_end_of_a_file(cells: dict[str, str]) -> None:
     ({'Address': 'I:277', 'Length': '2', 'Command': 'Read'}, 2, 'I:277'),
     ({'Address': 'S:127', 'Length': '2'}, 2, 'S2:127'),
     ({'Address': 'I:30.255', 'Length': '2', 'PLC_Type': 'SLC'}, 2, 'I:30.255')])
-def test_mapping_over_the_end_of_a_file(cells: dict[str, str], length: int, last: str) -> None:
+def test_mapping_over_the_end_of_a_file_is_out_of_range(
+        cells: dict[str, str], length: int, last: str) -> None:
     text = fault(**cells)
     assert text.startswith(
         '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range '

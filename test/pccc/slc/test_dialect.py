@@ -122,6 +122,6 @@ def test_flat_io_of_the_whole_image() -> None:
 
 
 @pytest.mark.parametrize('size', [0, 2, 5, 8])
-def test_slc_reply_that_is_not_what_was_asked(size: int) -> None:
+def test_slc_reply_that_is_not_what_was_asked_is_a_format_error(size: int) -> None:
     with pytest.raises(FormatError, match=f'^the reply holds {size} bytes'):
         DIALECT.read_data(at('F8:0'), 2, bytes(size))
