@@ -752,9 +752,10 @@ def test_message_with_a_wrong_check_gets_nak_and_is_counted(
 
 
 @pytest.mark.parametrize('name', ['bad_crc', 'bad_bcc', 'racom_bcc_short'])
-def test_bad_frames_of_the_vectors(name: str) -> None:
+def test_bad_frames_of_the_vectors_get_a_nak_and_are_not_served(name: str) -> None:
     entry = vector(name)
-    assert bench(entry.checksum).hear(entry.frame) == NAK
+    peer = bench(entry.checksum)
+    assert (peer.hear(entry.frame), peer.served) == (NAK, [])
 
 
 @pytest.mark.parametrize('checksum', Checksum)

@@ -156,7 +156,7 @@ def test_masked_write_of_two_words_has_one_mask_and_spares_the_other_bits() -> N
     assert words == ['20 00 FF FF', '21 00 FF FF', '01 00 FF FF', '00 00 FF FF']
 
 
-def test_frames_of_a_serial_line() -> None:
+def test_frames_of_a_serial_line_are_an_ack_and_a_good_message() -> None:
     frames = [frame for processor in PROCESSORS for frame in processor.get('frames', ())]
     assert len(frames) == 4
     for frame in frames:
