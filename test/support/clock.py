@@ -14,6 +14,7 @@
 
 """A clock that tests set themselves, and one that does not count what a busy host takes."""
 
+from collections import defaultdict
 from contextlib import suppress
 import os
 from pathlib import Path
@@ -34,7 +35,8 @@ class Stopwatch:
     """
     The time since it was made, less what the processes in question waited for a processor.
 
-    So a bound on what they do holds beside any load, which is measured and not guessed.
+    So a bound on what they do holds beside any load, which is measured and not guessed. Threads of
+    one process wait at the same time, so that one counts which waited longest.
     """
 
     def __init__(self, *processes: int) -> None:
@@ -45,15 +47,17 @@ class Stopwatch:
     @property
     def seconds(self) -> float:
         """Return the time without the waits, in s."""
-        waits = self._waits()
-        lost = sum(max(0, wait - self._waited.get(thread, 0)) for thread, wait in waits.items())
-        return time.monotonic() - self._began - lost / 1e9
+        lost: defaultdict[int, int] = defaultdict(int)
+        for (process, thread), wait in self._waits().items():
+            waited = wait - self._waited.get((process, thread), 0)
+            lost[process] = max(lost[process], waited)
+        return time.monotonic() - self._began - sum(lost.values()) / 1e9
 
-    def _waits(self) -> dict[str, int]:
+    def _waits(self) -> dict[tuple[int, str], int]:
         """Return how long (ns) each thread has waited for a processor so far."""
         waits = {}
         for process in self._processes:
             for file in Path(f'/proc/{process}/task').glob('*/schedstat'):
                 with suppress(OSError):  # the thread has ended
-                    waits[file.parent.name] = int(file.read_text('ascii').split()[1])
+                    waits[process, file.parent.name] = int(file.read_text('ascii').split()[1])
         return waits
