@@ -107,7 +107,7 @@ def test_clock_of_the_host_that_steps_changes_no_age(observer: Observer, tmp_pat
         rig.node.wait_for('the clock has stepped')
         rig.recovers(1.0)
         # Here the publisher's clock has not stepped, as if it were another host.
-        assert rig.write(3.0).startswith('not written: refused: it came 3600.')
+        assert re.match(r'not written: refused: it came 36\d\d\.', rig.write(3.0))
         for _ in range(2):  # an hour back, and then behind the publisher
             after = len(rig.node.lines)
             rig.node.send(signal.SIGUSR2)

@@ -196,13 +196,14 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('fault, text', [
-    ('delay 2 300', 'written'),
+    ('delay 2 150', 'written'),
     # Not sent, where two reads before it were too late already.
     ('delay 2 3000', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
 def test_station_that_is_slow_fails_alone(line: Boxed, fault: str, text: str) -> None:
     rig, _ = line
     rig.simulator.say(fault)
-    assert text in rig.write(3.0)
+    result = rig.write(3.0)
+    assert result == text if text == 'written' else text in result
     rig.status('mappings', ERROR)
     rig.status('link', OK)  # it answers its polls
     rig.speeds.next()  # the other goes on

@@ -135,7 +135,7 @@ def test_server_hangs_up_on_every_client(served: Served) -> None:
 
 def test_server_takes_its_time(served: Served) -> None:
     rig, server = served
-    server.latency = 0.05  # there and back within Timeout
+    server.latency = 0.02  # there and back within Timeout
     assert rig.write(3.0) == 'written'
     rig.speeds.next()
     rig.status('link', OK)
@@ -150,5 +150,6 @@ def test_server_takes_its_time(served: Served) -> None:
 def test_all_mappings_are_read_in_time(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path)
     simulator = files.start_simulator()
-    with LineServer(files.port) as server, rigged(observer, files, server.url, simulator) as rig:
+    with LineServer(files.port) as server, rigged(  # beside that of the module
+            observer, files, server.url, simulator, name='whole') as rig:
         rig.until_well()
