@@ -19,6 +19,7 @@ from contextlib import ExitStack, nullcontext
 from itertools import pairwise
 from pathlib import Path
 import resource
+from statistics import median
 import threading
 import time
 from typing import Any
@@ -43,6 +44,7 @@ from support.ros import (
     get_parameters,
     Observer,
     OK,
+    stamp,
     until_status,
     values_in,
     write_csv,
@@ -133,13 +135,13 @@ class Plant:
         self.folder = folder
         self._request = request
         self.observer = stack.enter_context(Observer())
-        rows = ['1,PLC5,N7:0,16,7 8']
         self.plcs = {}
         self.nodes: dict[str, BridgeNode] = {}
         for name in ('a', 'b', 'c'):
             (folder / name).mkdir()
             data = write_csv(
-                folder / name / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
+                folder / name / 'plc.csv', 'Station,PLC_Type,Address,Length,Values',
+                [f'1,PLC5,N7:0,16,7 {ord(name)}'])
             self.plcs[name] = stack.enter_context(Plcs(data))
         self.status = 0
         self._thread = threading.Thread()
@@ -165,7 +167,7 @@ class Plant:
         given = ['lines', '--ros-args', '--params-file', yaml_file(self.folder, text), *arguments]
         self._thread = threading.Thread(target=lambda: setattr(self, 'status', main(given)))
         self._thread.start()
-        assert [self.speeds(name) for name in reads] == [[7, 8]] * len(reads)
+        assert [self.speeds(name) for name in reads] == [[7, ord(name)] for name in reads]
 
     def speeds(self, name: str) -> list[float] | str:
         """Return the next value of a line."""
@@ -247,7 +249,7 @@ def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None
     plant.write_net('b', plant.plcs['b'].port)
     plant.write_map('b', 'speed,Read,N7:0,1,PLC5,2')
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
-    assert plant.speeds('b') == [7, 8]
+    assert plant.speeds('b') == [7, ord('b')]
     assert line_status(plant, OK)['running'] == '3'
 
 
@@ -288,14 +290,14 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
     response = plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request())
     assert (response.success, response.message) == (
         False, f'goes on as before: port: {taken} is the port of /hall/a')
-    assert plant.speeds('b') == [7, 8]
+    assert plant.speeds('b') == [7, ord('b')]
 
     plant.write_net('b', free)
     assert plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request()).success
     plant.write_net('a', plant.plcs['b'].port)
     assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
     assert [plant.nodes[name].port for name in 'ab'] == [plant.plcs['b'].port, free]
-    assert [plant.speeds(name) for name in 'ab'] == [[7, 8]] * 2
+    assert [plant.speeds(name) for name in 'ab'] == [[7, ord('b')], [7, ord('c')]]
 
 
 def test_internal_error_at_the_start_of_a_line(
@@ -335,7 +337,7 @@ def test_line_that_ends_slowly_does_not_hold_up_the_others(
     assert until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', OK)
     assert line_status(plant, ERROR)['/hall/b'] == 'begins again'
     ended.set()
-    assert plant.speeds('b') == [7, 8]
+    assert plant.speeds('b') == [7, ord('b')]
 
 
 @pytest.mark.parametrize('broken', ['a', 'b'])
@@ -347,7 +349,7 @@ def test_internal_error_restarts_its_line_only(
     before = {**plant.nodes}
     plant.fail(broken)
     plant.observer.until(lambda: plant.nodes[broken] is not before[broken], 'another node')
-    assert plant.speeds(broken) == [7, 8]
+    assert plant.speeds(broken) == [7, ord(broken)]
     assert {name for name in 'abc' if not before[name].link.is_alive()} == {broken}
     assert line_status(plant, OK)['restarts'] == '1'
     said = capfd.readouterr().err
@@ -371,9 +373,9 @@ def test_end_of_a_line_that_fails_is_told(
 def test_status_of_all_lines_comes_once_a_second(plant: Plant) -> None:
     plant.start('-p', 'lines:=[a]')
     inbox = plant.observer.diagnostics('')
-    stamps = [message.header.stamp for message in [inbox.next() for _ in range(4)]]
-    seconds = [stamp.sec + stamp.nanosec / 1e9 for stamp in stamps]
-    assert all(later - one > 0.8 for one, later in pairwise(seconds))
+    seconds = [stamp(inbox.next()) for _ in range(4)]
+    # Most of them: after one that a busy host has held up the next comes in time.
+    assert median(later - one for one, later in pairwise(seconds)) > 0.8
 
 
 def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
@@ -390,7 +392,7 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
     plant.start(reads='ac')
     began = time.monotonic()
     assert plant.end() == 0
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < PATIENCE / 2
     never.set()
 
 

@@ -164,6 +164,8 @@ def make_bench(tmp_path: Path, observer: Observer, plcs: Plcs) -> Iterator[Calla
 
 Benches = Callable[..., Bench]
 
+PATIENT = ('write_timeout:=30.0', 'net.cmd_timeout:=5000')  # where a busy host is held up
+
 
 # One message, several results
 
@@ -240,7 +242,7 @@ def test_messages_that_dds_drops_are_counted(
 
 
 def test_waiting_words_are_superseded_by_newer_ones(make_bench: Benches) -> None:
-    bench = make_bench(RECIPE, PULSES)
+    bench = make_bench(RECIPE, PULSES, parameters=PATIENT)
     bench.plcs.say('slow 1 10')
     publish = bench.publisher(Int16MultiArray, 'recipe')
     for number in range(100):
@@ -257,7 +259,7 @@ def test_waiting_words_are_superseded_by_newer_ones(make_bench: Benches) -> None
 
 
 def test_floats_of_several_topics_do_not_supersede_each_other(make_bench: Benches) -> None:
-    bench = make_bench(RECIPE, LEVEL)
+    bench = make_bench(RECIPE, LEVEL, parameters=PATIENT)
     bench.plcs.say('slow 1 10')
     recipe = bench.publisher(Int16MultiArray, 'recipe')
     level = bench.publisher(Float32MultiArray, 'level')
@@ -432,7 +434,9 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
 
 
 def test_file_that_a_plc_lacks_is_told_in_one_line(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ros.log._PAUSE', 3.0)
     bench = make_bench(*(f'm{n},Read,N99:{30 * n},1,PLC5,1,' for n in range(8)), SPEED)
     told: list[str] = []
 
@@ -492,8 +496,8 @@ def test_stop_ends_all_threads_and_gives_the_port_back(
     assert not link.is_alive()
     assert (len(link_threads()), times_open(plcs.port)) == (1, 1)  # those of the PLCs
     assert link.state == PortState(False, 'closed')
-    status = until_status(bench.diagnostics, 'link', ERROR)
-    assert status.message == 'ERROR: closed'
+    until_status(bench.diagnostics, 'link', ERROR,
+                 lambda status: status.message == 'ERROR: closed')
     make_bench(SPEED)  # the port is free for another one
     speed.next()
 
@@ -514,8 +518,8 @@ def test_internal_errors_are_told_and_the_third_is_the_end(
     bench.node.session.reads.latest = None  # a bug
     bench.observer.until(lambda: bench.node.link.has_failed, 'the third fault')
     bench.node.link.join()
-    status = until_status(bench.diagnostics, 'link', ERROR)
-    assert status.message.startswith('ERROR: internal error: TypeError(')
+    until_status(bench.diagnostics, 'link', ERROR, lambda status: status.message.startswith(
+        'ERROR: internal error: TypeError('))
     said = ''.join(capfd.readouterr())
     assert said.count('; please report it\nTraceback') == 3
 
