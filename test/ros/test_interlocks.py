@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import groupby
 from pathlib import Path
 import signal
 import time
@@ -26,6 +27,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.node import BridgeNode
@@ -34,7 +36,6 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support.clock import Stopwatch
 from support.commands import running_simulator
 from support.ros import (
     details,
@@ -66,6 +67,8 @@ Station,PLC_Type,Address,Length,Values,Motion,Period
 
 # s; a message to the bridge, a command on the line, and a look at the PLC take it at the most.
 WAY = 0.25
+
+ATTEMPTS = 8  # to be as fast as that
 
 
 class Cell(testing.SimulatedCell):
@@ -106,6 +109,19 @@ class Cell(testing.SimulatedCell):
         """Wait until the heartbeat counts."""
         self.until(lambda: self.word('N10:0') > 2, 'a heartbeat that counts')
 
+    def until_beats(self, count: int) -> None:
+        """Wait until the heartbeat has counted so far."""
+        enough = self.word('N10:0') + count
+        self.until(lambda: self.word('N10:0') >= enough, f'{count} beats')
+
+    def until_word(self, publisher: Any, value: int) -> None:
+        """Publish a value until it is in the PLC, where it stays for Fallback_After."""
+        def has_come() -> bool:
+            publisher.publish(Int16MultiArray(data=[value]))
+            return self.word('N10:1') == value
+
+        self.until(has_come, f'{value} in the PLC')
+
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Call a service of the bridge."""
         return self.ros.call(kind, f'/abdf1/{name}', request)
@@ -123,45 +139,62 @@ def fallbacks(results: Inbox) -> list[str]:
             if result.message.startswith('fallback value written')]
 
 
-def test_rule_2_fallback_at_the_start_goes_before_the_count(cell: Cell) -> None:
-    cell.until_counting()
-    assert cell.word('N10:1') == 7
-    assert fallbacks(cell.results) == ['start']
+def test_rule_2_fallback_at_the_start_goes_before_the_count(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Cell(tmp_path)
+    table = made.plcs[1].table
+    write, written = table.write, []
+
+    def record(address: Address, data: bytes) -> None:
+        written.append((address.offset, int.from_bytes(data, 'little')))
+        write(address, data)
+
+    monkeypatch.setattr(table, 'write', record)
+    with made as cell:
+        cell.until_counting()
+        assert cell.word('N10:1') == 7
+        cell.until(lambda: fallbacks(cell.results) == ['start'], 'its result')
+    once = [change for change, _ in groupby(written)]  # a busy host may need a second attempt
+    assert once[:2] == [(0, 0), (1, 7)]
+    assert once[2][0] == 0 < once[2][1]
 
 
 def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
     cell.until_counting()
-    cell.ros.executor.remove_node(cell.node)
-    watch = Stopwatch()
-    last, changed, seen = cell.word('N10:0'), 0.0, time.monotonic()
 
-    def stands() -> bool:
-        nonlocal last, changed, seen
-        if cell.word('N10:0') != last:
-            last, changed, seen = cell.word('N10:0'), watch.seconds, time.monotonic()
-        return time.monotonic() > seen + 1.5  # a least time, so by the clock
+    def time_to_stand() -> float:
+        """Hold the executor up; return when (s) the heartbeat has counted last."""
+        cell.ros.executor.remove_node(cell.node)
+        begun = changed = time.monotonic()
+        last = cell.word('N10:0')
 
-    cell.until(stands, 'a heartbeat that stands still')
-    assert changed < 1.0 + 0.1 + WAY  # max(Period, 1 s) and one beat
-    cell.ros.executor.add_node(cell.node)
-    last = cell.word('N10:0')
-    cell.until(lambda: cell.word('N10:0') > last, 'a heartbeat that counts again')
+        def stands() -> bool:
+            nonlocal last, changed
+            if cell.word('N10:0') != last:
+                last, changed = cell.word('N10:0'), time.monotonic()
+            return time.monotonic() > changed + 1.5
+
+        cell.until(stands, 'a heartbeat that stands still')
+        cell.ros.executor.add_node(cell.node)
+        cell.until(lambda: cell.word('N10:0') > last, 'a heartbeat that counts again')
+        return changed - begun
+
+    # max(Period, 1 s) and one beat; a busy host makes some attempts longer.
+    assert any(time_to_stand() < 1.0 + 0.1 + WAY for _ in range(ATTEMPTS))
 
 
 def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path) -> None:
     with Cell(tmp_path, 'use_sim_time:=true') as cell:
         cell.until_counting()
         speed = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
-        speed.publish(Int16MultiArray(data=[3]))
-        cell.until(lambda: cell.word('N10:1') == 3, 'the value')
-        cell.until(lambda: fallbacks(cell.results) == ['start', 'timeout'], 'the fallback')
+        cell.until_word(speed, 3)
+        cell.until(lambda: fallbacks(cell.results)[:2] == ['start', 'timeout'], 'the fallback')
 
 
 def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
     cell.until_counting()
     publisher = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
-    publisher.publish(Int16MultiArray(data=[42]))
-    cell.until(lambda: cell.word('N10:1') == 42, 'the command')
+    cell.until_word(publisher, 42)
     cell.end()
     assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
 
@@ -192,13 +225,23 @@ def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
 def test_rule_8_fallback_comes_when_the_publisher_is_gone(cell: Cell) -> None:
     cell.until_counting()
     publisher = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
-    watch, began = Stopwatch(), time.monotonic()
-    publisher.publish(Int16MultiArray(data=[42]))
-    cell.until(lambda: cell.word('N10:1') == 42, 'the command')
-    cell.until(lambda: cell.word('N10:1') == 7, 'the fallback value')
-    assert time.monotonic() - began > 0.4  # Fallback_After
-    assert watch.seconds < 0.4 + WAY
-    cell.until(lambda: fallbacks(cell.results) == ['start', 'timeout'], 'both results')
+    cell.until(lambda: fallbacks(cell.results) == ['start'], 'that of the start')
+
+    def time_to_fall_back() -> float:
+        """Publish once; return when (s) the fallback value has come after it, if that is sent."""
+        cell.results.clear()
+        began = time.monotonic()
+        publisher.publish(Int16MultiArray(data=[42]))
+        if cell.results.first().message != 'written':
+            return float('inf')
+        cell.until(lambda: cell.word('N10:1') == 7, 'the fallback value')
+        took = time.monotonic() - began
+        assert took > 0.4  # Fallback_After
+        cell.until(lambda: fallbacks(cell.results) == ['timeout'], 'its result')
+        return took
+
+    # A busy host makes some attempts longer.
+    assert any(time_to_fall_back() < 0.4 + WAY for _ in range(ATTEMPTS))
 
 
 def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
@@ -211,6 +254,10 @@ def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
         'a withheld row')
     assert 'withheld' in details(status)['doors']
     assert 'not in RUN: it is in REM PROG' in details(status)['doors']
+    cell.until_beats(10)
+    count = len(doors)
+    cell.until_beats(10)
+    assert len(doors) == count
     cell.plcs.say('run 1')
     count = len(doors)
     cell.until(lambda: len(doors) > count, 'a value after RUN')
@@ -229,7 +276,7 @@ def test_rule_18_read_only_writes_nothing_and_says_so(
         tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with Cell(tmp_path, 'read_only:=true') as cell:
         doors = cell.ros.listen(Int16MultiArray, '/abdf1/read/doors')
-        doors.first()
+        cell.until(lambda: len(doors) > 10, 'values')
         assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 0)
     said = capfd.readouterr().err
     assert said.count('read_only: no heartbeat and no fallback value is written: speed, beat') == 1
