@@ -57,7 +57,10 @@ def simulator(files: Files) -> Iterator[Process]:
 
 def test_one_picture_shows_every_topic_and_status(
         simulator: Process, capsys: pytest.CaptureFixture[str]) -> None:
+    give_up = time.monotonic() + PATIENCE
     said = call(main, capsys, '--node', NODE, '--once')
+    while re.search('STALE|WARN: |ERROR: ', said.out) and time.monotonic() < give_up:
+        said = call(main, capsys, '--node', NODE, '--once')  # the simulator stood still
     assert said.status == 0, said
     lines = said.out.splitlines()
     assert NODE in lines
@@ -93,9 +96,9 @@ def test_pictures_follow_the_loss_of_a_station(simulator: Process) -> None:
 def test_it_ends_after_the_time_it_is_given(
         simulator: Process, capsys: pytest.CaptureFixture[str]) -> None:
     began = time.monotonic()
-    said = call(main, capsys, '--node', NODE, '--seconds', '2', '--period', '0.1')
+    said = call(main, capsys, '--node', NODE, '--seconds', '5', '--period', '0.1')
     assert said.status == 0
-    assert 1.5 < time.monotonic() - began < PATIENCE
+    assert 4.5 < time.monotonic() - began < PATIENCE
     assert said.out.splitlines().count(NODE) > 1
 
 
