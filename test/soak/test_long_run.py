@@ -16,29 +16,38 @@
 
 from __future__ import annotations
 
-import os
-import threading
+import subprocess
+import sys
 
 import pytest
 from soak.long_run import Counts, difference, growth, Sample
 
+# Other threads of this process may come and go.
+GROWING = """
+import os, threading
+print('small', flush=True)
+input()
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+kept = os.pipe(), bytes(range(256)) * (1 << 18)  # 64 MiB
+print('large', flush=True)
+input()
+"""
+
 
 def test_sample_is_what_the_process_has() -> None:
-    before = Sample.take(os.getpid())
-    is_seen = threading.Event()
-    thread = threading.Thread(target=is_seen.wait)
-    thread.start()
-    descriptors = os.pipe()
-    kept = bytes(range(256)) * (1 << 18)  # 64 MiB
-    after = Sample.take(os.getpid())
-    is_seen.set()
-    thread.join()
-    for descriptor in descriptors:
-        os.close(descriptor)
-    assert len(kept) == 64 << 20
+    with subprocess.Popen([sys.executable, '-c', GROWING], text=True, stdin=subprocess.PIPE,
+                          stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None and process.stdout is not None
+        assert process.stdout.readline() == 'small\n'
+        before = Sample.take(process.pid)
+        process.stdin.write('\n')
+        process.stdin.flush()
+        assert process.stdout.readline() == 'large\n'
+        after = Sample.take(process.pid)
+        process.communicate('\n', timeout=30)
     assert (after.threads, after.descriptors) == (before.threads + 1, before.descriptors + 2)
     assert 60 < after.memory - before.memory < 140
-    assert after.cpu >= before.cpu > 0
+    assert after.cpu >= before.cpu and after.cpu > 0
 
 
 @pytest.mark.parametrize('after, expected', [
