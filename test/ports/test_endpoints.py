@@ -26,6 +26,8 @@ from abdf1_ros.ports.endpoints import PtyEndpoint, SerialEndpoint, TcpEndpoint, 
 from abdf1_ros.ports.link_thread import Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
+from support.counting import open_files
+from support.device_server import OWN_HOST
 from support.ptys import PATIENCE, Pty, read_exactly
 
 
@@ -92,10 +94,10 @@ def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
 def test_name_that_cannot_be_had_leaves_no_terminal_open(
         tmp_path: Path, link: str, text: str) -> None:
     (tmp_path / 'taken').touch()
-    before = os.listdir('/dev/fd')
+    before = open_files()
     with pytest.raises(OSError, match=text):
         PtyEndpoint(str(tmp_path / link))
-    assert os.listdir('/dev/fd') == before
+    assert not open_files() - before
     assert os.listdir(tmp_path) == ['taken']
 
 
@@ -112,10 +114,10 @@ def test_name_that_another_process_has(tmp_path: Path) -> None:
 
 
 def test_tcp_one_client_after_the_other(wake: int) -> None:
-    with closing(TcpEndpoint('127.0.0.1', 0)) as line:
+    with closing(TcpEndpoint(OWN_HOST, 0)) as line:
         scheme, _, address = line.name.partition('://')
         host, _, number = address.partition(':')
-        assert (scheme, host) == ('socket', '127.0.0.1')
+        assert (scheme, host) == ('socket', OWN_HOST)
         with pytest.raises(OSError, match=WAITING):
             line.open()
         for _ in range(2):

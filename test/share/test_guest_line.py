@@ -48,6 +48,7 @@ from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
 import pytest
 from support.clock import Stopwatch
+from support.device_server import OWN_HOST
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
 
@@ -115,7 +116,7 @@ def shared(folder: Path, places: str, access: str = 'Read',
 
 
 def free_port() -> int:
-    with socket.create_server(('127.0.0.1', 0)) as listener:
+    with socket.create_server((OWN_HOST, 0)) as listener:
         return int(listener.getsockname()[1])
 
 
@@ -137,7 +138,7 @@ def client_at(port: Path | str) -> Client:
 def test_two_guests_read_and_write_and_none_gets_the_other_ones_values(
         mode: str, tmp_path: Path) -> None:
     port = free_port()
-    with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{port}', 'Write', mode) as line:
+    with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{OWN_HOST}:{port}', 'Write', mode) as line:
         wrong: list[object] = []
 
         def work(client: Client, first: int) -> None:
@@ -149,7 +150,7 @@ def test_two_guests_read_and_write_and_none_gets_the_other_ones_values(
                 if client.read(f'N10:{first // 5 + 1}') != number:
                     wrong.append((at, number))
 
-        with client_at(tmp_path / 'hmi') as one, client_at(f'socket://127.0.0.1:{port}') as two:
+        with client_at(tmp_path / 'hmi') as one, client_at(f'socket://{OWN_HOST}:{port}') as two:
             threads = [threading.Thread(target=work, args=(client, first))
                        for client, first in ((one, 0), (two, 25))]
             for thread in threads:
@@ -187,7 +188,7 @@ def test_place_is_a_peer_of_the_manual(
 def test_ten_guests_that_misbehave_harm_nobody(tmp_path: Path) -> None:
     """They babble, dribble, break off, never acknowledge and flood, two of each kind."""
     ports = [free_port() for _ in range(10)]
-    places = ' '.join(f'tcp:{port}' for port in ports)
+    places = ' '.join(f'tcp:{OWN_HOST}:{port}' for port in ports)
     command = bytes.fromhex('10 02 01 09 0F 00 01 00 A2 02 07 89 00 00 10 03')
     whole = frames.message_frame(Packet(1, 9, 0x0F, 0, 1, command[8:-2]).encode(), Checksum.CRC)
     with shared(tmp_path, f'pty:{tmp_path}/hmi {places}') as line:
@@ -196,7 +197,7 @@ def test_ten_guests_that_misbehave_harm_nobody(tmp_path: Path) -> None:
         def be_bad(port: int, said: Sequence[bytes], pause: float) -> None:
             while not ended.is_set():
                 try:
-                    with socket.create_connection(('127.0.0.1', port), timeout=1) as other:
+                    with socket.create_connection((OWN_HOST, port), timeout=1) as other:
                         for data in said:
                             other.sendall(data)
                             time.sleep(pause)
@@ -254,7 +255,7 @@ def test_lost_line_is_told_to_the_guest(tmp_path: Path) -> None:
 
 def test_place_that_cannot_be_opened_says_why_until_it_can(tmp_path: Path) -> None:
     (tmp_path / 'hmi').write_text('mine')
-    with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{free_port()}') as line:
+    with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{OWN_HOST}:{free_port()}') as line:
         taken, waiting = line.guests
         assert 'is there already' in taken.fault
         assert (waiting.state, waiting.fault) == ('waiting for a client', '')

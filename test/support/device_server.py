@@ -37,6 +37,9 @@ from abdf1_ros.ports.settings import PortSettings
 import serial
 import serial.rfc2217
 
+# Of this process: a port that is free here stays so until we take it, or take it again.
+OWN_HOST = f'127.1.{os.getpid() >> 8 & 255}.{os.getpid() & 255 or 255}'
+
 
 class DeviceServer:
     """One connection on 127.0.0.1; ``port`` is where, ``connection`` our end of it."""
