@@ -111,6 +111,7 @@ def test_slave_behind_an_adapter_that_echoes(
         assert main([*options, '--echo']) == 0
         assert '2 passed, 0 failed, 1 skipped' in capsys.readouterr().out
         assert main(options) == 1
+        assert 'FAIL  poll-idle' in capsys.readouterr().out
     with running_simulator('--pty', port):
         assert main([*options, '--echo']) == 1
     assert 'leave out --echo' in capsys.readouterr().err
@@ -119,11 +120,13 @@ def test_slave_behind_an_adapter_that_echoes(
 def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / 'plc')
-    options = ('--port', port, '--answer-time', '0.5', '--only')
+    options = ('--port', port, '--only')
     with running_simulator('--pty', port, '--radio'):
-        assert main(['radio', *options, 'broadcast-unanswered', '--only', 'read-words']) == 0
+        assert main(['radio', *options, 'broadcast-unanswered', '--only', 'read-words',
+                     '--answer-time', '1']) == 0
         assert '2 passed, 0 failed, 0 skipped' in capsys.readouterr().out
-        assert main(['peer', *options, 'message-acknowledged']) == 1
+        assert main(['peer', *options, 'message-acknowledged', '--answer-time', '0.5']) == 1
+        assert 'FAIL  message-acknowledged' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(('args', 'text'), [
