@@ -91,7 +91,7 @@ def test_port_that_cannot_be_opened(ptys: tuple[Pty, Pty], tmp_path: Path) -> No
 def test_lost_port_ends_it_with_an_error(ptys: tuple[Pty, Pty]) -> None:
     with tap(ptys[0].name, ptys[1].name) as listening:
         ptys[1].close()
-        with pytest.raises(OSError, match='.'):
+        with pytest.raises(OSError, match='Input/output error|the other end has closed'):
             list(listening.chunks(PATIENCE, PATIENCE, lambda: None))
 
 
