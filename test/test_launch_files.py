@@ -15,10 +15,12 @@
 """The launch files, started by the real ``ros2 launch``."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 import os
 from pathlib import Path
 import re
 import signal
+import socket
 import time
 
 from abdf1_ros.paths import config_file
@@ -26,6 +28,7 @@ from abdf1_ros.ros.launching import parameter_types
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from std_srvs.srv import Trigger
+from support.ptys import wait_until
 from support.ros import EVERYTHING, get_parameters, Observer, Process
 from support.ros_tools import environment, install, needs, ros2, SOURCE
 import yaml
@@ -186,12 +189,27 @@ def test_killed_bridge_is_started_again_until_the_launch_ends(launch: Starter) -
 # The demo
 
 
-def test_demo_runs_the_example_on_its_simulator_and_passes_arguments_on(launch: Starter) -> None:
+@pytest.fixture
+def demo_port() -> Iterator[str]:
+    """Return the port that all demos have, once no other session on this machine has it."""
+    with socket.socket(socket.AF_UNIX) as claim:
+        def is_ours() -> bool:
+            with suppress(OSError):
+                claim.bind('\0abdf1_ros.test.demo')  # a name in no file system
+                return True
+            return False
+
+        wait_until(is_ours)
+        yield '/tmp/abdf1_demo'
+
+
+def test_demo_runs_the_example_on_its_simulator_and_passes_arguments_on(
+        launch: Starter, demo_port: str) -> None:
     with Observer() as observer:
         process = launch('demo.launch.py', 'namespace:=cell', 'log_level:=debug',
                          'port:=/dev/ttyS99')
         process.wait_for('DEBUG', '[cell.abdf1]')
-        process.wait_for('/tmp/abdf1_demo: open')
+        process.wait_for(f'{demo_port}: open')
         files = get_parameters(observer, 'net_file', 'map_file', node='/cell/abdf1')
     assert [Path(file).samefile(config_file(name))
             for file, name in zip(files, ('net.csv', 'map.csv'))] == [True, True]
