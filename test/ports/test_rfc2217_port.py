@@ -129,7 +129,7 @@ def test_server_that_refuses(ends: tuple[Rfc2217Port, socket.socket]) -> None:
 def test_server_that_does_not_answer(
         ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch, answer: bytes,
         text: str) -> None:
-    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.05)
+    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 1.0)
     port, server = ends
     server.sendall(answer)
     with pytest.raises(OSError, match=text):

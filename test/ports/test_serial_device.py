@@ -211,7 +211,7 @@ def close_with(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[
         descriptor = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
         port = SerialDevice(descriptor, lambda: done.append('closed'))
         monkeypatch.setattr(fcntl, 'ioctl', ioctl)
-        monkeypatch.setattr(serial_device, '_LAST_BYTES', 0.05)
+        monkeypatch.setattr(serial_device, '_LAST_BYTES', 0.05 if unsent[-1] else PATIENCE)
         monkeypatch.setattr(termios, 'tcflush', lambda descriptor, queue: done.append(
             'dropped' if queue == termios.TCOFLUSH else 'something else'))
         monkeypatch.setattr(termios, 'tcsetattr', lambda descriptor, when, attributes: done.append(
