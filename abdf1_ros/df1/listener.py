@@ -138,6 +138,8 @@ class ListeningDecoder(FrameDecoder):
         return result
 
     def _begin(self, pair: bytes) -> Decoded:
+        # What came before is noise, whose last byte may look like the beginning.
+        del self._heard[:max(0, len(self._heard) - len(self.waiting) - len(pair))]
         kind = self._kind
         if not self._duplex_given:
             if pair in (SOH, EOT) and kind.duplex is not Duplex.RADIO:

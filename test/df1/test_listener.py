@@ -198,6 +198,17 @@ def test_what_stood_on_the_line_is_kept_for_each_symbol(pieces: list[bytes], siz
     assert sum(map(len, kept)) <= len(data)
 
 
+@pytest.mark.parametrize('size', [1, 3, 100])
+def test_noise_before_a_symbol_is_not_kept_with_it(size: int) -> None:
+    data = 2 * frames.DLE + b'\x02' + frames.STX + b'\x10\x0A'  # DLE DLE 02 looks like STX
+    decoder, kept = ListeningDecoder(LineKind()), []
+    for start in range(0, len(data), size):
+        decoder.feed(data[start:start + size])
+        while decoder.next_symbol() is not None:
+            kept.append(decoder.wire)
+    assert kept[0] == frames.STX
+
+
 def test_a_response_inside_a_message_is_kept_apart_from_it() -> None:
     decoder = ListeningDecoder(LineKind(Checksum.CRC, Duplex.FULL))
     message = frames.message_frame(COMMAND, Checksum.CRC)

@@ -72,11 +72,13 @@ _FOUND = {
     'server': (bytes.fromhex('0F0000002102240423FF') + 55 * b'\xb6',),
     # A file that is longer than its PLC can have.
     'simulator_csv': (b'Station,PLC_Type,Address,Length\n1,PLC5,N7:999,1000\n',),
-    # A line shown in full; a latency without end; a reply that comes in an earlier recording.
+    # A line shown in full; a latency without end; a reply that comes in an earlier recording;
+    # noise whose last byte looks like the beginning of what follows.
     'captures': (
         _CAPTURE + 600 * b'x',
         _CAPTURE + b'\n-1e308 > %b\n1e308 < %b\n' % _EXCHANGE,
-        _CAPTURE + b'\n# baud: 9600\n5 > %b\n1 < %b\n' % _EXCHANGE)}
+        _CAPTURE + b'\n# baud: 9600\n5 > %b\n1 < %b\n' % _EXCHANGE,
+        bytes.fromhex('10 10 02 10 02 10 0A'))}
 
 
 def seeds(target: str) -> list[bytes]:
