@@ -137,6 +137,8 @@ class Readings:
         job.done(now)
         if has_recovered:
             self._change(self._refusals.recovered(job.block, self.blocks))
+        elif self._refusals.recovering:
+            self._change(self._refusals.read_again(job.block, self.blocks))
 
     def _withhold(self, point: ReadPoint, guard: Guard, reason: str) -> None:
         """Withhold a value; told once for all rows that depend on the same (rule 15)."""

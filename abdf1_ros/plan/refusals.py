@@ -29,7 +29,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.plan.partition import Span
-from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.planner import Block, Planner, StationArea
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +83,7 @@ class Refusals:
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._searches: dict[Block, _RefusalSearch] = {}
+        self.recovering: dict[StationArea, Block] = {}  # the last of each area
 
     def refused(self, block: Block, blocks: Iterable[Block]) -> Change | None:
         """
@@ -109,8 +110,19 @@ class Refusals:
         search = self._searches.pop(block, None)
         if search is not None:
             return self._settle(search, block, blocks, is_refused=False)
-        if not self._planner.allow(block.station_area, block.span):
+        if self._planner.allow(block.station_area, block.span):
+            self.recovering[block.station_area] = block
+        return None
+
+    def read_again(self, block: Block, blocks: Iterable[Block]) -> Change | None:
+        """
+        Take note of a further good read of the last block in ``recovering`` of its area.
+
+        All others that recover with it have done so: a file that comes back is planned once.
+        """
+        if self.recovering.get(block.station_area) is not block:
             return None
+        del self.recovering[block.station_area]
         return self._planned_anew(_of_the_area(block, blocks))
 
     def processor_told(self, station: int, processor: Processor | None,
