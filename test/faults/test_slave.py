@@ -181,7 +181,7 @@ def test_command_whose_ack_is_lost_is_executed_once(line: Line, receiver: str) -
     word = 0x1234 + (receiver == 'Slave')
     before = repetitions(reader)
     line.box.pass_on, lost = losing_ack(receiver, word.to_bytes(2, 'little'))
-    assert writer.write(word) == 'written'
+    assert writer.hand_over(word)
     assert lost == [frames.ACK]
     line.works()
     assert reader.was_told(word) == 1
