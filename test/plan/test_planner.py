@@ -37,11 +37,10 @@ from support.mappings import make_mapping
 
 CHARACTER = 0.001
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(CHARACTER))
-PLANNER = Planner(LINE, 0.1)
 
 
 def plan(*mappings: Mapping) -> list[Block]:
-    return PLANNER.plan(mappings)
+    return Planner(LINE, 0.1).plan(mappings)  # one that knows nothing of other tests' files
 
 
 def spans(blocks: Iterable[Block]) -> list[tuple[str, int]]:
