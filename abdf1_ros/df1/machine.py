@@ -191,8 +191,7 @@ class Machine:
     do with Embedded Responses = Auto-detect. ``rate`` is what the line has shown of its speed.
     ``send_before`` is the clock value (s) after which ``withdraw`` is due in place of
     ``data_to_send``. ``late`` is the sum of the seconds by which it was called after a deadline of
-    its procedure: so long this process, or its host, has not run. ``woke`` is the clock value (s)
-    at which it went on after the last pause of more than ``MOST_LATE``.
+    its procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -206,7 +205,7 @@ class Machine:
         self.unsent: Callable[[], int] = lambda: 0
         self.background: Background | None = None
         self.late = 0.0
-        self.woke = -math.inf
+        self._woke, self._slept = -math.inf, 0.0
         self.position = 0
         self.embeds = False
         self.send_before = math.inf
@@ -359,13 +358,17 @@ class Machine:
             return
         self.late += now - self.deadline
         if now - self.deadline > MOST_LATE:
-            self.woke = now
+            self._woke, self._slept = now, now - self.deadline
         if self._pending is not None:
             self._transmit(self._pending)
         else:
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the seconds from a clock value to now, but for the last pause."""
+        return now - begun - (self._slept if self._woke > begun else 0.0)
 
     def wake(self, now: float) -> None:
         """End a rest early: there may be something new to do."""

@@ -111,8 +111,8 @@ class ActiveStationList:
     the gateway to a station, by number: the gateway is polled in place of the station, and all its
     stations are active while the gateway is (M 3-7). ``polled`` are the stations of this line that
     the link polls all the time: nobody else need ask whether they are there again. ``probes`` says
-    when others may be asked; one takes ``probe_time`` seconds. ``woke`` tells when this
-    process went on after a pause (clock value in s): the line was nobody's before.
+    when others may be asked; one takes ``probe_time`` seconds. ``took`` tells how much of
+    the time between two clock values (s) this process has run.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
@@ -120,7 +120,7 @@ class ActiveStationList:
                  routes: Mapping[int, int] | None = None, probe_time: float = 0.0) -> None:
         self.polled: Collection[int] = ()
         self.probes = Probes(probe_time)
-        self.woke: Callable[[], float] = lambda: -math.inf
+        self.took: Callable[[float, float], float] = lambda begun, now: now - begun
         self.records = _Records()
         self._stations: dict[int, Station] = {}
         self._on_change = on_change
@@ -196,19 +196,16 @@ class ActiveStationList:
         if not self._someone_waits:
             self.probes.nobody_waits(now)
         elif was_silent:
-            self.probes.spent(self._took(begun, now), now, is_message=is_message)
+            self.probes.spent(self.took(begun, now), now, is_message=is_message)
         else:
-            self.probes.died(self._took(begun, now), now)
+            self.probes.died(self.took(begun, now), now)
 
     def polled_in_vain(self, begun: float, now: float) -> None:
         """Take note that the link has asked a silent station from ``begun`` until now."""
         if self._someone_waits:
-            self.probes.spent(self._took(begun, now), now)
+            self.probes.spent(self.took(begun, now), now)
         else:
             self.probes.nobody_waits(now)
-
-    def _took(self, begun: float, now: float) -> float:
-        return now - max(begun, self.woke())
 
     @property
     def _someone_waits(self) -> bool:

@@ -99,7 +99,7 @@ class Driver:
             _routes(network, mappings), longest_probe(network))
         self.machine = make_machine(network.line, self._run, self.counters)
         self.machine.background = self
-        self.stations.woke = lambda: self.machine.woke
+        self.stations.took = self.machine.took
         self.is_online = False
         self._is_ending = False
         self._settings = settings
@@ -136,6 +136,7 @@ class Driver:
         self._readings.read_back = self.interlocks.read_back
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, self._reads)
+        self.guests.wrote = self.interlocks.guest_wrote
         self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self._reads, self.guests, self._tasks)

@@ -86,7 +86,8 @@ class FallbackRow:
     before that is not sent any more. ``due`` is when the row has to be looked at. All are clock
     values (s). ``is_held_up`` tells that the fallback waits for a message that is under way,
     ``has_failed`` that a message has ended otherwise since the last that was confirmed.
-    ``refusal`` says why the last write of the fallback was not confirmed.
+    ``refusal`` says why the last write of the fallback was not confirmed, ``is_overwritten`` that
+    a guest has written over one that stands.
     """
 
     def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
@@ -102,6 +103,7 @@ class FallbackRow:
         self.refusal = ''
         self.is_under_way = False
         self.is_held_up = False
+        self.is_overwritten = False
         # From when the time counts: the last confirmed message, or, after a fallback, the first
         # whose outcome is unknown.
         self._counts_from = -math.inf
@@ -111,8 +113,8 @@ class FallbackRow:
         self._is_ending = False
         self._due_since = 0.0
         self._next_try = -math.inf
-        # Whether a write has ended as unknown since the last message or fallback was confirmed.
-        # What was under way when we began is unknown: a gateway may still hold it.
+        # Whether a write has ended as unknown since the last fallback was confirmed. What went out
+        # before we began is unknown: a gateway may still hold it.
         self._is_unconfirmed = mapping.via is not None
         self._again_at = math.inf  # once more for what a gateway may hold (rule 10)
         self.refresh_at = math.inf  # for what nobody has seen (rule 8)
@@ -136,14 +138,9 @@ class FallbackRow:
     def end(self, *, is_ending: bool) -> None:
         """Take note that there is an end, in which little time is left, or that there is none."""
         self._is_ending = is_ending
-        if self._again_at < math.inf:
-            self._again_at = min(self._again_at, self.tried + self._settle_time)
+        if is_ending and self._again_at < math.inf:
+            self._again_at = min(self._again_at, self.tried + _SETTLE_AT_END)
             self.due = -math.inf
-
-    @property
-    def _settle_time(self) -> float:
-        """Return the seconds after which a gateway holds nothing any more."""
-        return min(2 * self._cmd_timeout, _SETTLE_AT_END if self._is_ending else math.inf)
 
     @property
     def is_confirmed(self) -> bool:
@@ -156,9 +153,10 @@ class FallbackRow:
         return self.cause is not None and self.sent < self._due_since
 
     @property
-    def may_be_first_try(self) -> bool:
-        """Tell whether the next look at it may find a first try."""
-        return self.is_first_try or self.cause is None and not self.stands
+    def first_due(self) -> float:
+        """Return when the next look at it may find a first try (clock value in s)."""
+        may_be = self.is_first_try or self.cause is None and not self.stands
+        return self.due if may_be else math.inf
 
     def is_fresh(self, now: float) -> bool:
         """Tell whether the last confirmed message is young enough."""
@@ -217,8 +215,13 @@ class FallbackRow:
             self._next_try = now + _PAUSE_AFTER_REFUSAL if refused else now
             self._again_at = now + _PAUSE_AFTER_REFUSAL
             return None
-        self._again_at = now + self._settle_time if self._is_unconfirmed else math.inf
-        self._is_unconfirmed = False
+        settle_time = 2 * self._cmd_timeout
+        if self._is_unconfirmed:
+            self._again_at = now + (
+                min(settle_time, _SETTLE_AT_END) if self._is_ending else settle_time)
+        elif self.tried >= self._again_at:  # this was it, not a refresh before its time
+            self._again_at = math.inf
+        self._is_unconfirmed = self.is_overwritten = False
         self.refresh_at = now + max(self.after, _LEAST_REFRESH)
         if self.cause is not None and self.tried < self._due_since:
             return None
@@ -232,7 +235,6 @@ class FallbackRow:
         self.has_failed = outcome is not Outcome.WRITTEN
         if outcome is Outcome.WRITTEN:
             self._counts_from = self.refreshed = max(self.refreshed, requested)
-            self._is_unconfirmed = False
         elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
             self._is_unconfirmed = True
             if self.stands:

@@ -25,7 +25,7 @@ in time): nobody knows then whether it was executed.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -148,6 +148,7 @@ class GuestQueue:
         self._reads = reads
         self._inbox: Inbox[GuestCommand] = Inbox(is_open=False)
         self.has_news = False  # the inbox has something
+        self.wrote: Callable[[int, Sequence[Extent]], None] = lambda station, extents: None
         self.waiting: deque[Guest] = deque()  # who has commands, the next one first
         self.next_expiry = math.inf  # when ``expire`` has something to do (clock value in s)
 
@@ -222,6 +223,7 @@ class GuestQueue:
         if was_sent and _code(command.packet) not in _READS:
             extents = self._words(command.packet, station)
             self._reads.refresh_words(station, extents, self._line.now)
+            self.wrote(station, extents)
             command.guest.wrote(command.packet, station, extents)
 
     def _look(self) -> None:

@@ -114,6 +114,7 @@ class HeartbeatRow:
         self._foreign_at = -math.inf
         self._zeros = 0  # written again, where another writer goes on
         self._extra_zero = 0.0  # s
+        self._holds_at = math.inf  # without a further message of the topics that it requires
 
     def _go(self, event: BeatEvent) -> None:
         self.state = _NEXT[self.state][event]
@@ -124,6 +125,8 @@ class HeartbeatRow:
             return self.reason or self.refusal or 'the PLC has not confirmed it yet'
         if self.state is not BeatState.COUNTS:
             return self.refusal or self.state.value
+        if not self.value:
+            return BeatState.SHOWN.value
         silent = now - self.confirmed
         why = f': {self.refusal}' if self.refusal else ''
         return f'not confirmed for {silent:.1f} s{why}' if silent > 3 * self._period else ''
@@ -167,7 +170,7 @@ class HeartbeatRow:
         ``why_held`` says why it must not count (rule 3 b, d), empty where it may; ``executor`` is
         when that ran last.
         """
-        self.reason = why_held
+        self.reason, self._holds_at = why_held, self.topics_until(messages)
         if self.state is BeatState.SHOWN and now >= self._next:
             self._go(BeatEvent.SEEN)
         if why_held:
@@ -184,19 +187,21 @@ class HeartbeatRow:
             self.reason = 'the executor of the node stands still'  # nothing is written then
             self.due = max(self._next, now + _GLANCE)
         else:
-            self.due = min(self._next, self.topics_until(messages)) if self.value else self._next
+            self.due = min(self._next, self._holds_at) if self.value else self._next
         return self.due <= now and self.state is not BeatState.SHOWN
 
     def hold(self) -> None:
         """Write 0 at once, if it counts (rule 3)."""
         if self.state is BeatState.COUNTS:
             self._go(BeatEvent.HOLD)
-            self.is_first_try = True
+            self.is_first_try = not self.is_at_rest
 
     @property
-    def may_be_first_try(self) -> bool:
-        """Tell whether the next look at it may find a first try."""
-        return self.is_first_try
+    def first_due(self) -> float:
+        """Return when the next look at it may find the first try of a 0 (clock value in s)."""
+        if self.state is not BeatState.COUNTS:
+            return self.due if self.is_first_try else math.inf
+        return self._holds_at if self.value and not self.is_under_way else math.inf
 
     def read_back(self, value: int, started: float, now: float) -> str:
         """

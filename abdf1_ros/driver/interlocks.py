@@ -34,6 +34,7 @@ from abdf1_ros.driver.points import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes import WriteQueue
 from abdf1_ros.driver.writing import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.mapping import Mapping
 
 # So often in a row a PLC has not answered that is taken as out of reach, though its station is
@@ -102,8 +103,7 @@ class _Plc:
     def plan(self) -> None:
         """Look at its rows again when the first of them wants it."""
         self.due = min([row.due for row in self.rows], default=math.inf)
-        self.first_due = min([row.due for row in self.rows if row.may_be_first_try],
-                             default=math.inf)
+        self.first_due = min([row.first_due for row in self.rows], default=math.inf)
 
 
 class Interlocks:
@@ -264,6 +264,12 @@ class Interlocks:
                 row.make_due(FallbackCause.END, self._writing.line.now)
             self._look_again(row)
 
+    def guest_wrote(self, station: int, extents: Sequence[Extent]) -> None:
+        """Take note of what a guest may have written, all of a station where there is nothing."""
+        plc = self._plcs.get(station)
+        for row in plc.fallbacks if plc is not None else ():
+            row.is_overwritten |= not extents or any(map(row.mapping.extent.meets, extents))
+
     def message_expired(self, write: Write) -> None:
         """Take note that a message was too old to have the line: nobody waits for it any more."""
         row = self._by_mapping.get(id(write.mapping))
@@ -293,6 +299,8 @@ class Interlocks:
         """Return what has to be written next, None for nothing."""
         self.expire(now)
         self._release()
+        if self._are_all_due:  # there is no later for silent PLCs
+            self._stations.probes.nobody_waits(now)
         if now < self._due:
             return None
         best: tuple[TurnRank, _Plc, OwnRow] | None = None
@@ -435,7 +443,7 @@ class Interlocks:
         if outcome is Outcome.UNKNOWN:
             plc.failures += 1
             if plc.is_lost:
-                took = now - max(own.begun, self._writing.line.woke)
+                took = self._writing.line.took(own.begun, now)
                 share = _SHARE_OF_OTHERS * took * is_behind_gateway
                 plc.pause_end = now + max(_LEAST_PAUSE, share)
         elif outcome is not Outcome.NOT_SENT:
@@ -474,7 +482,7 @@ class Interlocks:
         for row in self.fallbacks:
             self._writes.drop('fallback', now, row.mapping)
             row.end(is_ending=True)
-            if not row.stands or self._writing.is_held_up(row.mapping):
+            if not row.stands or row.is_overwritten or self._writing.is_held_up(row.mapping):
                 row.make_due(FallbackCause.END, now)
         self._awaited = frozenset(
             number for number in self._plcs if self._stations[number].active)

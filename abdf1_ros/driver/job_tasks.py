@@ -39,7 +39,8 @@ class LineTime(Protocol):
 
     now: float
     late: float
-    woke: float
+
+    def took(self, begun: float, now: float) -> float: ...
 
 
 class Job:

@@ -269,6 +269,8 @@ class BridgeNode(Node):
             response.message = ENDS
         elif request.data:
             self.driver.resume()
+            if self._is_ending:  # since then
+                self.session.begin_end()
             self.link.take()
             response.success, response.message = True, f'{self.port} is being opened'
         else:
@@ -327,6 +329,7 @@ def _run(node: BridgeNode, ended: EndRequest) -> int:
 
 
 def _end(node: BridgeNode, executor: SingleThreadedExecutor) -> None:
+    node.begin_end()
     node.tell_plcs()
     node.link.stop()
     take_last_writes(executor.spin_once, lambda: node.writes_taken,

@@ -730,6 +730,8 @@ def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
     assert bench.machine.late == 0.25
     bench.machine.handle_timeout(5.0)
     assert bench.machine.late == 2.25
+    now = bench.machine.now
+    assert (bench.machine.took(now - 5.0, now), bench.machine.took(now, now + 1.0)) == (3.0, 1.0)
 
 
 class Clockwork:

@@ -55,7 +55,11 @@ LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
 class StillClock:
     """The time of a line, which stands still."""
 
-    now = late = woke = 0.0
+    now = late = 0.0
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the seconds between two clock values."""
+        return now - begun
 
 
 def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob:

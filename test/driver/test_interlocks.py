@@ -315,7 +315,10 @@ def test_rule_3d_the_0_stands_for_half_a_second(period: int, lost: float) -> Non
     cell.bench.run_until(lambda: beat.state is BeatState.HELD)
     hear, since = cell.bench.far.hear, cell.now
     cell.bench.far.hear = lambda data: hear(data) if cell.now >= since + lost else b''
+    why: list[str] = []
+    cell.bench.at(since + lost + 0.4, lambda: why.append(beat.why_not(cell.now)))
     cell.publish(speed, 3, times=30, run=2.5)  # the topic is back at once
+    assert why == ['0 stands, for the PLC to see it']
     first = next(when for when, _, value in cell.writes if when >= since and value == 0)
     after = next(when for when, name, value in cell.writes
                  if when > first and name == 'N10:0' and value)
@@ -340,6 +343,39 @@ def test_rule_3d_lapse_that_nobody_saw_is_0_as_well() -> None:
     line.run(0.5)
     assert before > 0
     assert second.value == 0
+
+
+def late_cell(timeout: int) -> tuple[Cell, Mapping]:
+    """Return a cell beside a PLC that answers, and the topic without which there is no beat."""
+    speed = speed_row(None)
+    cell = Cell(beat_row(requires=(speed.topic,), timeout=timeout), speed,
+                make_mapping('N7:9', period=200), make_mapping('N7:9', station=2, period=20_000),
+                start=False)
+    cell.bench.plc(2, 'PLC5', ('N7:0', 20))
+    cell.bench.open()
+    return cell, speed
+
+
+def test_rule_3d_0_of_a_late_plc_is_sent_at_once() -> None:
+    cell, speed = late_cell(4000)
+    cell.publish(speed, 3, times=30, run=3.0)
+    cell.is_late = True
+    cell.run(3.8)
+    assert cell.word('N10:0') > 0
+    cell.run(0.2)
+    assert cell.word('N10:0') == 0
+
+
+def test_rule_3d_topic_that_comes_wakes_nobody_while_a_late_plc_has_to_wait() -> None:
+    cell, speed = late_cell(2000)
+    cell.run(2.0)
+    cell.is_late = True
+    stations, driver = cell.bench.driver.stations, cell.bench.driver
+    cell.bench.run_until(lambda: stations.next_message(1) > cell.now + 0.5)
+    cell.publish(speed, 3, run=0.1)
+    assert driver.interlocks.heartbeats[0].state is BeatState.COUNTS
+    assert driver.next_task(cell.now) is None
+    assert (driver.next_due() or math.inf) > cell.now
 
 
 @pytest.mark.parametrize('is_end', [True, False])
@@ -466,7 +502,8 @@ def test_rules_5_and_8_message_over_a_fallback_that_is_due_puts_none_off(event: 
     assert cell.word('N7:0') == 7
 
 
-def test_rule_5_end_waits_for_the_second_write_of_rule_10() -> None:
+@pytest.mark.parametrize('is_followed', [False, True])
+def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> None:
     """A gateway delivers 0.9 s later what it has called undelivered."""
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
     cell = Cell(speed, start=False)
@@ -481,6 +518,9 @@ def test_rule_5_end_waits_for_the_second_write_of_rule_10() -> None:
 
     cell.is_undelivered = is_held
     cell.publish(speed, 42, run=0.05)
+    if is_followed:
+        cell.publish(speed, 5, run=0.05)
+        assert cell.results()[-1] == 'written'
     end(cell)
     assert cell.word('N7:0') == 7
 
@@ -493,6 +533,36 @@ def test_rule_5_end_waits_for_a_plc_that_does_not_answer_for_a_moment() -> None:
     cell.bench.far.hear = lambda data: hear(data) if cell.now > since + 0.7 else b''
     end(cell)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+
+
+def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
+    speed = speed_row(Fallback((7,), 5000))
+    cell = Cell(beat_row(), speed, make_mapping('N7:9', station=2, period=100),
+                polling='Standard', start=False)
+    cell.bench.plc(2, 'PLC5', ('N7:0', 20))
+    cell.bench.open()
+    cell.run(1.0)
+    cell.publish(speed, 42, times=20, run=1.95)
+    cell.plc.faults.silent = True
+    cell.bench.at(cell.now + 1.0, lambda: setattr(cell.plc.faults, 'silent', False))
+    cell.bench.driver.wind_down()
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(1.5)
+    assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+
+
+def test_rule_5_fallback_that_a_guest_has_written_over_is_written_at_the_end() -> None:
+    cell = Cell(speed_row(), run=1.0)
+    cmd, data = cell.bench.driver.mappings[0].dialect.write(
+        parse_address('N7:0', PlcType.PLC5), b'\x63\0')
+    cell.bench.driver.guests.put(GuestCommand(
+        Guest('pty:hmi', ShareAccess.ALL), Packet(1, 9, cmd, 0, 1, data), cell.now,
+        lambda reply: None))
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(0.5)
+    assert cell.word('N7:0') == 99
+    end(cell)
+    assert cell.word('N7:0') == 7
 
 
 def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
@@ -829,6 +899,18 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     cell.refused = set()
     cell.run(2.0)
     assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
+
+
+def test_rule_10_refresh_is_not_the_second_write() -> None:
+    row = FallbackRow(speed_row(), 3.0)
+    row.message_ended(1.0, Outcome.UNKNOWN)
+    assert row.judge(2.0, -math.inf)
+    row.take(2.0)
+    row.ended(Outcome.WRITTEN, 2.0)
+    row.refresh(7.0)
+    row.ended(Outcome.WRITTEN, 7.0)
+    assert not row.judge(7.0, -math.inf)
+    assert row.due == 8.0
 
 
 def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:

@@ -47,7 +47,11 @@ def make_block(period: int, text: str, length: int) -> Block:
 class StillClock:
     """The time of a line, which stands still."""
 
-    now = late = woke = 0.0
+    now = late = 0.0
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the seconds between two clock values."""
+        return now - begun
 
 
 def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:

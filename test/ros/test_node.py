@@ -509,7 +509,7 @@ def test_end_is_not_taken_back_by_a_request(make_bench: Benches, observer: Obser
     assert (polling.success, polling.message) == (False, 'this node ends')
     reload = observer.call(Trigger, '/abdf1/reload', Trigger.Request())
     assert (reload.success, reload.message) == (False, 'this node ends')
-    assert bench.node.driver.interlocks._is_ending
+    assert bench.node.driver.interlocks.is_ending
 
 
 def test_internal_errors_are_told_and_the_third_is_the_end(
