@@ -222,6 +222,7 @@ class FrameDecoder:
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
         self._checksum = checksum
         self._is_half_duplex = duplex is Duplex.HALF
+        self._has_responses = duplex is Duplex.FULL
         self.waiting = bytearray()
         self.link_data = bytearray()
         self._step: Callable[[], Decoded] = self._idle
@@ -373,7 +374,7 @@ class FrameDecoder:
             del self.waiting[:1]
             self._take_data(1)
             return None
-        if pair in (ACK, NAK) and not self._is_half_duplex:
+        if pair in (ACK, NAK) and self._has_responses:
             del self.waiting[:2]
             self._has_response = True
             return _CONTROLS[pair]  # an embedded response (M 4-3)

@@ -147,6 +147,7 @@ class ListeningDecoder(FrameDecoder):
             elif pair == STX and kind.duplex is None:
                 kind.duplex = Duplex.FULL
         self._is_half_duplex = kind.duplex in (None, Duplex.HALF)
+        self._has_responses = kind.duplex is Duplex.FULL
         return super()._begin(pair)
 
     def _poll_check(self) -> Poll:

@@ -303,8 +303,9 @@ def test_embedded_response_is_one_in_full_duplex_only(response: bytes) -> None:
     assert isinstance(frame, Frame)
     assert decode(mixed + good, duplex=FULL) == [
         Control(Code(response[1])), frame._replace(has_response=True), frame]
-    assert decode(mixed, duplex=HALF)[:2] == [
-        Frame(DATA[:3], None, FrameFault.NO_ETX, response[1]), Control(Code(response[1]))]
+    for duplex in (HALF, Duplex.RADIO):
+        assert decode(mixed, duplex=duplex)[:2] == [
+            Frame(DATA[:3], None, FrameFault.NO_ETX, response[1]), Control(Code(response[1]))]
 
 
 def test_reset_forgets_a_message_that_has_begun() -> None:
