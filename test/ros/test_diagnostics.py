@@ -482,13 +482,13 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     assert bench.says('interlocks')[1].endswith('alive: heartbeat does not count')
     beat = bench.driver.interlocks.heartbeats[0]
-    beat.confirmed, beat.state = NOW, BeatState.COUNTS
+    beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
     assert details(bench.status('interlocks', NOW + 1.5))['station 1'] == \
         'heartbeat counts since 1.5 s'
     assert bench.says('interlocks', NOW + 1.6)[0] == WARN
     values = details(bench.status('interlocks', NOW + 4))
-    assert values['alive'] == 'heartbeat 0, 4.0 s ago; does not count: not confirmed for 4.0 s'
+    assert values['alive'] == 'heartbeat 1, 4.0 s ago; does not count: not confirmed for 4.0 s'
     assert values['station 1'] == 'not in control: not confirmed for 4.0 s'
     assert values['bound of alive'].startswith('PLC timer presets ')
 
@@ -507,7 +507,7 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         return status.level, details(status)['station 1']
 
     assert station(1, NOW - 1) == (WARN, 'not in control: the PLC has not confirmed it yet')
-    beat.confirmed, beat.state = NOW, BeatState.COUNTS
+    beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert station(None, NOW) == (
         WARN, 'unknown: ruled has not been read since the heartbeat counts')
     assert station(1, NOW + 1) == (OK, 'in control since 0.0 s')
