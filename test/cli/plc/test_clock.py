@@ -51,8 +51,8 @@ def set_clock(plc: SimulatedPlc, when: datetime) -> None:
 
 
 @pytest.mark.parametrize('station', [1, 2])
-def test_clock_is_told_with_its_drift(port: str, plcs: tuple[SimulatedPlc, ...], station: int,
-                        capsys: Output) -> None:
+def test_clock_is_told_with_its_drift(
+        port: str, plcs: tuple[SimulatedPlc, ...], station: int, capsys: Output) -> None:
     set_clock(plcs[station - 1], datetime.now() - timedelta(days=1, hours=2))
     said = call(main, capsys, 'clock', str(station), '--port', port)
     assert said.status == 0
