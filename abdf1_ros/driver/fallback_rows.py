@@ -213,7 +213,9 @@ class FallbackRow:
         if outcome is not Outcome.WRITTEN:
             refused = outcome in (Outcome.FAILED, Outcome.PARTLY)
             self._next_try = now + _PAUSE_AFTER_REFUSAL if refused else now
-            self._again_at = now + _PAUSE_AFTER_REFUSAL
+            self.refresh_at = now + _PAUSE_AFTER_REFUSAL
+            if not now < self._again_at < math.inf:  # a second write that is planned stays so
+                self._again_at = self.refresh_at
             return None
         settle_time = 2 * self._cmd_timeout
         if self._is_unconfirmed:

@@ -455,7 +455,7 @@ class Interlocks:
                         now: float) -> None:
         cause = row.cause
         seconds = row.ended(outcome, now)
-        if outcome is Outcome.WRITTEN and not row.mapping.serves:
+        if row.stands and not row.mapping.serves:
             self._plan_refresh(row, row.refresh_at)
         if seconds is not None and cause is not None:
             self._report(WriteResult(

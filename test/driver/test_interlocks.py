@@ -901,16 +901,19 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
 
 
-def test_rule_10_refresh_is_not_the_second_write() -> None:
-    row = FallbackRow(speed_row(), 3.0)
+@pytest.mark.parametrize(('outcome', 'next_refresh'), [
+    (Outcome.WRITTEN, 12.0), (Outcome.UNKNOWN, 8.0), (Outcome.FAILED, 8.0)])
+def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh: float) -> None:
+    row = FallbackRow(speed_row(), 4.0)
     row.message_ended(1.0, Outcome.UNKNOWN)
     assert row.judge(2.0, -math.inf)
     row.take(2.0)
     row.ended(Outcome.WRITTEN, 2.0)
     row.refresh(7.0)
-    row.ended(Outcome.WRITTEN, 7.0)
+    row.ended(outcome, 7.0)
     assert not row.judge(7.0, -math.inf)
-    assert row.due == 8.0
+    assert row.due == 10.0
+    assert row.refresh_at == next_refresh
 
 
 def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
