@@ -132,7 +132,7 @@ docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code
 .PHONY: bench
 bench: $(INSTALLED) ## Measure plan, line, processor time, latency, scale (6 minutes)
 	@for name in planning cpu_time large_maps wire_efficiency node_cpu node_latency node_scale; do \
-	    echo "$$name:"; timeout 300 $(PY) test/benchmarks/$$name.py || exit; echo; \
+	    echo "$$name:"; timeout 300 $(PY) test/lab/benchmarks/$$name.py || exit; echo; \
 	done
 
 .PHONY: test-pythons
@@ -145,7 +145,7 @@ GET_ATHERIS := $(PY) -c 'import atheris' 2>/dev/null || $(PY) -m pip install --q
 .PHONY: fuzz
 fuzz: $(INSTALLED) ## Fuzz what reads bytes and text for FUZZ_SECONDS (60), from the stored corpus
 	@if $(GET_ATHERIS); then \
-	    $(PY) test/fuzz/run.py --seconds $(FUZZ_SECONDS); \
+	    $(PY) test/lab/fuzz/run.py --seconds $(FUZZ_SECONDS); \
 	else \
 	    echo 'fuzz: not done, as there is no atheris for this machine' | tee -a "$${NOTES:-/dev/null}"; \
 	fi
@@ -153,11 +153,11 @@ fuzz: $(INSTALLED) ## Fuzz what reads bytes and text for FUZZ_SECONDS (60), from
 .PHONY: long
 long: $(INSTALLED) ## Try new examples, inputs, faults and kills for LONG_HOURS (1)
 	@$(GET_ATHERIS) || true
-	$(PY) test/long.py --hours $(LONG_HOURS) $(LONG_ARGS)
+	$(PY) test/lab/long.py --hours $(LONG_HOURS) $(LONG_ARGS)
 
 .PHONY: mutate
 mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes, tell which no test finds (hours)
-	$(PY) test/mutation/run.py --count $(MUTANTS)
+	$(PY) test/lab/mutation/run.py --count $(MUTANTS)
 
 .PHONY: audit
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)

@@ -40,7 +40,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.ros.messages import latched_qos
+from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.simulator.commands import execute
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc

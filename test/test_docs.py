@@ -30,7 +30,7 @@ from xml.etree import ElementTree
 from abdf1_ros.cli.main import COMMANDS as MAINS
 from abdf1_ros.messages import Message
 from abdf1_ros.ros.lines import OPTIONS
-from abdf1_ros.ros.parameters import Parameters
+from abdf1_ros.ros.parameters.declared import Parameters
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.network import FIELDS, load_network
 import pytest

@@ -17,7 +17,7 @@
 from pathlib import Path
 
 from abdf1_ros.counters import numbered
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.messages import Message
 import pytest
 

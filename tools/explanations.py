@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.messages import Message
 
 

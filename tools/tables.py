@@ -113,7 +113,7 @@ def map_columns() -> str:
 
 def parameters() -> str:
     """Return the node's own parameters; needs rclpy."""
-    from abdf1_ros.ros.parameters import Parameters
+    from abdf1_ros.ros.parameters.declared import Parameters
     rows = []
     for entry in fields(Parameters):
         low, high = entry.metadata['low'], entry.metadata['high']
@@ -129,7 +129,7 @@ def _default(value: object) -> str:
 
 def addresses() -> str:
     """Return address, file, types and message of every kind of place; needs rclpy."""
-    from abdf1_ros.ros.messages import MESSAGES as TOPIC_TYPES
+    from abdf1_ros.ros.topics.messages import MESSAGES as TOPIC_TYPES
     rows = []
     for label, examples in PLACES:
         parsed = [parse_address(text, plc_type) for plc_type, text in examples.items()]

@@ -42,8 +42,8 @@ from abdf1_ros.cli.terminal import (
     YELLOW,
 )
 from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.plan.bounds import Bound
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
-from abdf1_ros.plan.interlocks import Bound
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.plan.usable_rows import usable_rows

@@ -44,7 +44,7 @@ from abdf1_ros.cli.terminal import (
     number_option,
 )
 from abdf1_ros.paths import config_file
-from abdf1_ros.ros.messages import latched_qos, MESSAGES
+from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

@@ -39,11 +39,11 @@ import math
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestQueue
-from abdf1_ros.driver.interlocks import Interlocks
+from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
-from abdf1_ros.driver.reads import Reads
-from abdf1_ros.driver.writes import WriteQueue
-from abdf1_ros.plan.interlocks import OWN_IN_A_ROW
+from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.driver.writes.queue import WriteQueue
+from abdf1_ros.plan.bounds import OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
 MOST_BETWEEN_GUESTS = 3

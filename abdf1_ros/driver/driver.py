@@ -36,25 +36,25 @@ from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import GuestQueue
-from abdf1_ros.driver.heartbeat_rows import LARGEST
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.interlocks import Interlocks
+from abdf1_ros.driver.interlocks.heartbeat import LARGEST
+from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
-from abdf1_ros.driver.points import Outcome, show, Write, WriteResult
-from abdf1_ros.driver.read_backs import ReadBacks
-from abdf1_ros.driver.readings import Readings, ValueListener
+from abdf1_ros.driver.reads.read_backs import ReadBacks
+from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.served import Served
-from abdf1_ros.driver.writes import MAX_WAITING_WRITES, waited_too_long, WriteQueue
-from abdf1_ros.driver.writing import WritesUnderWay
+from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, waited_too_long, WriteQueue
+from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.plan.forecast import answer_time, line_model, longest_probe, poll_cycle
-from abdf1_ros.plan.interlocks import MODE_PERIOD
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

@@ -34,7 +34,7 @@ from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
-from abdf1_ros.driver.reads import Reads
+from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.extent import Extent

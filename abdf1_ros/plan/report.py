@@ -31,7 +31,8 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import ValueType
-from abdf1_ros.plan import forecast, interlocks
+from abdf1_ros.plan import bounds, forecast
+from abdf1_ros.plan.bounds import Bound, Times
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
@@ -92,7 +93,7 @@ class Report:
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        return forecast.load(self.blocks, self._answer_time) + interlocks.own_load(
+        return forecast.load(self.blocks, self._answer_time) + bounds.own_load(
             self.network, self.mappings, self.default_period, self._answer_time)
 
     @property
@@ -105,13 +106,13 @@ class Report:
         return self._times.longest
 
     @property
-    def bounds(self) -> list[interlocks.Bound]:
+    def bounds(self) -> list[Bound]:
         """Return the bounds of heartbeats and fallbacks."""
         return list(self._times.bounds())
 
     @property
-    def _times(self) -> interlocks.Times:
-        return interlocks.Times(self.network, self.mappings, self.blocks, self.response_time)
+    def _times(self) -> Times:
+        return Times(self.network, self.mappings, self.blocks, self.response_time)
 
     @property
     def advice(self) -> list[str]:
@@ -123,7 +124,7 @@ class Report:
         # As the node forecasts it, whatever a PLC really takes to answer.
         stale = forecast.stale_times(
             self.blocks, self.default_period, stale_after,
-            interlocks.own_load(self.network, self.mappings, self.default_period))
+            bounds.own_load(self.network, self.mappings, self.default_period))
         return {mapping: time for mapping, time in stale.items()
                 if mapping.publish is Publish.ALWAYS}
 
@@ -139,9 +140,9 @@ class Report:
 
     def notes(self) -> list[str]:
         """Return what somebody should know, and what is not odd at all."""
-        found = list(interlocks.costs(
+        found = list(bounds.costs(
             self.network, self.mappings, self.default_period, self.response_time))
-        found += interlocks.conditions(self.network, self.mappings)
+        found += bounds.conditions(self.network, self.mappings)
         bits = [mapping for mapping in self.mappings if mapping.command is Command.READ
                 and mapping.type is ValueType.BOOL]
         silent = [mapping for mapping in bits if mapping.publish is Publish.CHANGE]
@@ -349,7 +350,7 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
 
 def _interlock_remarks(report: Report) -> Iterator[Remark]:
     """Find heartbeats and fallbacks with times that the line cannot keep."""
-    for text in interlocks.remarks(report.network, report.mappings, report.response_time):
+    for text in bounds.remarks(report.network, report.mappings, report.response_time):
         yield Remark(RemarkKind.INTERLOCK, text)
 
 

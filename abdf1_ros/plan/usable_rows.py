@@ -22,8 +22,8 @@ from dataclasses import replace
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.plan.bounds import guard_faults
 from abdf1_ros.plan.forecast import line_model
-from abdf1_ros.plan.interlocks import guard_faults
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.map_file import broken_links

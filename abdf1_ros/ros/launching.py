@@ -21,7 +21,7 @@ from dataclasses import fields
 import difflib
 from pathlib import Path
 
-from abdf1_ros.ros.parameters import Parameters
+from abdf1_ros.ros.parameters.declared import Parameters
 
 
 def parameter_types() -> dict[str, type]:

@@ -17,7 +17,7 @@ Many lines in one process: ``lines``.
 
 Each line is a node as ``node`` has it, in one ROS context: one DDS participant for all. Each has
 two threads, for its link and for its callbacks. One executor for all would need 17 ms for every
-message to a hundred nodes, in which no link gets on (test/benchmarks/many_lines.py); an executor
+message to a hundred nodes, in which no link gets on (`many_lines.py` of test/lab); an executor
 a line needs 1.3 ms. What goes wrong with one line stays with it.
 """
 
@@ -33,12 +33,11 @@ import time
 from typing import Any
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.ros.graph import Graph
-from abdf1_ros.ros.interlocks import END_LIMIT
-from abdf1_ros.ros.log import bug_text
+from abdf1_ros.ros.diagnostics.graph import Graph
+from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
-from abdf1_ros.ros.parameter_files import parameter_files, parameter_tree
-from abdf1_ros.ros.parameters import unknown_overrides
+from abdf1_ros.ros.parameters.declared import unknown_overrides
+from abdf1_ros.ros.parameters.files import parameter_files, parameter_tree
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
@@ -49,6 +48,7 @@ from abdf1_ros.ros.process import (
     run_ros,
     take_last_writes,
 )
+from abdf1_ros.ros.topics.interlocks import END_LIMIT
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

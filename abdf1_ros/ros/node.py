@@ -26,17 +26,15 @@ import time
 from typing import Any
 
 from abdf1_ros.driver.driver import Driver, ENDS
-from abdf1_ros.driver.writes import MAX_WAITING_WRITES
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.graph import DuplicateNameWatch, Graph
-from abdf1_ros.ros.interlocks import END_LIMIT
-from abdf1_ros.ros.log import bug_text
-from abdf1_ros.ros.messages import latched_qos
-from abdf1_ros.ros.parameters import Configuration, configure, declare_again, read_again
+from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph
+from abdf1_ros.ros.diagnostics.log import bug_text
+from abdf1_ros.ros.parameters.declared import Configuration, configure, declare_again, read_again
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_FAULT,
@@ -47,7 +45,9 @@ from abdf1_ros.ros.process import (
     take_last_writes,
 )
 from abdf1_ros.ros.session import Session, Surroundings
-from abdf1_ros.ros.writes import WriteTopics
+from abdf1_ros.ros.topics.interlocks import END_LIMIT
+from abdf1_ros.ros.topics.messages import latched_qos
+from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

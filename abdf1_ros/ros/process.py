@@ -33,8 +33,8 @@ from typing import NamedTuple
 
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
-from abdf1_ros.ros.log import bug_text
-from abdf1_ros.ros.parameter_files import usable_files
+from abdf1_ros.ros.diagnostics.log import bug_text
+from abdf1_ros.ros.parameters.files import usable_files
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy

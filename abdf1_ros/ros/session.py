@@ -32,7 +32,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import Guest
-from abdf1_ros.driver.points import Outcome, WriteResult
+from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.extent import Extent
@@ -40,18 +40,18 @@ from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import changed_text, deaf_text, Diagnostics
-from abdf1_ros.ros.graph import DuplicateNameWatch, Graph, TypeWatch
-from abdf1_ros.ros.interlocks import InterlockWatch, wait_for_end
-from abdf1_ros.ros.line_figures import speed_seen
-from abdf1_ros.ros.log import EventLog, LimitedLog, UnreadableRows, where
-from abdf1_ros.ros.messages import ACTIVE_LAYOUT
-from abdf1_ros.ros.parameters import Configuration
-from abdf1_ros.ros.reads import ReadTopic, ReadTopics
-from abdf1_ros.ros.snapshot import Snapshot
-from abdf1_ros.ros.station_health import LinkCounterService
-from abdf1_ros.ros.write_log import is_usual_fallback
-from abdf1_ros.ros.writes import WriteTopics
+from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph, TypeWatch
+from abdf1_ros.ros.diagnostics.line import speed_seen
+from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, UnreadableRows, where
+from abdf1_ros.ros.diagnostics.stations import LinkCounterService
+from abdf1_ros.ros.diagnostics.statuses import changed_text, deaf_text, Diagnostics
+from abdf1_ros.ros.diagnostics.writes import is_usual_fallback
+from abdf1_ros.ros.parameters.declared import Configuration
+from abdf1_ros.ros.topics.interlocks import InterlockWatch, wait_for_end
+from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
+from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
+from abdf1_ros.ros.topics.snapshot import Snapshot
+from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine

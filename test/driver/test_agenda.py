@@ -27,15 +27,16 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestQueue
-from abdf1_ros.driver.interlocks import Interlocks
+from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
-from abdf1_ros.driver.read_backs import ReadBacks
-from abdf1_ros.driver.read_queue import ReadJob
-from abdf1_ros.driver.readings import Readings
-from abdf1_ros.driver.writes import MessageJob, WriteQueue
-from abdf1_ros.driver.writing import WritesUnderWay
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.reads.queue import ReadJob
+from abdf1_ros.driver.reads.read_backs import ReadBacks
+from abdf1_ros.driver.reads.readings import Readings
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
+from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner

@@ -33,10 +33,10 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, message_frame
 from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.interlocks import Interlocks
+from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.plan.interlocks import Times
+from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.mapping import Mapping

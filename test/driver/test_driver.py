@@ -23,8 +23,9 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Freshness, Outcome
-from abdf1_ros.driver.writes import MAX_WAITING_WRITES
+from abdf1_ros.driver.reads.point import Freshness
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType

@@ -14,7 +14,7 @@
 
 """The driver against stations of the families that are not spoken to with typed commands."""
 
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc

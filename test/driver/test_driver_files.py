@@ -17,8 +17,8 @@
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.points import Outcome
-from abdf1_ros.driver.transactions import REWRITTEN
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.writes.packets import REWRITTEN
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.slc import commands as slc

@@ -19,9 +19,9 @@ from __future__ import annotations
 from dataclasses import replace
 from random import Random
 
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.forecast import longest_transaction
-from abdf1_ros.plan.interlocks import Times
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.network import Network

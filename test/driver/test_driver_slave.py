@@ -23,7 +23,7 @@ from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address

@@ -25,8 +25,8 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome
-from abdf1_ros.driver.writes import MAX_WAITING_WRITES
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc

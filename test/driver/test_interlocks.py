@@ -26,18 +26,19 @@ import math
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
-from abdf1_ros.driver.fallback_rows import FallbackCause, FallbackRow
-from abdf1_ros.driver.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
-from abdf1_ros.driver.heartbeat_rows import BeatState, LARGEST
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint
+from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
+from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
-from abdf1_ros.plan.interlocks import MODE_PERIOD
+from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES

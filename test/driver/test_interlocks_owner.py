@@ -22,10 +22,10 @@ from __future__ import annotations
 
 import math
 
-from abdf1_ros.driver.heartbeat_rows import BeatState, HeartbeatRow
+from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
-from abdf1_ros.plan.interlocks import MODE_PERIOD
+from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Lamp

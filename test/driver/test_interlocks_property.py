@@ -33,7 +33,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address

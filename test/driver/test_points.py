@@ -16,7 +16,8 @@
 
 from array import array
 
-from abdf1_ros.driver.points import Freshness, Outcome, ReadPoint, show, Write
+from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.write import Outcome, show, Write
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType

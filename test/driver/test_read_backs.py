@@ -19,8 +19,8 @@ import math
 
 from abdf1_ros.df1.frames import EOT, STX
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.driver.read_backs import ReadBacks
+from abdf1_ros.driver.reads.read_backs import ReadBacks
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Block, Planner

@@ -23,8 +23,8 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.points import ReadPoint
-from abdf1_ros.driver.read_queue import ReadJob, ReadQueue
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.reads.queue import ReadJob, ReadQueue
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.plan.forecast import block_time, intervals, load, PATIENCE
 from abdf1_ros.plan.line_model import LineModel

@@ -17,8 +17,8 @@
 from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.driver.transactions import carry_out, REWRITTEN
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes.packets import carry_out, REWRITTEN
 from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError, StationInactive
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.families import parse_address

@@ -16,7 +16,7 @@
 import importlib
 from pathlib import Path
 
-from abdf1_ros.driver.points import Outcome
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.heartbeats import Fallback, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -91,6 +91,6 @@ def test_transaction_costs_little_more_with_900_fallbacks() -> None:
 
 def test_read_in_a_loop_without_waiting_is_130_calls_at_most(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / 'benchmarks'))
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / 'lab' / 'benchmarks'))
     benchmark = importlib.import_module('cpu_time')
     assert benchmark.measure_without_waiting(loops=1)[1] <= 130

@@ -17,8 +17,7 @@
 from dataclasses import replace
 import math
 
-from abdf1_ros.plan.forecast import line_model, longest_transaction
-from abdf1_ros.plan.interlocks import (
+from abdf1_ros.plan.bounds import (
     conditions,
     guard_faults,
     own_load,
@@ -26,6 +25,7 @@ from abdf1_ros.plan.interlocks import (
     Times,
     write_time,
 )
+from abdf1_ros.plan.forecast import line_model, longest_transaction
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile

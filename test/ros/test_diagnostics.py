@@ -23,16 +23,17 @@ from typing import Any
 from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.driver.driver import Driver, Listener
-from abdf1_ros.driver.fallback_rows import FallbackCause
-from abdf1_ros.driver.heartbeat_rows import BeatState
+from abdf1_ros.driver.interlocks.fallback import FallbackCause
+from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import Outcome, ReadPoint, Write, WriteResult
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics import Diagnostics
-from abdf1_ros.ros.write_log import WriteLog
+from abdf1_ros.ros.diagnostics.statuses import Diagnostics
+from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network

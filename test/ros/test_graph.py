@@ -16,8 +16,8 @@
 
 from collections.abc import Sequence
 
-from abdf1_ros.ros import graph as graph_module
-from abdf1_ros.ros.graph import DuplicateNameWatch, Graph, TypeWatch
+from abdf1_ros.ros.diagnostics import graph as graph_module
+from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph, TypeWatch
 import pytest
 from support.mappings import make_mapping
 

@@ -29,7 +29,7 @@ from abdf1_ros.ros import lines as module
 from abdf1_ros.ros import process
 from abdf1_ros.ros.lines import chosen, LineName, main, sections
 from abdf1_ros.ros.node import BridgeNode
-from abdf1_ros.ros.parameter_files import parameter_files, usable_files
+from abdf1_ros.ros.parameters.files import parameter_files, usable_files
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
 import pytest

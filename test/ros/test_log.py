@@ -18,7 +18,13 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.ros.log import EventLog, LimitedLog, MOST_CAUSES, MOST_ENTRIES, UnreadableRows
+from abdf1_ros.ros.diagnostics.log import (
+    EventLog,
+    LimitedLog,
+    MOST_CAUSES,
+    MOST_ENTRIES,
+    UnreadableRows,
+)
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
 from support.clock import Clock

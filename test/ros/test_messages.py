@@ -21,7 +21,7 @@ from typing import Any
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import ValueType
-from abdf1_ros.ros.messages import (
+from abdf1_ros.ros.topics.messages import (
     encoder,
     latched_qos,
     MESSAGES,

@@ -24,7 +24,7 @@ import time
 from typing import Any
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.writes import MAX_WAITING_WRITES
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -436,7 +436,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
 def test_file_that_a_plc_lacks_is_told_in_one_line(
         make_bench: Benches, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.log._PAUSE', 3.0)
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics.log._PAUSE', 3.0)
     bench = make_bench(*(f'm{n},Read,N99:{30 * n},1,PLC5,1,' for n in range(8)), SPEED)
     told: list[str] = []
 
@@ -554,7 +554,7 @@ def test_third_internal_error_ends_the_node_with_status_1(
 def test_duplicate_name_is_told_and_forgotten(
         make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.graph._LOOKS_FOR_DUPLICATES', 1)
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics.graph._LOOKS_FOR_DUPLICATES', 1)
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
     other = Node('abdf1', context=observer.context, use_global_arguments=False)

@@ -17,7 +17,7 @@
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 
-from abdf1_ros.ros.parameter_store import forget, overrides, show
+from abdf1_ros.ros.parameters.store import forget, overrides, show
 import pytest
 from rclpy.node import Node
 from rclpy.parameter import Parameter

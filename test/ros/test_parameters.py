@@ -21,7 +21,7 @@ from typing import Any
 
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.parameters import Configuration, configure, Parameters
+from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.network import Network
 import pytest

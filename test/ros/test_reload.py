@@ -23,9 +23,9 @@ from abdf1_ros.df1.line_rate import LineRate
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ros.diagnostics import Diagnostics
+from abdf1_ros.ros.diagnostics.graph import Graph
+from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.files import FileWatch
-from abdf1_ros.ros.graph import Graph
 from abdf1_ros.ros.node import BridgeNode
 from abdf1_ros.testing import Plcs
 import pytest
@@ -255,7 +255,7 @@ def test_second_wrong_baud_is_told_as_the_first(
 
 
 def test_other_node_of_our_name_stays_known(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.graph._LOOKS_FOR_DUPLICATES', 1)
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics.graph._LOOKS_FOR_DUPLICATES', 1)
     monkeypatch.setattr(Graph, 'nodes', lambda *arguments: 2)
     text = 'another node is called abdf1 too'
     until_status(bench.diagnostics, 'link', WARN, lambda status: text in status.message)

@@ -20,10 +20,10 @@ from datetime import datetime
 from pathlib import Path
 import time
 
-from abdf1_ros.driver.points import ReadPoint
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.node import BridgeNode
-from abdf1_ros.ros.snapshot import Snapshot
+from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

@@ -16,7 +16,7 @@
 
 from collections.abc import Sequence
 
-from abdf1_ros.ros.writes import LossCounter
+from abdf1_ros.ros.topics.writes import LossCounter
 import pytest
 
 

@@ -23,7 +23,7 @@ from typing import Any, Self
 
 from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
-from abdf1_ros.ros.messages import latched_qos, MESSAGES
+from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import rclpy
 from rclpy.duration import Infinite

@@ -24,8 +24,8 @@ import re
 import time
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.driver.points import Outcome, Write, WriteResult
-from abdf1_ros.driver.transactions import carry_out
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc import steps

@@ -33,7 +33,7 @@ from abdf1_ros.cli.terminal import is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.points import WriteResult
+from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread

@@ -20,7 +20,7 @@ import time
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.view import Reading, Snapshot, Style
 from abdf1_ros.errors import FormatError
-from abdf1_ros.ros.messages import latched_qos, new_message, read_qos
+from abdf1_ros.ros.topics.messages import latched_qos, new_message, read_qos
 from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest

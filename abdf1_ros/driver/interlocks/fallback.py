@@ -1,0 +1,249 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Fallback values: what is written when nobody writes any more (rules 7 to 12 and 17).
+
+The numbers of rules are those of docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from enum import auto, Enum
+import math
+
+from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.settings.mapping import Mapping
+
+# A fallback value that the PLC refuses is written again after so many seconds.
+_PAUSE_AFTER_REFUSAL = 1.0
+
+# At an orderly end the second write of rule 10 comes after so many seconds: there are two in all.
+_SETTLE_AT_END = 1.0
+
+# One that stands is written again after so many seconds at least (rule 8).
+_LEAST_REFRESH = 5.0
+
+
+class FallbackCause(Enum):
+    """Why a fallback value is due (rule 17)."""
+
+    TIMEOUT = 'timeout'
+    START = 'start'
+    RETURN = 'return'
+    RUN = 'run'
+    END = 'end'
+
+
+class FallbackState(Enum):
+    """What the PLC holds of a row: a message, or the fallback, as far as one knows."""
+
+    MESSAGE = 'a message stands'
+    DUE = 'the fallback value is due'
+    STANDS = 'the fallback value stands'
+
+
+class FallbackEvent(Enum):
+    """What changes the state: a message also when it may have been written."""
+
+    DUE = auto()
+    FALLBACK_WRITTEN = auto()
+    MESSAGE_WRITTEN = auto()
+
+
+_NEXT = {
+    FallbackState.MESSAGE: {
+        FallbackEvent.DUE: FallbackState.DUE,
+        FallbackEvent.MESSAGE_WRITTEN: FallbackState.MESSAGE,
+        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
+    FallbackState.DUE: {  # whatever is written, until the PLC has confirmed the fallback
+        FallbackEvent.DUE: FallbackState.DUE,
+        FallbackEvent.MESSAGE_WRITTEN: FallbackState.DUE,
+        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
+    FallbackState.STANDS: {
+        FallbackEvent.DUE: FallbackState.DUE,
+        FallbackEvent.MESSAGE_WRITTEN: FallbackState.MESSAGE,
+        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
+}
+
+
+class FallbackRow:
+    """
+    One row with Fallback, and what the PLC holds of it.
+
+    ``cause`` says why the fallback is due, None where it is not. ``refreshed`` is when the last
+    confirmed message was published, ``sent`` when the fallback was last sent: a message published
+    before that is not sent any more. ``due`` is when the row has to be looked at. All are clock
+    values (s). ``is_held_up`` tells that the fallback waits for a message that is under way,
+    ``has_failed`` that a message has ended otherwise since the last that was confirmed.
+    ``refusal`` says why the last write of the fallback was not confirmed, ``is_overwritten`` that
+    a guest has written over one that stands.
+    """
+
+    def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
+        assert mapping.fallback is not None
+        self.mapping = mapping
+        self.after = mapping.fallback.after / 1000
+        self.state = FallbackState.MESSAGE
+        self.refreshed = -math.inf
+        self.sent = -math.inf
+        self.tried = -math.inf  # like ``sent``, also when it is written again
+        self.due = math.inf
+        self.cause: FallbackCause | None = None
+        self.refusal = ''
+        self.is_under_way = False
+        self.is_held_up = False
+        self.is_overwritten = False
+        # From when the time counts: the last confirmed message, or, after a fallback, the first
+        # whose outcome is unknown.
+        self._counts_from = -math.inf
+        self.has_failed = False
+        self._values = mapping.fallback.values
+        self._cmd_timeout = cmd_timeout
+        self._is_ending = False
+        self._due_since = 0.0
+        self._next_try = -math.inf
+        # Whether a write has ended as unknown since the last fallback was confirmed. What went out
+        # before we began is unknown: a gateway may still hold it.
+        self._is_unconfirmed = mapping.via is not None
+        self._again_at = math.inf  # once more for what a gateway may hold (rule 10)
+        self.refresh_at = math.inf  # for what nobody has seen (rule 8)
+
+    def _go(self, event: FallbackEvent) -> None:
+        self.state = _NEXT[self.state][event]
+
+    @property
+    def stands(self) -> bool:
+        """Tell whether the PLC holds the fallback, and no message was sent since."""
+        return self.state is FallbackState.STANDS
+
+    def make_due(self, cause: FallbackCause, now: float) -> None:
+        """Make the fallback due at once; the first cause is the one that is told."""
+        if self.cause is None:
+            self.cause, self._due_since = cause, now
+        self._due_since = min(self._due_since, now)  # a message may have put it off
+        self._go(FallbackEvent.DUE)
+        self._next_try = self.due = now
+
+    def end(self, *, is_ending: bool) -> None:
+        """Take note that there is an end, in which little time is left, or that there is none."""
+        self._is_ending = is_ending
+        if is_ending and self._again_at < math.inf:
+            self._again_at = min(self._again_at, self.tried + _SETTLE_AT_END)
+            self.due = -math.inf
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Tell whether nothing is left to be written of what is due."""
+        return self.cause is None and not (self.stands and self._again_at < math.inf)
+
+    @property
+    def is_first_try(self) -> bool:
+        """Tell whether the fallback is due and was not sent since."""
+        return self.cause is not None and self.sent < self._due_since
+
+    @property
+    def first_due(self) -> float:
+        """Return when the next look at it may find a first try (clock value in s)."""
+        may_be = self.is_first_try or self.cause is None and not self.stands
+        return self.due if may_be else math.inf
+
+    def is_fresh(self, now: float) -> bool:
+        """Tell whether the last confirmed message is young enough."""
+        return now < self.refreshed + self.after
+
+    def deadline(self, youngest: float) -> float:
+        """
+        Return when the fallback becomes due (clock value in s), infinite for never.
+
+        ``youngest`` is when the youngest message was published that waits or is under way. It is
+        waited for while all goes well: there is always one where they come faster than the PLC
+        refuses them.
+        """
+        if self.state is FallbackState.DUE:
+            return self._due_since
+        if self.state is FallbackState.STANDS:
+            return math.inf
+        return self.after + (
+            self._counts_from if self.has_failed else max(self._counts_from, youngest))
+
+    def judge(self, now: float, youngest: float) -> bool:
+        """Tell whether the fallback is to be written now; plan when to look again if it is not."""
+        if self.state is FallbackState.MESSAGE and now >= self.deadline(youngest):
+            self.make_due(FallbackCause.TIMEOUT, now)
+        if self.is_under_way or self.is_held_up:
+            self.due = math.inf
+        elif self.state is FallbackState.DUE:
+            self.due = max(self._due_since, self._next_try)
+        elif self.state is FallbackState.STANDS:
+            self.due = self._again_at
+        else:
+            self.due = self.deadline(youngest)
+        return self.due <= now
+
+    def take(self, now: float) -> Write:
+        """Return the write of the fallback, which ends with ``ended``."""
+        self.sent = now
+        return self.refresh(now)
+
+    def refresh(self, now: float) -> Write:
+        """Return the write of a fallback that stands already."""
+        self.is_under_way, self.tried = True, now
+        return Write(self.mapping, self._values, now)
+
+    def ended(self, outcome: Outcome, now: float) -> float | None:
+        """
+        Take note how it ended; return the seconds that it was due, None where none is reported.
+
+        It is written once more where a gateway may still hold a message of the row (rule 10), and
+        where it has become due since this write began.
+        """
+        self.is_under_way = False
+        self.due = now
+        if outcome is not Outcome.WRITTEN:
+            refused = outcome in (Outcome.FAILED, Outcome.PARTLY)
+            self._next_try = now + _PAUSE_AFTER_REFUSAL if refused else now
+            self.refresh_at = now + _PAUSE_AFTER_REFUSAL
+            if not now < self._again_at < math.inf:  # a second write that is planned stays so
+                self._again_at = self.refresh_at
+            return None
+        settle_time = 2 * self._cmd_timeout
+        if self._is_unconfirmed:
+            self._again_at = now + (
+                min(settle_time, _SETTLE_AT_END) if self._is_ending else settle_time)
+        elif self.tried >= self._again_at:  # this was it, not a refresh before its time
+            self._again_at = math.inf
+        self._is_unconfirmed = self.is_overwritten = False
+        self.refresh_at = now + max(self.after, _LEAST_REFRESH)
+        if self.cause is not None and self.tried < self._due_since:
+            return None
+        was_due, self.cause = self.cause is not None, None
+        self._go(FallbackEvent.FALLBACK_WRITTEN)
+        return now - self._due_since if was_due else None
+
+    def message_ended(self, requested: float, outcome: Outcome) -> None:
+        """Take note how a message of the row ended that had the line (rule 7)."""
+        self.due = -math.inf
+        self.has_failed = outcome is not Outcome.WRITTEN
+        if outcome is Outcome.WRITTEN:
+            self._counts_from = self.refreshed = max(self.refreshed, requested)
+        elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
+            self._is_unconfirmed = True
+            if self.stands:
+                self._counts_from = requested
+            elif self.state is FallbackState.DUE and not self.is_first_try:
+                # It may have been written over a fallback that the PLC has not confirmed.
+                self._due_since = max(self._due_since, requested + self.after)
+        else:
+            return
+        self._go(FallbackEvent.MESSAGE_WRITTEN)

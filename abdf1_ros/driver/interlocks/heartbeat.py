@@ -1,0 +1,263 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Heartbeats: a word that we count up while all conditions hold (rules 1 to 6).
+
+The numbers of rules are those of docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from enum import auto, Enum
+import math
+
+from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.settings.mapping import Mapping
+
+LARGEST = 32_767
+
+_LEAST_LIFE_SIGN = 1.0  # s
+
+# 0 stands for so long (s) at least: a PLC sees a word once in a scan (rule 2).
+_LEAST_ZERO = 0.5
+
+# A 0 that the PLC has not confirmed is written again after so many seconds, or a Period.
+_REPEAT_ZERO = 1.0
+
+# A stopped executor does not wake the link, so the link looks by itself every so many seconds.
+_GLANCE = 0.1
+
+# A second value that is not ours within so many seconds, or Periods where that is longer, is
+# another writer, not a download.
+_CONFLICT_TIME = 60.0
+_CONFLICT_PERIODS = 20
+
+_SHIFTS = 7
+_GOLDEN = 0.618  # its multiples lie evenly between whole numbers
+
+
+class BeatState(Enum):
+    """What the PLC is to see: 0, or a value that counts."""
+
+    CONTACT = 'first contact: 0 has to be confirmed'
+    SHOWN = '0 stands, for the PLC to see it'
+    COUNTS = 'counts'
+    HELD = '0, while it must not count'
+    CONFLICT = '0, as another writer writes this word'
+
+
+class BeatEvent(Enum):
+    """What changes the state."""
+
+    OPENED = auto()
+    RUN = auto()
+    CONTACT = auto()
+    OTHER_WRITER = auto()
+    ZERO_CONFIRMED = auto()
+    SEEN = auto()
+    HOLD = auto()
+    RELEASE = auto()
+
+
+_ALWAYS = {BeatEvent.OPENED: BeatState.CONTACT, BeatEvent.RUN: BeatState.CONTACT,
+           BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.OTHER_WRITER: BeatState.CONFLICT}
+_NEXT = {
+    BeatState.CONTACT: {**_ALWAYS, BeatEvent.ZERO_CONFIRMED: BeatState.SHOWN},
+    BeatState.SHOWN: {**_ALWAYS, BeatEvent.SEEN: BeatState.COUNTS},
+    BeatState.COUNTS: {**_ALWAYS, BeatEvent.HOLD: BeatState.HELD},
+    BeatState.HELD: {**_ALWAYS, BeatEvent.RELEASE: BeatState.COUNTS},
+    BeatState.CONFLICT: {**_ALWAYS, BeatEvent.CONTACT: BeatState.CONFLICT},
+}
+
+
+class HeartbeatRow:
+    """
+    One Heartbeat row, and what the PLC holds of it.
+
+    ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
+    one. ``reason`` says why it does not count, empty while it does. ``refusal`` says why the last
+    write was not confirmed, ``tried`` when that was sent. ``due`` is when the row has to be looked
+    at (clock values in s). It counts from ``first`` on.
+    """
+
+    def __init__(self, mapping: Mapping, first: int = 1) -> None:
+        assert mapping.heartbeat is not None
+        assert mapping.period is not None
+        self.mapping = mapping
+        self._before_first = first - 1
+        self.state = BeatState.CONTACT
+        self.value = 0
+        self.confirmed: float | None = None
+        self.reason = ''
+        self.refusal = ''
+        self.is_under_way = False
+        self.is_first_try = True  # of the 0 that has to be written
+        self.tried = -math.inf
+        self.due = math.inf
+        self.requires = mapping.heartbeat.requires
+        self._requires_timeout = (mapping.heartbeat.requires_timeout or 0) / 1000
+        self._period = mapping.period / 1000
+        self._is_confirmed = False
+        self._next = -math.inf
+        self._foreign_at = -math.inf
+        self._zeros = 0  # written again, where another writer goes on
+        self._extra_zero = 0.0  # s
+        self._holds_at = math.inf  # without a further message of the topics that it requires
+
+    def _go(self, event: BeatEvent) -> None:
+        self.state = _NEXT[self.state][event]
+
+    def why_not(self, now: float) -> str:
+        """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
+        if self.reason or self.confirmed is None:
+            return self.reason or self.refusal or 'the PLC has not confirmed it yet'
+        if self.state is not BeatState.COUNTS:
+            return self.refusal or self.state.value
+        if not self.value:
+            return BeatState.SHOWN.value
+        silent = now - self.confirmed
+        why = f': {self.refusal}' if self.refusal else ''
+        return f'not confirmed for {silent:.1f} s{why}' if silent > 3 * self._period else ''
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether the PLC has confirmed 0."""
+        return self.value == 0 and self._is_confirmed
+
+    def begin(self, now: float, event: BeatEvent = BeatEvent.CONTACT) -> None:
+        """Start again with 0: the PLC may be another one by now (rule 2)."""
+        self._go(event)
+        if event is BeatEvent.RUN:  # whatever was foreign before came with a download
+            self._foreign_at = -math.inf
+        self._is_confirmed, self.is_first_try = False, True
+        self._next = self.due = now
+
+    def missing(self, messages: MappingType[str, float], now: float) -> str:
+        """
+        Return the first topic without a message in time, empty for none (rule 3 d).
+
+        ``messages`` tells when the last accepted message of each was published (clock value in s).
+        """
+        return next((topic for topic in self.requires
+                     if now >= messages.get(topic, -math.inf) + self._requires_timeout), '')
+
+    def topics_until(self, messages: MappingType[str, float]) -> float:
+        """Return until when it may count by rule 3 (d) without a further message."""
+        return min((messages.get(topic, -math.inf) + self._requires_timeout
+                    for topic in self.requires), default=math.inf)
+
+    def executor_until(self, executor: float) -> float:
+        """Return until when it may count by rule 3 (c); ``executor`` is when that ran last."""
+        return executor + max(self._period, _LEAST_LIFE_SIGN)
+
+    def judge(self, now: float, why_held: str, executor: float,
+              messages: MappingType[str, float]) -> bool:
+        """
+        Tell whether something is to be written now; plan when to look again if it is not.
+
+        ``why_held`` says why it must not count (rule 3 b, d), empty where it may; ``executor`` is
+        when that ran last.
+        """
+        self.reason, self._holds_at = why_held, self.topics_until(messages)
+        if self.state is BeatState.SHOWN and now >= self._next:
+            self._go(BeatEvent.SEEN)
+        if why_held:
+            self.hold()
+        elif self.state is BeatState.HELD and self.is_at_rest:  # the PLC has to see the 0
+            self._go(BeatEvent.RELEASE)
+        if self.is_under_way:
+            self.due = math.inf
+        elif self.state in (BeatState.HELD, BeatState.CONFLICT):
+            self.due = math.inf if self.is_at_rest else self._next if self.value == 0 else now
+        elif self.state is not BeatState.COUNTS:
+            self.due = self._next
+        elif now >= self.executor_until(executor):
+            self.reason = 'the executor of the node stands still'  # nothing is written then
+            self.due = max(self._next, now + _GLANCE)
+        else:
+            self.due = min(self._next, self._holds_at) if self.value else self._next
+        return self.due <= now and self.state is not BeatState.SHOWN
+
+    def hold(self) -> None:
+        """Write 0 at once, if it counts (rule 3)."""
+        if self.state is BeatState.COUNTS:
+            self._go(BeatEvent.HOLD)
+            self.is_first_try = not self.is_at_rest
+
+    @property
+    def first_due(self) -> float:
+        """Return when the next look at it may find the first try of a 0 (clock value in s)."""
+        if self.state is not BeatState.COUNTS:
+            return self.due if self.is_first_try else math.inf
+        return self._holds_at if self.value and not self.is_under_way else math.inf
+
+    def read_back(self, value: int, started: float, now: float) -> str:
+        """
+        Compare a value that was read from ``started`` on; return what is told of another's.
+
+        Only between the confirmation of ours and the next count one knows what it has to be. The
+        first is taken for a download, a second one for another writer: 0 then stays, unless a
+        change to RUN shows that it was a download as well (rule 19).
+        """
+        is_known = self._is_confirmed and not self.is_under_way
+        if not is_known or started < (self.confirmed or 0.0) or value == self.value:
+            return ''
+        text = f'{value} was read where {self.value} was written'
+        is_again = now - self._foreign_at < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
+        was_known, self._foreign_at = self.state is BeatState.CONFLICT, now
+        self.begin(now, BeatEvent.OTHER_WRITER if is_again else BeatEvent.CONTACT)
+        if was_known:
+            # At another moment of the other's period each time, for it to see the 0 before it
+            # counts on.
+            self._zeros += 1
+            self._next = self.due = now + self._period * (0.5 + self._zeros * _GOLDEN % 1)
+            return ''
+        if is_again:
+            return (f'another program writes this word: {text}; 0 stays until the PLC goes from '
+                    'PROGRAM to RUN, ~/reload, or the port is opened again')
+        # If two bridges counted from 1 at the same time, neither would see the other any more.
+        self._extra_zero = self._period * (1 + int(1000 * now) % _SHIFTS)
+        return f'{text}: taken for a download'
+
+    @property
+    def wants_zero(self) -> bool:
+        """Tell whether what is to be written is 0."""
+        return self.state is not BeatState.COUNTS
+
+    def take(self, now: float) -> Write:
+        """Return the write of 0, or of the next value, which ends with ``ended``."""
+        self.is_under_way, self.is_first_try, self.tried = True, False, now
+        if self.wants_zero:
+            self.value, self._is_confirmed = 0, False
+        elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
+            before = self.value or self._before_first
+            self.value, self._is_confirmed = before % LARGEST + 1, False
+        # Another writer has to see our 0 between two of its own.
+        is_urgent = self.wants_zero and self.state is not BeatState.CONFLICT
+        self._next = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
+        return Write(self.mapping, [self.value], now)
+
+    def ended(self, outcome: Outcome, now: float) -> None:
+        """Take note how it ended."""
+        self.is_under_way = False
+        self.due = now
+        if outcome is not Outcome.WRITTEN:
+            return
+        self._is_confirmed, self.confirmed = True, now
+        if self.value == 0 and self.state is not BeatState.CONFLICT:
+            self._next = now + max(self._period, _LEAST_ZERO) + self._extra_zero
+            self._extra_zero = 0.0
+        if self.value == 0 and self.state is BeatState.CONTACT:
+            self._go(BeatEvent.ZERO_CONFIRMED)

@@ -1,0 +1,132 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Guarded reads: values that are published only while the PLC's program runs (rules 13 to 15).
+
+The port of a PLC answers also while its program is stopped. The numbers of rules are those of
+docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+import math
+
+from abdf1_ros.driver.reads.point import Guard, ReadPoint
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.plan.bounds import ANSWERS_IN_TIME
+
+
+class RunGuard(Guard):
+    """Permits values while a station answers, within their stale time, that it is in RUN."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._told = -math.inf
+        self._state = 'its mode is not known'
+
+    @property
+    def status_period(self) -> float:
+        """Return how often (s) the station has to be asked for its mode."""
+        return min(self._since) / ANSWERS_IN_TIME
+
+    def told(self, identity: Identity | None, asked: float) -> None:
+        """Take an answer about the mode, None for one that cannot be used."""
+        is_running = identity is not None and bool(identity.is_running) and not identity.faults
+        for limit, since in self._since.items():
+            if not is_running:
+                self._since[limit] = math.inf
+            elif asked - self._told > limit or math.isinf(since):
+                self._since[limit] = asked
+        self._told = asked
+        if identity is None:
+            self._state = 'its mode is not known'
+        else:
+            self._state = f'it is in {identity.mode_text}'
+            if identity.faults:
+                self._state += f', {"; ".join(identity.faults)}'
+
+    def why_not(self, point: ReadPoint, started: float, now: float) -> str:
+        """Return why a value read from ``started`` on is not to be published, empty if it is."""
+        since = self._since[point.patience]
+        if since == math.inf:
+            return f'not in RUN: {self._state}'
+        if now - self._told > point.patience:
+            return f'it has not told its mode for {now - self._told:.1f} s'
+        return '' if started > since else 'it has begun to run during this read'
+
+
+class CounterGuard(Guard):
+    """Permits values after two changes of a word in time, until one is overdue."""
+
+    def __init__(self, tag: str) -> None:
+        super().__init__()
+        self._tag = tag
+        self._word: bytes | None = None
+        self._changed = -math.inf
+
+    def read(self, word: bytes, now: float) -> None:
+        """Take what was read of the word."""
+        if self._word is not None and word != self._word:
+            for limit, since in self._since.items():
+                if now - self._changed > limit:
+                    self._since[limit] = math.inf
+                elif since == math.inf:
+                    self._since[limit] = now  # the second change in time
+            self._changed = now
+        self._word = word
+
+    def why_not(self, point: ReadPoint, started: float, now: float) -> str:
+        """Return why a value read from ``started`` on is not to be published, empty if it is."""
+        limit = point.patience
+        if now - self._changed > limit:
+            self._since[limit] = math.inf
+        since = self._since[limit]
+        if since == math.inf:
+            return f'{self._tag} has not changed twice within {limit:g} s'
+        return '' if started > since else f'{self._tag} has begun to change during this read'
+
+
+class Guards:
+    """The guards of all rows with Publish_While; ``counters`` has those of counters, by tag."""
+
+    def __init__(self, points: Iterable[ReadPoint]) -> None:
+        self._runs: dict[int, RunGuard] = {}
+        self.counters: dict[str, CounterGuard] = {}
+        for point in points:
+            condition, station = point.mapping.publish_while, point.mapping.station
+            if condition is None:
+                continue
+            if condition.tag is None:
+                self._runs.setdefault(station, RunGuard()).add(point)
+            else:  # a tag is there once in the map
+                self.counters.setdefault(condition.tag, CounterGuard(condition.tag)).add(point)
+
+    def status_periods(self) -> dict[int, float]:
+        """Return how often (s) stations have to be asked for their mode."""
+        return {station: guard.status_period for station, guard in self._runs.items()}
+
+    def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
+        """Take what a station has told about itself; it was ``asked`` at this clock value (s)."""
+        if station in self._runs:
+            self._runs[station].told(identity, asked)
+
+    def values_read(self, points: Sequence[ReadPoint], places: Sequence[slice], data: bytes,
+                    now: float) -> None:
+        """Give the counters among the words that were read to their guards."""
+        for point, place in zip(points, places, strict=True):
+            counter = self.counters.get(point.mapping.tag)
+            if counter is not None:
+                counter.read(data[place], now)

@@ -1,0 +1,178 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is known about a mapping that reads, and the guard that may withhold its values."""
+
+from __future__ import annotations
+
+from enum import Enum
+import math
+
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.settings.mapping import Mapping, Publish
+
+
+class Freshness(Enum):
+    """How good the last value of a point is."""
+
+    FRESH = 'fresh'
+    LATE = 'late'
+    STALE = 'stale'
+    FAILED = 'failed'
+    WITHHELD = 'withheld'
+    WAITING = 'waiting for the first read'
+
+
+class ReadPoint:
+    """
+    What is known about one mapping that reads.
+
+    ``period`` and ``stale_time`` are in seconds. A value is late when it is older than one and a
+    half periods and older than half of ``stale_time``; it is stale when older than ``stale_time``.
+    ``interval`` is the seconds between the last two good reads, None if a failed one was between
+    them. ``error`` says why the last read gave no value, ``withheld`` why its value was not
+    published. Values are withheld since ``withheld_since`` (clock value in s), and this is the
+    ``withholdings``-th time. ``guard`` decides that, where the row has one; what its condition
+    rests on may be as old as ``patience``, in seconds.
+    """
+
+    def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
+        self.mapping = mapping
+        self.period = period
+        self.stale_time = stale_time
+        self.last_good: float | None = None
+        self.interval: float | None = None
+        self.error: str | None = None
+        self.failures = 0
+        self.guard: Guard | None = None
+        self.withheld = ''
+        self.withheld_since = 0.0
+        self.withholdings = 0
+        self._is_told = False
+        timeout = mapping.publish_while.timeout if mapping.publish_while else None
+        self.patience = stale_time if timeout is None else timeout / 1000
+        self._decode = mapping.codec.decoder()
+        self._scaling = mapping.scaling
+        self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
+        self._is_on_change = mapping.publish is Publish.CHANGE
+        self._published: bytes | str | None = None
+
+    def update(self, words: bytes, now: float) -> Values | None:
+        """
+        Take the words of a good read; return the values to publish, or None when unchanged.
+
+        Raises FormatError when the words are no value of the mapping's type.
+        """
+        values = self._decode(words)
+        is_same = self._is_on_change and not self._is_change(values) and self.error is None
+        if self.withheld and self.guard is not None:
+            self.guard.withheld.discard(self)
+        if self.last_good is not None:
+            self.interval = now - self.last_good if self.error is None else None
+        self.last_good, self.error, self.withheld = now, None, ''
+        if is_same:
+            return None
+        return values if self._scaling is None else self._scaling.publish(values)
+
+    def _is_change(self, values: Values) -> bool:
+        """Remember values; return whether they differ from the last ones."""
+        # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
+        # itself.
+        content = values if isinstance(values, str) else values.tobytes()
+        is_change: bool = content != self._published
+        self._published = content
+        return is_change
+
+    def fail(self, error: str) -> bool:
+        """Take note that a read gave no value; return whether the reason is a new one."""
+        is_news = error != self.error
+        if self.guard is not None:
+            self.guard.withheld.discard(self)
+        self.error = error
+        self.failures += 1
+        return is_news
+
+    def withhold(self, reason: str, now: float) -> bool:
+        """
+        Take note that a value is not published; return whether that is to be told, once a cause.
+
+        At the start nothing holds; that is told when it has had its time to begin.
+        """
+        if not self.withheld:
+            self.withheld_since, self._is_told = now, False
+        self.withheld, self.error = reason, None
+        is_start = self.last_good is None and now - self.withheld_since < self.patience
+        is_news = not self._is_told and not is_start
+        if is_news:
+            self._is_told = True
+            self.withholdings += 1
+        if self._is_told and self.guard is not None:
+            self.guard.withheld.add(self)
+        return is_news
+
+    @property
+    def is_withheld(self) -> bool:
+        """Tell whether its values are read and not published, and that has been told."""
+        return bool(self.withheld) and self._is_told and self.error is None
+
+    def is_due(self, now: float, block_period: float) -> bool:
+        """
+        Tell whether a read that is made now is for this point.
+
+        Its block is read every ``block_period`` seconds, more often than it wants.
+        """
+        if self.last_good is None or self.error is not None:
+            return True
+        return now - self.last_good >= self.period - 0.5 * block_period
+
+    def age(self, now: float) -> float | None:
+        """Return the seconds since the last good read, None before the first."""
+        return None if self.last_good is None else now - self.last_good
+
+    def freshness(self, now: float) -> Freshness:
+        """Judge the last value."""
+        if self.error is not None:
+            return Freshness.FAILED
+        if self.is_withheld:
+            return Freshness.WITHHELD
+        if self.last_good is None:
+            return Freshness.WAITING
+        age = now - self.last_good
+        if age <= self._usual_age:
+            return Freshness.FRESH
+        return Freshness.STALE if age > self.stale_time else Freshness.LATE
+
+
+class Guard:
+    """
+    One condition of a station, and the ``points`` whose values may be published while it holds.
+
+    ``withheld`` are those of them that are withheld, which has been told.
+    """
+
+    def __init__(self) -> None:
+        self.points: list[ReadPoint] = []
+        self.withheld: set[ReadPoint] = set()
+        # From when on the condition holds (clock value in s), by the patience of points.
+        self._since: dict[float, float] = {}
+
+    def add(self, point: ReadPoint) -> None:
+        """Take a point that depends on the condition."""
+        self.points.append(point)
+        self._since[point.patience] = math.inf
+        point.guard = self
+
+    def why_not(self, point: ReadPoint, started: float, now: float) -> str:
+        """Return why a value read from ``started`` on is not to be published, empty if it is."""
+        raise NotImplementedError

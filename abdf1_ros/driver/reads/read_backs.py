@@ -1,0 +1,102 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Unconfirmed writes: the next read of the words shows what the PLC holds.
+
+The one result of such a write waits for that read, but not longer than a write may wait for the
+line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+import math
+
+from abdf1_ros.driver.write import Write, WriteResult
+from abdf1_ros.plan.planner import Block
+
+
+@dataclass(frozen=True, slots=True)
+class _UnconfirmedWrite:
+    """A write and its unconfirmed ``result``, which came at the clock value ``since`` (s)."""
+
+    write: Write
+    result: WriteResult
+    since: float
+
+
+class ReadBacks:
+    """
+    The writes that wait to be read back, for ``patience`` seconds at most.
+
+    ``report`` gets their results. ``next_expiry`` is when the first will have waited too long
+    (clock value in s), infinite for never. All of it belongs to the link thread.
+    """
+
+    def __init__(self, patience: float, report: Callable[[WriteResult], None]) -> None:
+        self._patience = patience
+        self._report = report
+        self._waiting: list[_UnconfirmedWrite] = []
+        self.next_expiry = math.inf
+
+    def add(self, write: Write, result: WriteResult, blocks: Iterable[Block],
+            now: float) -> None:
+        """Take an unconfirmed write; report at once where none of ``blocks`` reads its words."""
+        entry = _UnconfirmedWrite(write, result, now)
+        if any(block.extent.holds(write.mapping.extent) for block in blocks):
+            self._waiting.append(entry)
+            self._plan()
+        else:
+            self._tell(entry, 'not read back: no row reads all of these words', now)
+
+    def read(self, block: Block, data: bytes, started: float, now: float) -> None:
+        """Compare the data of a block whose read ``started`` at that clock value (s)."""
+        for entry in self._waiting[:]:
+            mapping = entry.write.mapping
+            if started >= entry.since and block.extent.holds(mapping.extent):
+                is_held = entry.write.is_held(data[block.slice_of(mapping)])
+                which = 'the value' if is_held else 'another value'
+                self._end(entry, f'read back: the PLC holds {which}', now)
+
+    def overtaken(self, newer: Write, now: float) -> None:
+        """End those whose words the write ``newer`` changes, which is sent now."""
+        for entry in self._waiting[:]:
+            if entry.write.overlaps(newer):
+                self._end(entry, 'not read back: a newer write of these words has gone out', now)
+
+    def expire(self, now: float) -> None:
+        """End those that have waited too long."""
+        for entry in self._waiting[:]:
+            if now >= entry.since + self._patience:
+                self._end(entry, f'not read back within {self._patience:g} s', now)
+
+    def end(self, now: float) -> None:
+        """End all: the port is lost."""
+        for entry in self._waiting[:]:
+            self._end(entry, 'not read back before the line went down', now)
+
+    def _end(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
+        self._waiting.remove(entry)
+        self._plan()
+        self._tell(entry, finding, now)
+
+    def _plan(self) -> None:
+        self.next_expiry = self._waiting[0].since + self._patience if self._waiting else math.inf
+
+    def _tell(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
+        write, result = entry.write, entry.result
+        self._report(replace(result, detail=f'{result.detail}; {finding}',
+                             latency=now - write.requested))

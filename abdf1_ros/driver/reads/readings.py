@@ -1,0 +1,239 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What comes of reads: values to publish, rows that fail, other blocks to be read instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+import math
+from typing import Protocol
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.job_tasks import LineTime
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.reads.guards import Guards
+from abdf1_ros.driver.reads.point import Guard, ReadPoint
+from abdf1_ros.driver.reads.queue import ReadJob
+from abdf1_ros.driver.reads.read_backs import ReadBacks
+from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.plan.bounds import own_load
+from abdf1_ros.plan.forecast import block_time, longest_transaction, period_of, stale_times
+from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.refusals import Change, Refusals
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+
+# Other commands go between the packets of one read. On a busy line the read may take so many times
+# its own time.
+_TURNS_OF_A_READ = 10
+
+
+class ValueListener(Protocol):
+    """Gets what was read; called in the link thread. What is not overridden does nothing."""
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take the values of a good read that are to be published."""
+
+    def unreadable(self, mapping: Mapping, reason: str) -> None:
+        """Take note that a station answers without a usable value; once for each reason."""
+
+    def published_again(self, mapping: Mapping, seconds: float) -> None:
+        """Take note that rows are no longer withheld, of which ``mapping`` was the last one."""
+
+
+class Readings:
+    """
+    The ``points`` of all rows that are published, and the ``reads`` that serve them.
+
+    ``listener`` is told. ``read_backs`` compares what was read with unconfirmed writes,
+    ``read_back`` with heartbeats.
+    """
+
+    def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
+                 planner: Planner, stations: ActiveStationList, line: LineTime,
+                 listener: ValueListener, read_backs: ReadBacks) -> None:
+        self.read_back: Callable[[Mapping, bytes, float], None] | None = None
+        blocks = planner.plan(mapping for mapping in mappings
+                              if not (settings.read_only and mapping.heartbeat))
+        self.points = _points(network, mappings, blocks, settings)
+        self.guards = Guards(self.points.values())
+        self.reads = Reads(stations)
+        self._network = network
+        self._stations = stations
+        self._line = line
+        self._listener = listener
+        self._read_backs = read_backs
+        self._refusals = Refusals(planner)
+        self.reads.replace((), map(self._job, blocks), 0.0)
+
+    @property
+    def blocks(self) -> list[Block]:
+        """Return what is read together."""
+        return [job.block for job in self.reads.jobs]
+
+    def _job(self, block: Block) -> ReadJob:
+        longest = longest_transaction(self._network) + _TURNS_OF_A_READ * block_time(block)
+        points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
+        return ReadJob(block, points, self._line, self._packet_ended, longest)
+
+    def _packet_ended(self, job: ReadJob, error: Exception | None) -> None:
+        try:
+            if error is None and (reason := job.why_too_old()):
+                job.begin_anew()
+                for point in job.points:
+                    point.fail(f'read again: {reason}')
+            elif error is None:
+                if (data := job.data()) is not None:
+                    self._read(job, data)
+            elif isinstance(error, LinkError):
+                self.link_failed(job.station, job.points, error)
+            elif isinstance(error, RemoteError):
+                self._stations[job.station].remote_errors += 1
+                self._failed(job, str(error), is_address_fault(error))
+            elif isinstance(error, FormatError):
+                self._failed(job, f'unusable reply: {error}', is_refusal=False)
+        finally:
+            self.reads.ended(job, self._line.now)
+
+    def _read(self, job: ReadJob, data: bytes) -> None:
+        """Update the points for which this read was made."""
+        now = self._line.now
+        if self._read_backs.next_expiry != math.inf:
+            self._read_backs.read(job.block, data, job.started, now)
+        if self.guards.counters:
+            self.guards.values_read(job.points, job.slices, data, now)
+        if self.read_back is not None:
+            for mapping, place in job.heartbeats:
+                self.read_back(mapping, data[place], job.started)
+        has_recovered, period = False, job.block.period
+        for point, place in zip(job.points, job.slices, strict=True):
+            has_recovered |= point.error is not None
+            is_rare = point.period > period and not job.is_refresh  # others are for every read
+            if is_rare and not point.is_due(now, period):
+                continue
+            guard = point.guard
+            if guard is not None and (reason := guard.why_not(point, job.started, now)):
+                self._withhold(point, guard, reason)
+            elif guard is not None and point in guard.withheld:
+                self._release(point, guard, data[place])
+            else:
+                self._update(point, data[place])
+        job.done(now)
+        if has_recovered:
+            self._change(self._refusals.recovered(job.block, self.blocks))
+        elif self._refusals.recovering:
+            self._change(self._refusals.read_again(job.block, self.blocks))
+
+    def _withhold(self, point: ReadPoint, guard: Guard, reason: str) -> None:
+        """Withhold a value; told once for all rows that depend on the same (rule 15)."""
+        is_first = not guard.withheld
+        if point.withhold(reason, self._line.now) and is_first:
+            count = len(guard.points)
+            more = f'; so are all {count} rows that depend on it' if count > 1 else ''
+            self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
+
+    def _release(self, point: ReadPoint, guard: Guard, words: bytes) -> None:
+        """Update a point whose values were withheld; told with the last of the guard."""
+        self._update(point, words)
+        if not guard.withheld:
+            self._listener.published_again(
+                point.mapping, self._line.now - point.withheld_since)
+
+    def served(self, mapping: Mapping, words: bytes) -> None:
+        """Take words of ours that the other end has written."""
+        self._update(self.points[mapping], words)
+
+    def _update(self, point: ReadPoint, words: bytes) -> None:
+        try:
+            values = point.update(words, self._line.now)
+        except FormatError as error:
+            self._unreadable(point, str(error))
+        else:
+            if values is not None:
+                self._listener.read(point.mapping, values)
+
+    def _unreadable(self, point: ReadPoint, reason: str) -> None:
+        if point.fail(reason):
+            self._listener.unreadable(point.mapping, reason)
+
+    def _failed(self, job: ReadJob, reason: str, is_refusal: bool) -> None:
+        """Fail the points; after a refusal read smaller blocks."""
+        job.interrupted()
+        is_news = is_refusal and job in self.reads.jobs
+        change = self._refusals.refused(job.block, self.blocks) if is_news else None
+        is_divided = change is not None and list(change.old) == [job.block]
+        for point in self._affected(job.station, job.points):
+            if is_divided:
+                point.fail(f'{reason} (or another address read with it has this fault)')
+            else:
+                self._unreadable(point, reason)
+        self._change(change)
+
+    def _change(self, change: Change | None) -> None:
+        """Read the new blocks of a change from now on."""
+        if change is not None:
+            old = [job for job in self.reads.jobs if job.block in change.old]
+            self.reads.replace(old, map(self._job, change.new), self._line.now)
+
+    def told(self, station: int, identity: Identity | None, asked: float) -> None:
+        """Use what a station has said to be since it was ``asked`` (clock value, s), if it did."""
+        self.guards.mode_told(station, identity, asked)
+        if identity is not None:
+            self._change(self._refusals.processor_told(station, identity.processor, self.blocks))
+
+    def link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
+        """Fail the points of a transaction without a reply."""
+        if station == BROADCAST:
+            return
+        self._stations[station].failures += 1
+        for point in self._affected(station, points):
+            point.fail(str(error))
+
+    def _affected(self, station: int, points: Iterable[ReadPoint]) -> Iterable[ReadPoint]:
+        """Return the points of a failed transaction, all of the station where it is silent."""
+        if self._stations[station].replies_in_time:
+            return points
+        return [point for point in self.points.values() if point.mapping.station == station]
+
+    def port_lost(self, reason: str) -> None:
+        """Fail all that depends on the port."""
+        for job in self.reads.jobs:
+            job.interrupted()
+        for mapping, point in self.points.items():
+            if mapping.polls:
+                point.fail(reason)
+
+
+def _points(network: Network, mappings: Sequence[Mapping], blocks: Sequence[Block],
+            settings: DriverSettings) -> dict[Mapping, ReadPoint]:
+    """Return the points of all mappings that read, in their order."""
+    default = settings.default_period
+    stale = stale_times(blocks, default, settings.stale_after,
+                        own_load(network, mappings, default))
+    return {mapping: _served_point(mapping, settings) if mapping.serves
+            else ReadPoint(mapping, period_of(mapping, default), stale[mapping])
+            for mapping in mappings if mapping.reads}
+
+
+def _served_point(mapping: Mapping, settings: DriverSettings) -> ReadPoint:
+    # Without a Period the other end may write at any time, or never.
+    expected = mapping.period / 1000 if mapping.period else math.inf
+    point = ReadPoint(mapping, expected, settings.stale_after * expected)
+    point.last_good = None if mapping.period else 0.0
+    return point

@@ -1,0 +1,176 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+All reads of a line: those that wait in the order of ``read_queue``, and those set aside.
+
+The reads of a station are set aside while it is inactive, or while it acknowledges commands
+without replying in time. Now and then one of them is sent as a probe.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container, Iterable, Sequence
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.reads.queue import ReadJob, ReadQueue
+from abdf1_ros.driver.write import Write
+from abdf1_ros.pccc.extent import Extent
+
+
+class Reads:
+    """Keep all read jobs; ``stations.probes`` says when one of a silent station may be sent."""
+
+    def __init__(self, stations: ActiveStationList) -> None:
+        self._stations = stations
+        self._due = ReadQueue()
+        self._aside: dict[int, deque[ReadJob]] = {}
+        self._put_off = 0.0  # until when, as nobody replies (clock value, s)
+
+    @property
+    def jobs(self) -> frozenset[ReadJob]:
+        return frozenset(self._due.jobs)
+
+    @property
+    def has_silent(self) -> bool:
+        """Tell whether reads of silent stations wait for their probe."""
+        return bool(self._aside)
+
+    @property
+    def poll_cycle(self) -> float | None:
+        """Return the longest time (s) between the last two good reads of any job."""
+        return max((job.interval for job in self.jobs if job.interval is not None),
+                   default=None)
+
+    @property
+    def longest_poll_cycle(self) -> float | None:
+        """Return the longest time (s) there has ever been between two good reads of a job."""
+        return max((job.longest for job in self.jobs if job.longest is not None), default=None)
+
+    def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
+        """Put ``new`` jobs, due at once, in the place of ``old`` ones."""
+        self._due.replace(old, new, now)
+
+    def begin(self, now: float) -> None:
+        """Make all reads due at once: the port has been opened."""
+        waiting = self._due.jobs.difference(*self._aside.values())
+        for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
+            self._due.put(job, now)
+
+    def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
+        """
+        Return a probe if one may be sent, or else the next read that is due.
+
+        It is of a station that answers and is not ``busy``.
+        """
+        if self._aside:
+            self.is_due(now)  # sets reads aside of a station that has died in another way
+            if job := self._probe(now, busy):
+                return job
+        passed_over = []
+        while (job := self._due.take(now)) is not None:
+            if not self._stations.records[job.station].replies_in_time:
+                self._set_aside(job)
+            elif job.station in busy:
+                passed_over.append(job)
+            else:
+                job.is_probe = False
+                break
+        for other in passed_over:
+            self._due.put(other, other.due)
+        return job
+
+    def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
+        """Return the next read of a silent station, None while no probe may be sent."""
+        for number in list(self._aside):
+            if self._stations[number].replies_in_time:  # to a write, or to somebody else
+                self.release(number, now)
+        if now < self._next_probe():
+            return None
+        station = next((number for number in self._aside
+                        if number not in busy and not self._stations.is_polled(number)), None)
+        if station is None:
+            return None
+        jobs = self._aside.pop(station)
+        job = jobs.popleft()
+        job.due, job.is_probe = now, True
+        if jobs:
+            self._aside[station] = jobs  # to the end: the next probe goes to another station
+        return job
+
+    def is_due(self, now: float) -> bool:
+        """Tell whether a read of a station that answers is due."""
+        while (job := self._due.first(now)) is not None:
+            if self._stations[job.station].replies_in_time:
+                return True
+            self._due.take(now)
+            self._set_aside(job)
+        return False
+
+    def next_due(self) -> float | None:
+        """Return when the next read or probe is due (clock value in s), None for never."""
+        due = self._due.next_due()
+        if all(map(self._stations.is_polled, self._aside)):
+            return due
+        return self._next_probe() if due is None else min(due, self._next_probe())
+
+    def _next_probe(self) -> float:
+        return max(self._stations.probes.next, self._put_off)
+
+    def ended(self, job: ReadJob, now: float) -> None:
+        """Take a job back after a good or failed read, unless it has been replaced."""
+        if job not in self._due.jobs:
+            return
+        station = self._stations.records[job.station]
+        if not station.replies_in_time:
+            is_probe = job.is_probe or station.active  # or a reply that is late once more
+            self._stations.tried(job.station, job.asked, now, was_silent=is_probe)
+            self._put_off = now if self._due else now + job.block.period
+            self._set_aside(job)
+            return
+        if self._aside:
+            self.release(job.station, now)
+        if job.is_under_way or job.is_to_repeat:
+            self._due.put(job, job.due)
+        elif job.started < job.refreshed:  # it had begun before the write
+            self._due.put(job, now)
+        else:
+            self._due.put(job, max(job.due + job.block.period, job.started))
+
+    def refresh(self, write: Write, now: float) -> None:
+        """Make the reads of all words that ``write`` changed due at once."""
+        station = write.mapping.station
+        self._refresh(station, now, lambda job: job.extent.meets(write.mapping.extent))
+
+    def refresh_words(self, station: int, extents: Sequence[Extent], now: float) -> None:
+        """Make the reads of these words due at once; all of the station where there are none."""
+        self._refresh(station, now, lambda job: job.station == station and (
+            not extents or any(job.extent.meets(extent) for extent in extents)))
+
+    def _refresh(self, station: int, now: float, is_meant: Callable[[ReadJob], bool]) -> None:
+        self.release(station, now)
+        for job in filter(is_meant, self._due.jobs):
+            job.is_refresh, job.refreshed = True, now
+            if job.due > now:
+                self._due.put(job, now)
+
+    def release(self, station: int, now: float) -> None:
+        """Make the reads of a station that were set aside due at once."""
+        for job in self._aside.pop(station, ()):
+            self._due.put(job, now)
+
+    def _set_aside(self, job: ReadJob) -> None:
+        job.interrupted()
+        self._aside.setdefault(job.station, deque()).append(job)

@@ -1,0 +1,156 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One write: what is to be done with a message, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from abdf1_ros.df1.packet import is_local_status
+from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.steps import write_requests
+from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.settings.limits import raw_values
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.text import value_text
+
+_SHOWN_VALUES = 16
+_SHOWN_CHARACTERS = 100  # more than a PLC string has
+
+
+class Outcome(Enum):
+    """How a write ended."""
+
+    WRITTEN = 'written'
+    BROADCAST = 'sent to all stations; nobody confirms a broadcast'
+    SUPERSEDED = 'not written: superseded by a newer value'
+    REFUSED = 'not written: refused'
+    NOT_SENT = 'not written: not sent'
+    FAILED = 'not written: the PLC refused it'
+    PARTLY = 'only partly written'
+    UNKNOWN = 'unknown whether written'
+    FALLBACK = 'fallback value written'
+
+
+@dataclass(frozen=True, slots=True)
+class WriteResult:
+    """
+    The one result of one write to one mapping.
+
+    ``detail`` is empty for a write that went well; that of an unconfirmed one says what a read has
+    found afterwards, or why there was none. ``latency`` is seconds from the request. ``request``
+    is what the requester calls it. ``packets_done`` of its packets were confirmed before ``error``
+    ended it.
+    """
+
+    mapping: Mapping
+    outcome: Outcome
+    detail: str
+    value: str
+    latency: float
+    request: str = ''
+    packets_done: int = 0
+    error: LinkError | RemoteError | None = field(default=None, compare=False)
+
+    @property
+    def is_unconfirmed(self) -> bool:
+        """Tell whether the PLC may have executed a packet that it has not confirmed."""
+        if isinstance(self.error, RemoteError):
+            return is_local_status(self.error.sts)
+        return self.error is not None and self.error.sent
+
+    def __str__(self) -> str:
+        """Return outcome and detail."""
+        return f'{self.outcome.value}: {self.detail}' if self.detail else self.outcome.value
+
+
+class Write:
+    """
+    Values on their way to one mapping.
+
+    Raises FormatError, saying what is wrong, when they cannot or must not be written.
+    ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that write
+    it. ``is_probe`` tells that the station was inactive when the write got the line, ``is_own``
+    that no message has asked for it. ``request`` goes into the result.
+    """
+
+    def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
+                 request: str = '') -> None:
+        self.mapping = mapping
+        self.request = request
+        self.requested = now
+        self.is_probe = self.is_own = False
+        self.value = show(values)
+        self.raw = raw_values(mapping, values)
+        self.commands = write_requests(
+            mapping.address, mapping.codec, self.raw, mapping.dialect)
+
+    def speak(self, dialect: Dialect) -> None:
+        """Keep to the packets of another dialect of the family, before anything has been sent."""
+        if dialect is not self.mapping.dialect:
+            self.commands = write_requests(
+                self.mapping.address, self.mapping.codec, self.raw, dialect)
+
+    @property
+    def may_rewrite(self) -> bool:
+        """Tell whether bits may be changed by writing back their word after a refusal."""
+        processor = self.mapping.processor
+        return self.is_pulse and processor is not None and processor.may_lack_masked_write
+
+    def bit_change(self, packet: int) -> tuple[Address, int, int]:
+        """Return word, mask and bits of a packet that changes bits."""
+        assert not isinstance(self.raw, str)
+        return self.mapping.codec.bit_changes(self.mapping.address, self.raw)[packet]
+
+    @property
+    def is_pulse(self) -> bool:
+        """Tell whether each write counts by itself, not only the newest."""
+        return self.mapping.type is ValueType.BOOL
+
+    def overlaps(self, other: Write) -> bool:
+        """Tell whether both write to the same words, or to bits of them."""
+        return self.mapping.extent.meets(other.mapping.extent)
+
+    def is_held(self, words: bytes) -> bool:
+        """Tell whether the mapping's ``words`` hold the values of this write."""
+        codec = self.mapping.codec
+        if isinstance(self.raw, str) or self.is_pulse:
+            try:
+                held = codec.decode(words)
+            except FormatError:
+                return False
+            return held == self.raw if isinstance(held, str) else [*held] == [*self.raw]
+        return words == codec.encode(self.raw)
+
+    def result(self, outcome: Outcome, detail: str, now: float, packets_done: int = 0,
+               error: LinkError | RemoteError | None = None) -> WriteResult:
+        """Return how this write ended."""
+        return WriteResult(self.mapping, outcome, detail, self.value, now - self.requested,
+                           self.request, packets_done, error)
+
+
+def show(values: Sequence[float] | str) -> str:
+    """Return values as text for people, cut short when there are many."""
+    if isinstance(values, str):
+        rest = len(values) - _SHOWN_CHARACTERS
+        more = f' and {rest} more characters' if rest > 0 else ''
+        return repr(values[:_SHOWN_CHARACTERS]) + more
+    text = ', '.join(map(value_text, values[:_SHOWN_VALUES]))
+    rest = len(values) - _SHOWN_VALUES
+    return f'[{text}, and {rest} more]' if rest > 0 else f'[{text}]'

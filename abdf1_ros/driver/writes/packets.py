@@ -1,0 +1,97 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands that read, write and identify a PLC, and how they end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from abdf1_ros.df1.packet import BROADCAST, is_local_status
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.fields import word
+from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
+from abdf1_ros.pccc.steps import data_of
+
+REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
+             'lost')
+
+
+def carry_out(write: Write, clock: Callable[[], float], *,
+              goes_on: bool = False) -> Steps[WriteResult]:
+    """
+    Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
+
+    With ``goes_on`` also after one that was refused, or that the station has not replied to: it
+    may carry out the others.
+    """
+    done, detail, failed = 0, '', None
+    for packet in range(len(write.commands)):
+        try:
+            detail = (yield from _send(write, packet)) or detail
+            done += 1
+        except (RemoteError, LinkError) as error:
+            failed = failed or error
+            if not goes_on or not isinstance(error, (RemoteError, CommandTimeout)):
+                break
+    if failed is not None:
+        return _ended_early(write, _outcome_of(failed), clock(), done, failed)
+    is_broadcast = write.mapping.station == BROADCAST
+    outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
+    return write.result(outcome, detail, clock(), done)
+
+
+def _outcome_of(error: RemoteError | LinkError) -> Outcome:
+    if isinstance(error, RemoteError):
+        return Outcome.UNKNOWN if is_local_status(error.sts) else Outcome.FAILED
+    return Outcome.UNKNOWN if error.sent else Outcome.NOT_SENT
+
+
+def _send(write: Write, packet: int) -> Steps[str]:
+    """Send one packet; return a remark for the result, empty for none."""
+    try:
+        data_of((yield write.commands[packet]), write.mapping.address)
+    except RemoteError as error:
+        if error.sts != STS_ILLEGAL_COMMAND or not write.may_rewrite:
+            raise
+        yield from _rewrite(write, packet, error)
+        return REWRITTEN
+    return ''
+
+
+def _rewrite(write: Write, packet: int,
+             refusal: RemoteError) -> Steps[None]:
+    """Replace a refused masked write: read the word and write it back changed."""
+    dialect = write.mapping.dialect
+    address, mask, bits = write.bit_change(packet)
+    try:
+        reply = check_status((yield dialect.read(address, 1)))
+        old = int.from_bytes(dialect.read_data(address, 1, reply), 'little')
+    except LinkError as error:
+        error.sent = False  # the refused command and a read have changed nothing
+        raise
+    except (RemoteError, FormatError) as error:
+        raise RemoteError(refusal.sts, refusal.ext_sts, f'{refusal}; its word cannot be read to '
+                          f'be written back: {error}') from None
+    check_status((yield dialect.write(address, word(old & ~mask | bits & mask))))
+
+
+def _ended_early(write: Write, outcome: Outcome, now: float, done: int,
+                 error: LinkError | RemoteError) -> WriteResult:
+    if not done:
+        return write.result(outcome, str(error), now, done, error)
+    detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
+    return write.result(Outcome.PARTLY, detail, now, done, error)

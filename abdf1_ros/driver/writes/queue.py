@@ -1,0 +1,195 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The writes that wait for the line.
+
+For words only the newest value waits; for bits all of them wait in their order. The writes of a
+station keep their order, and two writes of the same words are never under way together.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Container
+import itertools
+import math
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
+from abdf1_ros.messages import Message
+from abdf1_ros.settings.mapping import Mapping
+
+MAX_WAITING_WRITES = 1000
+
+
+def waited_too_long(seconds: float) -> str:
+    """Return the reason of a write that has waited for more than ``seconds``."""
+    return f'waited longer than {seconds:g} s for the line'
+
+
+class MessageJob(WriteJob):
+    """A write that a message has asked for."""
+
+    def __init__(self, write: Write, writing: WritesUnderWay, queue: WriteQueue,
+                 slack: float) -> None:
+        super().__init__(write, writing)
+        patience = queue.patience_of(write.mapping) + slack
+        self.expires = write.requested + patience
+        # With a fallback all packets of a long write have to leave before it is due.
+        self.patience = 0.0 if write.mapping.fallback else patience
+        self._queue = queue
+
+    def ended(self, error: Exception | None) -> None:
+        """Report the result."""
+        self._queue.ended(self)
+
+
+class WriteQueue:
+    """
+    Keep writes until they have the line, for ``patience`` seconds at most.
+
+    They are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
+    transmission. A write to a silent station is a probe; one that ``stations.probes`` does not
+    admit ends unsent. ``message_ended`` is called for each that had the line, ``message_expired``
+    for each that was too old before. Another thread may only ask for the length. ``next_expiry``
+    is when ``expire`` has something to do (clock value in s).
+    """
+
+    def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
+                 report: Callable[[WriteResult], None], tx_delay: float = 0.0) -> None:
+        self.message_ended: Callable[[Write, Outcome], None] = lambda write, outcome: None
+        self.message_expired: Callable[[Write], None] = lambda write: None
+        self._stations = stations
+        self._writing = writing
+        self._patience = patience
+        self._report = report
+        # It does not count as waiting: it comes before a probe, and before the command.
+        self._slack = 2 * tx_delay
+        self.waiting: deque[Write] = deque()
+        self.next_expiry = math.inf
+
+    def __len__(self) -> int:
+        """Return how many wait."""
+        return len(self.waiting)
+
+    def add(self, write: Write, now: float) -> None:
+        """
+        Let a write wait; it takes the place of an older value of its mapping.
+
+        If it went to the end instead, a topic that is published again and again would never have
+        its turn. But it must not overtake a later write of another mapping to the same words. In
+        that case the older value is sent as well, or two such topics would delay each other for
+        ever.
+        """
+        self.next_expiry = min(self.next_expiry, self._expiry(write))
+        older = [] if write.is_pulse else [
+            old for old in self.waiting if old.mapping is write.mapping]
+        if not older:
+            self.waiting.append(write)
+            return
+        at = self.waiting.index(older[-1])
+        is_overlapped = any(
+            map(write.overlaps, itertools.islice(self.waiting, at + 1, None)))
+        if len(older) > 1 or not is_overlapped:
+            self.waiting.remove(older[-1])
+            self._report(older[-1].result(Outcome.SUPERSEDED, '', now))
+        self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
+
+    def next(self, now: float, busy: Container[int] = ()) -> MessageJob | None:  # noqa: A003
+        """
+        Return the next write.
+
+        Writes to stations in ``busy`` keep waiting, and so do writes of words that are being
+        written: the packets of two writes must not mix.
+        """
+        self.expire(now)
+        write = self._first_free(busy)
+        if write is None:
+            return None
+        self.waiting.remove(write)
+        self._writing.begin(write)
+        return MessageJob(write, self._writing, self, self._slack)
+
+    def ended(self, job: MessageJob) -> None:
+        """Take note that a write that had the line has ended."""
+        self._writing.report(job, self._report)
+        self._writing.ended(job)
+        if job.result is not None:
+            self.message_ended(job.write, job.result.outcome)
+
+    def _first_free(self, busy: Container[int]) -> Write | None:
+        """Return the first write that does not have to wait."""
+        held_up: set[int] = set()
+        for write in self.waiting:
+            station = write.mapping.station
+            if station in busy or station in held_up:
+                continue
+            if not self._writing.is_held_up(write.mapping):
+                return write
+            held_up.add(station)
+        return None
+
+    def youngest(self) -> dict[int, float]:
+        """
+        Return when the youngest message of each row with Fallback was published.
+
+        By the ``id`` of the mapping, of messages that wait or are under way.
+        """
+        found: dict[int, float] = {}
+        for write in itertools.chain(self.waiting, self._writing.under_way):
+            if write.mapping.fallback is not None and not write.is_own:
+                key = id(write.mapping)
+                found[key] = max(write.requested, found.get(key, -math.inf))
+        return found
+
+    def expire(self, now: float) -> None:
+        """End the writes that are not to be sent any more."""
+        self.next_expiry = math.inf
+        for write in list(self.waiting):
+            reason = self._reject_reason(write, now)
+            if reason:
+                self.waiting.remove(write)
+                self._report(write.result(Outcome.NOT_SENT, reason, now))
+                self.message_expired(write)
+            else:
+                self.next_expiry = min(self.next_expiry, self._expiry(write))
+
+    def patience_of(self, mapping: Mapping) -> float:
+        """Return how long (s) a message may wait: less where a fallback is due before (rule 7)."""
+        after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
+        return min(self._patience, after)
+
+    def drop(self, reason: str, now: float, mapping: Mapping | None = None) -> None:
+        """End the waiting writes, of one mapping or all, without sending them."""
+        dropped = [write for write in self.waiting if mapping in (None, write.mapping)]
+        for write in dropped:
+            self.waiting.remove(write)
+            self._report(write.result(Outcome.NOT_SENT, reason, now))
+
+    def _expiry(self, write: Write) -> float:
+        """Return the clock value (s) from which a write is too old."""
+        return write.requested + self.patience_of(write.mapping)
+
+    def _reject_reason(self, write: Write, now: float) -> str:
+        """Return why a write is not to be sent any more, empty if it is."""
+        if now >= self._expiry(write):
+            return waited_too_long(self.patience_of(write.mapping))
+        station = write.mapping.station
+        if self._stations.admits_message(station, now):
+            return ''
+        is_late = self._stations[station].active
+        return (Message.ERR_COMMAND_TIMEOUT.entry() if is_late
+                else Message.ERR_INACTIVE_STATION.entry(station))

@@ -1,0 +1,97 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What has become of the writes of a node."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from abdf1_ros.driver.interlocks.fallback import FallbackCause
+from abdf1_ros.driver.write import Outcome, WriteResult
+from abdf1_ros.ros.diagnostics.status import Judgement, OK, WARN, with_age
+
+# How long a failed write keeps its status at WARN, in seconds.
+_WRITE_MEMORY = 10.0
+
+_FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
+
+
+def is_usual_fallback(result: WriteResult) -> bool:
+    """Tell whether a fallback value was written for a start or an end, as always."""
+    return result.outcome is Outcome.FALLBACK and \
+        result.detail in (FallbackCause.START.value, FallbackCause.END.value)
+
+
+class WriteLog:
+    """
+    Counts of writes by how they ended.
+
+    Refusals and lost messages are counted in the thread of the requests, all others in that of
+    the link, so no count has two writers.
+    """
+
+    def __init__(self) -> None:
+        self._counts: Counter[Outcome] = Counter()
+        self._lost = 0
+        self._last_loss: tuple[str, float] | None = None
+        self._last_failure: tuple[WriteResult, float] | None = None
+
+    def add(self, result: WriteResult, now: float) -> None:
+        """Count a result."""
+        self._counts[result.outcome] += 1
+        is_good = result.outcome in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED)
+        if not is_good and not is_usual_fallback(result):
+            self._last_failure = result, now
+
+    def lost(self, topic: str, count: int, now: float) -> None:
+        """Count messages that never came."""
+        self._lost += count
+        self._last_loss = f'{count} to ~/write/{topic}', now
+
+    def _messages(self) -> int:
+        """Return the number of results of messages; fallback values do not count."""
+        return self._counts.total() - self._counts[Outcome.FALLBACK]
+
+    def judge(self, now: float) -> Judgement:
+        """Return WARN for a while after a write that was not confirmed, or a lost message."""
+        total = self._messages()
+        summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
+        if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
+            result = self._last_failure[0]
+            return WARN, f'{summary}; {result.mapping.tag} {result}'
+        if self._last_loss and now - self._last_loss[1] < _WRITE_MEMORY:
+            return WARN, f'{summary}; {self._lost} messages were lost on their way here'
+        return OK, summary
+
+    def values(self, now: float) -> dict[str, str]:
+        """Return the counts and the last failure."""
+        counts = self._counts
+        failed = sum(counts[outcome] for outcome in _FAILURES)
+        last = None
+        if self._last_failure is not None:
+            result, when = self._last_failure
+            last = f'{result.mapping.tag} {result}', when
+        return {
+            'accepted': str(self._messages() - counts[Outcome.REFUSED]),
+            'confirmed': str(counts[Outcome.WRITTEN]),
+            'failed': str(failed),
+            'unknown': str(counts[Outcome.UNKNOWN]),
+            'superseded': str(counts[Outcome.SUPERSEDED]),
+            'refused': str(counts[Outcome.REFUSED]),
+            'fallback values': str(counts[Outcome.FALLBACK]),
+            'lost on their way': str(self._lost),
+            'last loss': with_age(self._last_loss, now),
+            'last failure': with_age(last, now),
+        }

@@ -1,0 +1,385 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node's parameters: one table, their declaration, and the configuration made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, fields, replace
+import difflib
+import os
+from pathlib import Path
+import random
+from typing import Any
+
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.paths import config_file
+from abdf1_ros.plan.usable_rows import usable_rows
+from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.ros.files import FileWatch
+from abdf1_ros.ros.parameters.store import forget, overrides, show
+from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.map_row import MAX_PERIOD
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
+from abdf1_ros.settings.station_lists import parse_stations
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+)
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+
+
+def _parameter(default: bool | float | str, description: str, low: float | None = None,
+               high: float | None = None) -> Any:
+    return field(default=default,
+                 metadata={'description': description, 'low': low, 'high': high})
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """The node's own parameters; those of the link (``net.*``) are the fields of Network."""
+
+    net_file: str = _parameter('', 'path of the net CSV, needed')
+    map_file: str = _parameter('', 'path of the map CSV, needed')
+    port: str = _parameter(
+        '', f'device path, {URLS} to use instead of Com_Port')
+    low_latency: bool = _parameter(
+        True, 'ask the driver of the port to hand on bytes at once, where it can')
+    rs485: bool = _parameter(
+        False, 'let the kernel switch an RS-485 transmitter with RTS, where it can')
+    strict_map: bool = _parameter(False, 'a bad row in the map ends the process')
+    read_only: bool = _parameter(False, 'refuse every write')
+    default_period: int = _parameter(
+        100, 'ms between reads of a mapping without Period; 0: as often as the line allows',
+        0, MAX_PERIOD)
+    diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
+    snapshot_period: float = _parameter(
+        1.0, 's between snapshots of all values, while somebody subscribes; 0: never', 0.0, 3600.0)
+    stale_after: float = _parameter(
+        3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
+    processor_period: float = _parameter(
+        10.0, 's between questions for type, mode and faults of each processor; 0: never',
+        0.0, 3600.0)
+    write_timeout: float = _parameter(
+        2.0, 's that a write may wait for the line', 0.05, 60.0)
+    nak_on_command_timeout: bool = _parameter(
+        True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
+    max_outstanding: int = _parameter(
+        1, 'commands that may wait for their reply at a time, Mode Peer only', 1, 16)
+    accept_slave_messages: bool = _parameter(
+        True, 'serve or pass on what slaves send by themselves; false: acknowledge and drop it')
+    poll_list: str = _parameter(
+        '', 'stations to poll with Polling Standard, as in 1,3-5; empty: all mapped ones')
+    priority_poll_list: str = _parameter('', 'stations to poll first in every scan')
+    poll_group_size: int = _parameter(
+        0, 'stations of poll_list polled in each scan; 0: all', 0, 255)
+    poll_multiple: bool = _parameter(
+        False, 'poll a station until it has nothing more; false: one message a scan')
+    send_in_sequence: bool = _parameter(
+        False, 'send commands when our own station comes up in the list; false: between polls')
+    eot_suppression: bool = _parameter(
+        False, 'Mode Slave: stay silent instead of answering EOT')
+    duplicate_detection: bool = _parameter(
+        True, 'Mode Slave and Peer: execute a repeated command only once')
+    poll_timeout: float = _parameter(
+        60.0, 'Mode Slave: s without a poll after which own commands fail; 0: never', 0.0,
+        3600.0)
+    expose_map_parameters: bool = _parameter(
+        True, 'show every mapping as read-only parameters map.<tag>.<column>')
+    trace_file: str = _parameter(
+        '', 'path of a capture of all that passes the port, for sniff; empty: none')
+    trace_limit: float = _parameter(
+        10.0, 'MB that the capture takes on the disk at most', 0.01, 10_000.0)
+
+
+Cell = tuple[str, str, str]
+"""Of the map: name of its parameter, value, description of its column."""
+
+_KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
+
+
+_STATION_LISTS = 'poll_list', 'priority_poll_list'
+
+# Shown as resolved paths, because a relative one does not tell which file it is.
+_PATHS = ('net_file', 'map_file')
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """
+    All that the node needs to know.
+
+    ``map_problems`` are those of rows left out, ``ignored`` are names of overrides without effect.
+    """
+
+    parameters: Parameters
+    network: Network
+    port: str
+    mappings: list[Mapping]
+    map_problems: list[Problem]
+    polling: PollingSettings | None = None
+    ignored: list[str] = field(default_factory=list)
+    files: FileWatch = field(default_factory=FileWatch)
+
+    def driver_settings(self) -> DriverSettings:
+        """Return parameters of the same names, and what follows from others."""
+        own = {entry.name for entry in fields(Parameters)}
+        same = {entry.name: getattr(self.parameters, entry.name)
+                for entry in fields(DriverSettings) if entry.name in own}
+        return replace(
+            DriverSettings(**same), default_period=self.parameters.default_period / 1000,
+            polling=self.polling, first_tns=random.randrange(0x10000))
+
+    def __str__(self) -> str:
+        """Return one line that tells what the node runs with."""
+        network, parameters = self.network, self.parameters
+        read = sum(mapping.reads for mapping in self.mappings)
+        written = len({mapping.topic for mapping in self.mappings if mapping.writes})
+        return (f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}: '
+                f'port {self.port}, Mode {network.mode}, {network.baud} baud, '
+                f'{network.error_code}; {len(self.mappings)} rows, topics: {read} to read, '
+                f'{written} to write')
+
+
+def configure(node: Node) -> Configuration:
+    """
+    Declare all parameters and read both files.
+
+    Raises ConfigurationError with every fault that keeps the node from running.
+    """
+    known = [entry.name for entry in fields(Parameters)]
+    known += [entry.parameter for entry in FIELDS.values()]
+    problems = unknown_overrides(node, known, 'net.')
+    parameters = _declare_own(node, problems)
+    configuration = _from_files(
+        node, parameters, problems, _declare_network, is_strict=parameters.strict_map)
+    _declare_map(node, configuration)
+    return configuration
+
+
+def read_again(node: Node, parameters: Parameters) -> Configuration:
+    """
+    Read both files again; ``declare_again`` shows what comes from them.
+
+    Raises ConfigurationError with every fault, also of single rows: a running node is not stopped
+    for a mistake in a file.
+    """
+    return _from_files(node, parameters, [], _overridden_network, is_strict=True)
+
+
+def declare_again(node: Node, configuration: Configuration) -> None:
+    """Declare anew what comes from the files."""
+    forget(node, 'net.')
+    _declare_network(node, configuration.network)
+    forget(node, 'map.')
+    _declare_map(node, configuration)
+
+
+def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
+                overridden: Callable[[Node, Network], Network], *, is_strict: bool,
+                ) -> Configuration:
+    network = Network()
+    mappings: list[Mapping] = []
+    map_problems: list[Problem] = []
+    files = FileWatch((parameters.net_file, parameters.map_file))
+    try:
+        network = overridden(
+            node, load_network(_needed('net_file', parameters.net_file, problems)))
+    except ConfigurationError as error:
+        problems += error.problems
+    try:
+        map_file = _needed('map_file', parameters.map_file, problems)
+        mappings, map_problems = load_mappings(map_file)
+        mappings, unusable = usable_rows(
+            mappings, network, parameters.default_period / 1000)
+        map_problems += unusable
+    except ConfigurationError as error:
+        problems += error.problems
+    if is_strict:
+        problems += map_problems
+    polling = _polling(parameters, mappings, problems)
+    port = network.port
+    if parameters.port:
+        try:
+            other = make_network({'com_port': (parameters.port, 'parameter port')}, network)
+            port, network = other.port, replace(network, remarks=other.remarks)
+        except ConfigurationError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigurationError(problems)
+    return Configuration(parameters, network, port, mappings, map_problems, polling,
+                         _ignored_overrides(node, mappings), files)
+
+
+def _overridden_network(node: Node, network: Network) -> Network:
+    """Return the network with what overrides it; nothing is declared."""
+    given = overrides(node)
+    return _overriding({name: given[entry.parameter].value for name, entry in FIELDS.items()
+                        if entry.parameter in given}, network)
+
+
+def _overriding(values: dict[str, Any], network: Network) -> Network:
+    """Return the network with ``values`` by the names of its fields."""
+    return make_network({  # as text: 5.0 equals 5, but is not a station
+        name: (_text(value), f'parameter {FIELDS[name].parameter}')
+        for name, value in values.items() if _text(value) != str(getattr(network, name))}, network)
+
+
+def _needed(name: str, path: str, problems: list[Problem]) -> str:
+    """Return the path of a file; raises ConfigurationError that tells how to start."""
+    if path:
+        return path
+    if any(problem.place.file == f'parameter {name}' for problem in problems):
+        raise ConfigurationError([])  # it is given, but not as a text
+    raise ConfigurationError([Problem(
+        f'parameter {name}', f'which file? Start with --ros-args -p net_file:=net.csv -p '
+        f'map_file:=map.csv; examples are in {config_file("net.csv").parent}, and "ros2 launch '
+        'abdf1_ros demo.launch.py" runs them with a simulated line')])
+
+
+def _resolved(path: str) -> str:
+    return str(Path(path).resolve()) if path else ''
+
+
+def unknown_overrides(node: Node, known: Collection[str], begins: str = ' ') -> list[Problem]:
+    """
+    Return the parameters of ours that a user has given and that do not exist.
+
+    rclpy drops them silently. Others may belong to other nodes of a shared parameter file, so
+    only those are found whose names look like ours, or begin so. ``map.*`` may come back from a
+    dump of our parameters, see ``_ignored_overrides``.
+    """
+    problems = []
+    for name in overrides(node):
+        close = difflib.get_close_matches(name, known, 1, 0.75)
+        if name not in known and (close or name.startswith(begins)):
+            hint = f'did you mean {close[0]}?' if close else f'{begins}* are its columns'
+            problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
+    return problems
+
+
+def _ignored_overrides(node: Node, mappings: list[Mapping]) -> list[str]:
+    """Return the names of overrides ``map.*`` that say something else than the map."""
+    given = {name: _text(parameter.value) for name, parameter in overrides(node).items()
+             if name.startswith('map.')}
+    repeated = {name for name, value, _ in _map_cells(mappings) if given.get(name) == value} \
+        if given else set()
+    return sorted(given.keys() - repeated)
+
+
+def _polling(parameters: Parameters, mappings: list[Mapping],
+             problems: list[Problem]) -> PollingSettings:
+    """Return how a master with standard polling polls."""
+    priority = _stations('priority_poll_list', parameters.priority_poll_list, problems)
+    normal = _stations('poll_list', parameters.poll_list, problems)
+    if not parameters.poll_list:
+        mapped = {mapping.station for mapping in mappings if not mapping.serves}
+        normal = tuple(sorted(mapped - {BROADCAST, *priority}))
+    return PollingSettings(normal, priority, parameters.poll_group_size,
+                           parameters.poll_multiple, parameters.send_in_sequence)
+
+
+def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
+    """Return the stations of a list such as "1,3-5", in its order."""
+    stations, faults = parse_stations(text)
+    problems += [Problem(f'parameter {name}', fault) for fault in faults]
+    return stations
+
+
+def _declare(node: Node, name: str, default: Any, description: str, low: float | None = None,
+             high: float | None = None) -> Any:
+    """
+    Declare a parameter and return its value, whatever the user has given.
+
+    rclpy shows types and ranges to the user, but we check them, with better messages. A path is
+    shown resolved and returned as it was given.
+    """
+    given = overrides(node).get(name)
+    if name in _PATHS and given is not None and isinstance(given.value, str):
+        descriptor = ParameterDescriptor(description=description, read_only=True)
+        path = os.path.expanduser(given.value)  # in net_file:=~/net.csv the shell leaves it
+        node.declare_parameter(name, _resolved(path), descriptor, ignore_override=True)
+        return path
+    descriptor = ParameterDescriptor(
+        description=description, read_only=True, dynamic_typing=True)
+    if low is not None and high is not None:
+        if isinstance(default, int):
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(low), to_value=float(high))]
+    try:
+        return node.declare_parameter(name, default, descriptor).value
+    except ParameterException:
+        descriptor.integer_range, descriptor.floating_point_range = [], []
+        return node.declare_parameter(name, default, descriptor).value
+
+
+def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
+    values: dict[str, Any] = {}
+    for entry in fields(Parameters):
+        low, high = entry.metadata['low'], entry.metadata['high']
+        value = _declare(
+            node, entry.name, entry.default, entry.metadata['description'], low, high)
+        kind = type(entry.default)
+        if kind is float and type(value) is int:
+            value = float(value)
+        if kind is str and isinstance(value, int | float):
+            value = str(value)
+        if entry.name in _STATION_LISTS and isinstance(value, list):  # of YAML: [1, 2]
+            value = ','.join(map(str, value))
+        if type(value) is not kind or (low is not None and not low <= value <= high):
+            right = _KINDS[kind]
+            if low is not None:
+                right += f' from {low:.15g} to {high:.15g}'
+            problems.append(Problem(
+                f'parameter {entry.name}', f'{entry.name} = {value!r} should be {right}'))
+            value = entry.default
+        values[entry.name] = value
+    return Parameters(**values)
+
+
+def _declare_network(node: Node, network: Network) -> Network:
+    """Declare net.*, defaults from the file; return the network with what overrides it."""
+    values = {}
+    for name, entry in FIELDS.items():
+        choices = f' ({", ".join(map(str, entry.choices))})' if entry.choices else ''
+        values[name] = _declare(node, entry.parameter, getattr(network, name),
+                                entry.description + choices, entry.low, entry.high)
+    return _overriding(values, network)
+
+
+def _text(value: Any) -> str:
+    """Return a value as a CSV would hold it; YAML makes a bool of Yes and No."""
+    if isinstance(value, bool):
+        return 'Yes' if value else 'No'
+    return str(value)
+
+
+def _map_cells(mappings: list[Mapping]) -> list[Cell]:
+    return [(f'map.{mapping.name.replace("/", ".")}.{column.name.lower()}',
+             mapping.cell(column.name), column.description)
+            for mapping in mappings for column in MAP_COLUMNS]
+
+
+def _declare_map(node: Node, configuration: Configuration) -> None:
+    if configuration.parameters.expose_map_parameters:
+        show(node, _map_cells(configuration.mappings))

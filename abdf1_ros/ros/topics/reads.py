@@ -1,0 +1,131 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The read topics of one map: a publisher each, kept where the next map has the same row."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.ros.topics.messages import encoder, MESSAGES, read_qos
+from abdf1_ros.settings.mapping import Mapping, Publish
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+
+# So many values of a reply are published while its ACK is on the line (two characters), the
+# others while the next command is sent: publishing a hundred would delay the line by 3 ms.
+_VALUES_AT_ONCE = 4
+
+# A publisher is kept while the new time is at most so many times the one that it has promised: a
+# deadline that is a little short gives no false alarm.
+_MARGIN = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class ReadTopic:
+    """
+    A publisher, and what it was made for.
+
+    ``promise`` is the time (s) after which values count as stopped, infinite where there is none.
+    """
+
+    publisher: Any
+    encode: Callable[[Values], Any]
+    shape: tuple[object, ...]
+    promise: float
+
+    def is_fit_for(self, shape: tuple[object, ...], promise: float) -> bool:
+        """Tell whether subscribers of a row notice no difference."""
+        return shape == self.shape and promise <= _MARGIN * self.promise and \
+            math.isinf(promise) is math.isinf(self.promise)
+
+
+class ReadTopics:
+    """
+    Publish values in the link thread; made and ended in the thread of the executor.
+
+    ``open`` has to come before the driver runs; what is ``published`` before is used again where
+    it fits. ``take_over`` comes when the driver of before does not run any more. ``latest`` are
+    the last values by topic.
+    """
+
+    def __init__(self, node: Node, published: dict[str, ReadTopic]) -> None:
+        self._node = node
+        self._published = published
+        self._at_once = _VALUES_AT_ONCE
+        self._later: deque[tuple[Any, Any]] = deque()
+        self.latest: dict[str, Values] = {}
+        self._topics: dict[str, ReadTopic] = {}
+        self._to_come: list[tuple[Mapping, ReadPoint]] = []
+
+    def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
+        """Have a publisher for each mapping that is read."""
+        for mapping, point in points.items():
+            earlier = self._published.get(mapping.topic)
+            # DDS has one type for a topic, so a publisher of another one has to end first.
+            if earlier is not None and earlier.shape[0] is not mapping.message_type:
+                self._to_come.append((mapping, point))
+            else:
+                self._topics[mapping.topic] = self._topic(mapping, point, earlier)
+
+    def take_over(self) -> None:
+        """Close the publishers that are not used any more, and make those that wait for it."""
+        kept = {id(topic) for topic in self._topics.values()}
+        for topic in self._published.values():
+            if id(topic) not in kept:
+                self._node.destroy_publisher(topic.publisher)
+        for mapping, point in self._to_come:
+            topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
+            if mapping.topic in self.latest:  # it may come twice
+                topic.publisher.publish(topic.encode(self.latest[mapping.topic]))
+        self._published.clear()
+        self._published.update(self._topics)
+
+    def _topic(self, mapping: Mapping, point: ReadPoint, old: ReadTopic | None) -> ReadTopic:
+        shape = mapping.message_type, str(mapping.address), mapping.length
+        promise = point.stale_time if mapping.publish is Publish.ALWAYS else math.inf
+        if old is not None and old.is_fit_for(shape, promise):
+            return old
+        # The default callbacks would cost time for every publisher at every turn of the executor.
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        publisher = self._node.create_publisher(
+            MESSAGES[mapping.message_type], f'~/read/{mapping.topic}',
+            read_qos(mapping, point.stale_time), event_callbacks=quiet)
+        return ReadTopic(publisher, encoder(mapping), shape, promise)
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Publish the values of a good read, at once or as soon as the line is busy again."""
+        self.latest[mapping.topic] = values
+        topic = self._topics.get(mapping.topic)
+        if topic is None:
+            return  # ``take_over`` publishes it
+        if self._at_once:
+            self._at_once -= 1
+            topic.publisher.publish(topic.encode(values))
+        else:
+            self._later.append((topic.publisher, topic.encode(values)))
+
+    def publish_later_values(self) -> None:
+        """Publish the values that were put off; the line is busy now."""
+        self._at_once = _VALUES_AT_ONCE
+        while self._later:
+            publisher, values = self._later.popleft()
+            publisher.publish(values)

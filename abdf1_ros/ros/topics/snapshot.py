@@ -1,0 +1,118 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The topic ~/snapshot: all values of a map in one message, with address, age and description."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from collections.abc import Mapping as MappingType
+from datetime import datetime, UTC
+import time
+
+from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.write import show
+from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.ros.diagnostics.status import WORDS
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.text import printable, value_text
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+# Longer arrays are one text, and cut short.
+_MOST_KEYS = 32
+
+_LEVELS = {
+    Freshness.FRESH: DiagnosticStatus.OK, Freshness.LATE: DiagnosticStatus.OK,
+    Freshness.WAITING: DiagnosticStatus.STALE, Freshness.STALE: DiagnosticStatus.STALE,
+    Freshness.FAILED: DiagnosticStatus.ERROR, Freshness.WITHHELD: DiagnosticStatus.ERROR}
+
+
+class Snapshot:
+    """
+    The last values of ``points``, which ``latest`` holds by topic, as one message.
+
+    Texts that do not change are made once: five thousand rows are many.
+    """
+
+    def __init__(self, points: MappingType[Mapping, ReadPoint],
+                 latest: MappingType[str, Values]) -> None:
+        names = {(mapping.station, str(mapping.address)): mapping.tag
+                 for mapping in points if mapping.length == 1}
+        self._rows = [_ValueRow(mapping, point, names) for mapping, point in points.items()]
+        self._latest = latest
+
+    def message(self, now: float) -> DiagnosticArray:
+        """Return the values at the clock value ``now`` (s); its stamp is for the caller."""
+        begun = time.time() - now
+        return DiagnosticArray(status=[
+            row.status(self._latest.get(row.topic), now, begun) for row in self._rows])
+
+
+class _ValueRow:
+    """A row of the snapshot; ``names`` are tags of single values by station and address."""
+
+    def __init__(self, mapping: Mapping, point: ReadPoint,
+                 names: MappingType[tuple[int, str], str]) -> None:
+        self.topic = mapping.topic
+        self._point = point
+        self._tag = printable(mapping.tag)
+        self._place = f'station {mapping.station} {mapping.address}'
+        self._keys = _keys(mapping, names)
+        self._facts = [KeyValue(key=key, value=printable(value)) for key, value in (
+            ('address', str(mapping.address)), ('type', mapping.type.value),
+            ('topic', mapping.topic), ('description', mapping.description))]
+
+    def status(self, values: Values | None, now: float, begun: float) -> DiagnosticStatus:
+        """Return its status; the clock of ``now`` began at the time ``begun`` (s since 1970)."""
+        point = self._point
+        freshness = point.freshness(now)
+        level, read = _LEVELS[freshness], point.last_good
+        why = point.error or point.withheld if level == DiagnosticStatus.ERROR else ''
+        texts = [why] if why else []
+        pairs: list[tuple[str, str]] = []
+        if values is None or read is None:
+            texts = texts or [freshness.value]
+        else:
+            texts.append(f'{_text(values)}, {now - read:.1f} s ago')
+            pairs = [*self._values(values), ('stamp', _moment(begun + read)),
+                     ('age_ms', f'{(now - read) * 1000:.0f}')]
+        return DiagnosticStatus(
+            level=level, name=self._tag, hardware_id=self._place,
+            message=f'{WORDS[level]}: {printable("; ".join(texts))}',
+            values=[*(KeyValue(key=key, value=value) for key, value in pairs), *self._facts])
+
+    def _values(self, values: Values) -> Iterable[tuple[str, str]]:
+        if isinstance(values, str) or len(values) != len(self._keys):
+            return [('value', _text(values))]
+        return zip(self._keys, map(value_text, values), strict=True)
+
+
+def _text(values: Values) -> str:
+    if isinstance(values, str):
+        return printable(values)
+    return value_text(values[0]) if len(values) == 1 else show(values)
+
+
+def _moment(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')
+
+
+def _keys(mapping: Mapping, names: MappingType[tuple[int, str], str]) -> Sequence[str]:
+    """Return a key for each value; none for what is shown as one text."""
+    if mapping.type is ValueType.STRING or mapping.length > _MOST_KEYS:
+        return ()
+    if mapping.length == 1:
+        return ('value',)
+    places = map(str, map(mapping.place_of, range(mapping.length)))
+    return [f'value {names.get((mapping.station, place), place)}' for place in places]

@@ -1,0 +1,181 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Write topics: from a message to the driver, and what DDS has dropped before it came to us.
+
+Messages are numbered by their publisher (Fast DDS does it, others may not). Where a number is
+missing, a message was dropped: the executor was slower than the publisher, and the history of
+either end was full. There is no other sign: Fast DDS 2.14 has no message-lost event for it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from functools import partial
+import time
+from typing import Any
+
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.errors import FormatError
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.text import printable
+from rclpy.node import Node
+from std_msgs.msg import String
+
+_LONGEST_LABEL = 100
+
+# Publishers of one topic whose numbers are followed at a time.
+_MOST_PUBLISHERS = 16
+
+
+class LossCounter:
+    """
+    Tell how many messages of a topic never came.
+
+    rclpy does not tell the publisher of a number. A number that follows the last one of a known
+    publisher belongs to that publisher. Otherwise it belongs to a new one, as long as
+    ``count_publishers`` gives more than are known. Otherwise messages before it were lost.
+    """
+
+    def __init__(self, count_publishers: Callable[[], int]) -> None:
+        self._count_publishers = count_publishers
+        self._latest: list[int] = []  # number of the latest message of each publisher
+
+    def lost_before(self, number: int | None) -> int:
+        """Take the number of a message, None where it has none; return the number of lost ones."""
+        if number is None:
+            return 0
+        latest = self._latest
+        if number - 1 in latest:
+            latest[latest.index(number - 1)] = number
+            return 0
+        earlier = [other for other in latest if other < number]
+        if not earlier or len(latest) < self._count_publishers():
+            if len(latest) == _MOST_PUBLISHERS:
+                del latest[0]
+            latest.append(number)
+            return 0
+        nearest = max(earlier)
+        latest[latest.index(nearest)] = number
+        return number - nearest - 1
+
+
+def _request(message: Any, info: Any) -> str:
+    """
+    Return the name of a message for its result, different from all others of its topic.
+
+    That is the label which its publisher has put into the layout, or else the time when it was
+    published (ns): rclpy does not tell the publisher.
+    """
+    if not isinstance(message, String) and message.layout.dim and message.layout.dim[0].label:
+        return printable(message.layout.dim[0].label[:_LONGEST_LABEL])
+    return str(info['source_timestamp'] or '')
+
+
+class WriteTopic:
+    """
+    The mappings that one topic writes to; ``take`` is the callback of its subscription.
+
+    ``on_loss`` is called with the topic and the number of messages that were dropped on their
+    way to us, ``wake`` when the link has something to do. What waited longer than ``patience`` s
+    is refused.
+    """
+
+    def __init__(self, topic: str, mappings: Sequence[Mapping], driver: Driver, patience: float,
+                 *, losses: LossCounter, on_loss: Callable[[str, int], None],
+                 wake: Callable[[], None]) -> None:
+        self._topic = topic
+        self._mappings = mappings
+        self._driver = driver
+        self._patience = patience
+        self._losses = losses
+        self._on_loss = on_loss
+        self._wake = wake
+
+    def take(self, message: Any, info: Any) -> None:
+        """Write a message to every mapping of the topic."""
+        if lost := self._losses.lost_before(info['publication_sequence_number']):
+            self._on_loss(self._topic, lost)
+        # It may have waited while this process was paused or the network was down.
+        now = time.time_ns()
+        stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
+        waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
+        requested = line_time() - waited
+        request = _request(message, info)
+        try:
+            self._check_age(waited)
+            values = values_of(message)
+        except FormatError as error:
+            self._driver.refuse(self._mappings, str(error), message.data, request)
+        else:
+            self._driver.write(self._mappings, values, requested, request)
+            self._wake()
+
+    def _check_age(self, age: float) -> None:
+        if age > self._patience:
+            raise FormatError(
+                f'it came {age:.1f} s after it was published, write_timeout is '
+                f'{self._patience:g} s; or the clocks of the two hosts differ')
+
+
+class WriteTopics:
+    """
+    The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
+
+    ``take`` is called with the topic and what came; ``taken`` counts that.
+    """
+
+    def __init__(self, node: Node, take: Callable[[str, Any, Any], None]) -> None:
+        self._node = node
+        self._take = take
+        self._subscriptions: dict[str, tuple[Any, Any]] = {}
+        self.taken = 0
+
+    def open(self, driver: Driver, patience: float,  # noqa: A003
+             on_loss: Callable[[str, int], None], wake: Callable[[], None],
+             ) -> dict[str, WriteTopic]:
+        """Subscribe to each topic of a driver; subscriptions that there are stay."""
+        wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
+        for mapping in driver.mappings:
+            if mapping.writes:
+                wanted[mapping.topic].append(mapping)
+        kinds = {topic: MESSAGES[mappings[0].message_type]
+                 for topic, mappings in wanted.items()}
+        for topic, (kind, subscription) in [*self._subscriptions.items()]:
+            if kinds.get(topic) is not kind:
+                self._node.destroy_subscription(subscription)
+                del self._subscriptions[topic]
+        for topic, kind in kinds.items():
+            if topic not in self._subscriptions:
+                self._subscriptions[topic] = kind, self._subscription(topic, kind)
+        return {topic: WriteTopic(
+            topic, mappings, driver, patience, on_loss=on_loss, wake=wake,
+            losses=LossCounter(partial(self._node.count_publishers, _name(topic))))
+            for topic, mappings in wanted.items()}
+
+    def _subscription(self, topic: str, kind: Any) -> Any:
+        def take(message: Any, info: Any) -> None:
+            self.taken += 1
+            self._take(topic, message, info)
+
+        callback: Any = take
+        return self._node.create_subscription(kind, _name(topic), callback, write_qos())
+
+
+def _name(topic: str) -> str:
+    return f'~/write/{topic}'

@@ -1,0 +1,233 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Our two ends of an exchange: the node, as client or as server, and the simulated PLC."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import sys
+import time
+from typing import Any, Protocol
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import Codec, types_of, ValueType
+from abdf1_ros.ports.endpoints import SerialEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+from cases import Case, same, Values
+from std_msgs.msg import String
+from support.ros import Inbox, Observer, Process, ros_args, write_csv
+
+OURS, THEIRS = 5, 1  # stations of the node, and of what answers it
+PATIENCE = 5.0  # s until a value has to be there
+BEAT = Case('N7:240', [0], [0])  # the heartbeat of a node that shares its line
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """
+    What a run is about.
+
+    ``access`` is the cell Access of the node's rows; ``serves`` tells that they are Serve.
+    ``share`` is the cell Share: guests may write, and the node has a heartbeat as well.
+    """
+
+    family: PlcType
+    check: Checksum
+    port: str
+    cases: Sequence[Case]
+    folder: Path
+    access: str = ''
+    serves: bool = False
+    mode: str = 'Peer'
+    share: str = ''
+
+
+class End(Protocol):
+    """One of our ends."""
+
+    def give(self, case: Case, values: Values) -> None:
+        """Put values at the address of a case: into our words, or into the other's."""
+
+    def take(self, case: Case, expected: Values) -> Values | None:
+        """Return what is there, at the latest after PATIENCE, earlier when it is as expected."""
+
+    def close(self) -> None:
+        """End it."""
+
+
+def codec_of(case: Case, family: PlcType) -> tuple[Address, Codec]:
+    """Return the address of a case and what makes its values of words."""
+    address = parse_address(case.address, family)
+    return address, Codec(types_of(address)[0], case.count, address.bit or 0)
+
+
+class PlcEnd:
+    """The simulated PLC at the end of a line, as station 1."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._family = setup.family
+        table = DataTable(setup.family)
+        for case in setup.cases:
+            address, codec = codec_of(case, setup.family)
+            table.create(address, codec.words)
+        self._plc = SimulatedPlc(THEIRS, table, setup.check, time.monotonic)
+        is_peer = setup.mode == 'Peer'
+        if is_peer:
+            self._plc.be_full_duplex()
+
+        def run(machine: Machine) -> Procedure:
+            peer = FullDuplexPeer(
+                machine, PeerSettings(setup.check), ActiveStationList(), self._plc.serve)
+            return peer.run(self._plc)
+
+        machine = Machine(run if is_peer else multidrop([self._plc]), checksum=setup.check,
+                          duplex=Duplex.FULL if is_peer else Duplex.HALF,
+                          counters=self._plc.counters)
+        self._link = LinkThread(machine, SerialEndpoint(PortSettings(setup.port, 19200)).open)
+        self._link.start()
+
+    def give(self, case: Case, values: Values) -> None:
+        """Put values into the PLC's table."""
+        address, codec = codec_of(case, self._family)
+        if codec.type is not ValueType.BOOL:
+            self._plc.table.write(address, codec.encode(wanted(values, codec.type)))
+            return
+        assert not isinstance(values, str)
+        for change in codec.bit_changes(address, values):
+            self._plc.table.write_bits(*change)
+
+    def take(self, case: Case, expected: Values) -> Values:
+        """Return what is in the PLC's table."""
+        address, codec = codec_of(case, self._family)
+        values = codec.decode(self._plc.table.read(address, codec.words))
+        return values if isinstance(values, str) else list(values)
+
+    def close(self) -> None:
+        """End it."""
+        self._link.stop()
+
+
+def wanted(values: Values, kind: ValueType) -> Values:
+    """Return values as their type has them: a word with or without sign."""
+    if kind is ValueType.INT16 and not isinstance(values, str):
+        return [(int(value) & 0xFFFF ^ 0x8000) - 0x8000 for value in values]
+    return values
+
+
+class NodeEnd:
+    """The node, in Mode Peer as a rule; its rows are Serve, or it asks station 1."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._cases = {case.address: f'v{number}' for number, case in enumerate(setup.cases)}
+        self._family = setup.family
+        self._serves = setup.serves
+        rows = []
+        for case, tag in zip(setup.cases, self._cases.values()):
+            command, station = ('Serve', OURS) if setup.serves else (
+                'Read' if case.is_structure else 'ReadWrite', THEIRS)
+            rows.append(f'{tag},{command},{case.address},{station},{setup.family.value},'
+                        f'{case.count},{"" if setup.serves else 500},{setup.access}')
+        if setup.share:
+            rows.append(f'beat,Heartbeat,{BEAT.address},{THEIRS},{setup.family.value},,200,')
+        net = write_csv(
+            setup.folder / 'net.csv',
+            'Mode,Station,PLC_Type,Error_Code,Com_Port,Baud,Timeout,Cmd_Timeout,Share,'
+            'Share_Access',
+            [f'{setup.mode},{OURS},{setup.family.value},{setup.check.value},{setup.port},19200,'
+             f'500,5000,{setup.share},Write'])
+        table = write_csv(
+            setup.folder / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Period,Access',
+            rows)
+        self._observer = Observer('interop')
+        self._results = self._observer.results()
+        self._node = Process('node', *ros_args(f'net_file:={net}', f'map_file:={table}'))
+        self._inboxes: dict[str, Inbox] = {}
+        self._publishers: dict[str, Any] = {}
+        try:
+            self._find_topics(setup)
+        except AssertionError:
+            self.close()
+            raise
+
+    def _find_topics(self, setup: Setup) -> None:
+        """Wait for the topics of all rows."""
+        self._node.wait_for(': open')
+        for case in setup.cases:
+            tag = self._cases[case.address]
+            kind = MESSAGES[codec_of(case, setup.family)[1].type]
+            self._inboxes[case.address] = self._observer.listen(kind, f'/abdf1/read/{tag}')
+            if case.is_structure and not setup.serves:
+                continue  # its control word belongs to the processor
+            publisher = self._observer.node.create_publisher(
+                kind, f'/abdf1/write/{tag}', write_qos())
+            self._observer.until(publisher.get_subscription_count, f'a subscriber of {tag}')
+            self._publishers[case.address] = publisher
+
+    def give(self, case: Case, values: Values) -> None:
+        """Publish values to the write topic."""
+        kind = codec_of(case, self._family)[1].type
+        message = MESSAGES[kind]()
+        message.data = wanted(values, kind)
+        self._publishers[case.address].publish(message)
+        if not self._serves:
+            result = self._results.until(lambda result: True, f'result of {case.address}')
+            if result.message != 'written':
+                print(f'{case.address}: {result.message}', file=sys.stderr)
+            self._results.clear()
+        self._spin(0.3)
+
+    def take(self, case: Case, expected: Values) -> Values | None:
+        """Return the newest value of the read topic."""
+        inbox = self._inboxes[case.address]
+        inbox.clear()
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end and not (inbox and same(expected, self._values(inbox))):
+            self._spin(0.05)
+        return self._values(inbox) if inbox else None
+
+    @staticmethod
+    def _values(inbox: Inbox) -> Values:
+        message = inbox[-1]
+        return message.data if isinstance(message, String) else list(values_of(message))
+
+    def until_there(self, place: Path) -> None:
+        """Wait until a guest can connect."""
+        self._observer.until(place.exists, f'the place {place}')
+
+    def _spin(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self._observer.executor.spin_once(timeout_sec=0.05)
+
+    def close(self) -> None:
+        """End it."""
+        try:
+            self._node.end()
+        finally:
+            self._observer.__exit__()

@@ -1,0 +1,529 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Let our node and our simulator exchange values with programs of others, and tell what came of it.
+
+Every value of ``cases.py`` is read by the client, written by the client, read again, and looked
+at on the other side. All that passes the line is kept as a capture. ``README.md`` tells how the
+counterparts are had. The exit status is 0 when every value that the counterpart can handle was
+right.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, ExitStack, suppress
+from dataclasses import dataclass
+import json
+from pathlib import Path
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from typing import Any
+
+_HERE = Path(__file__).resolve().parent
+sys.path[:0] = map(str, Path(__file__).resolve().parents[:4])
+
+from abdf1_ros.df1.checksum import Checksum  # noqa: E402
+from abdf1_ros.df1.packet import Packet  # noqa: E402
+from abdf1_ros.pccc.access import Access  # noqa: E402
+from abdf1_ros.pccc.data_table import DataTable  # noqa: E402
+from abdf1_ros.pccc.families import dialect_of  # noqa: E402
+from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
+from abdf1_ros.pccc.server import Server  # noqa: E402
+from abdf1_ros.pccc.values import ValueType  # noqa: E402
+from cases import Case, CASES, same, Values  # noqa: E402
+from ethernet import ask, DuplexLine, EthernetPlc, serve  # noqa: E402
+from ours import codec_of, End, NodeEnd, OURS, PlcEnd, Setup, THEIRS, wanted  # noqa: E402
+from shared import share, Tally  # noqa: E402
+from support.ros import Process  # noqa: E402
+
+PATIENCE = 60.0  # s for an answer of a player
+
+
+class Player:
+    """A program of players/, as a process under a Python that has the product."""
+
+    def __init__(self, python: str, program: str, *args: str) -> None:
+        self._process = subprocess.Popen(
+            [python, '-u', str(_HERE / 'players' / f'{program}.py'), *args], text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self._said: list[str] = []
+        threading.Thread(target=self._listen, daemon=True).start()
+        if not self._answer().get('ready'):
+            raise RuntimeError(f'{program} does not start: {"".join(self._said)}')
+
+    def _listen(self) -> None:
+        assert self._process.stderr
+        self._said.extend(self._process.stderr)
+
+    def _answer(self) -> dict[str, Any]:
+        timer = threading.Timer(PATIENCE, self._process.kill)
+        timer.start()
+        assert self._process.stdout
+        line = self._process.stdout.readline()
+        timer.cancel()
+        answer: dict[str, Any] = json.loads(line) if line else {
+            'error': f'it has ended: {"".join(self._said)[-500:]}'}
+        return answer
+
+    def _ask(self, **request: object) -> dict[str, Any]:
+        assert self._process.stdin
+        try:
+            print(json.dumps(request), file=self._process.stdin, flush=True)
+        except BrokenPipeError:
+            return {'error': 'it has ended'}
+        return self._answer()
+
+    def read(self, case: Case) -> dict[str, Any]:
+        """Let it read."""
+        return self._ask(do='read', address=case.address, count=case.count)
+
+    def write(self, case: Case, values: Values) -> dict[str, Any]:
+        """Let it write."""
+        return self._ask(do='write', address=case.address, values=values)
+
+    def close(self) -> None:
+        """End it."""
+        assert self._process.stdin
+        with suppress(BrokenPipeError):  # it has ended by itself
+            self._process.stdin.close()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+
+
+class Df1dSlave:
+    """A PLC of ours that has df1d as its link: what df1d receives comes over its socket."""
+
+    def __init__(self, port: int, setup: Setup) -> None:
+        self._family = setup.family
+        self._table = DataTable(setup.family)
+        for case in setup.cases:
+            address, codec = codec_of(case, setup.family)
+            self._table.create(address, codec.words)
+        self._server = Server(self._table)
+        self._socket = socket.create_connection(('127.0.0.1', port))
+        name = b'interop'
+        self._socket.sendall(bytes((THEIRS, len(name))) + name)
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self) -> None:
+        """Take SOH, length, message; say ACK; send SOH, length, reply."""
+        with self._socket.makefile('rb') as incoming:
+            while byte := incoming.read(1):
+                if byte != b'\1':
+                    continue  # df1d tells that a message of ours was acknowledged
+                size, = incoming.read(1)
+                command = Packet.decode(incoming.read(size))
+                reply = self._server.serve(command).encode()
+                self._socket.sendall(b'\6\1' + bytes((len(reply),)) + reply)
+
+    def read(self, case: Case) -> dict[str, Any]:
+        """Return what is in the table."""
+        address, codec = codec_of(case, self._family)
+        values = codec.decode(self._table.read(address, codec.words))
+        return {'values': values if isinstance(values, str) else list(values)}
+
+    def write(self, case: Case, values: Values) -> dict[str, Any]:
+        """Put values into the table."""
+        address, codec = codec_of(case, self._family)
+        if codec.type is not ValueType.BOOL:
+            self._table.write(address, codec.encode(wanted(values, codec.type)))
+        else:
+            assert not isinstance(values, str)
+            for change in codec.bit_changes(address, values):
+                self._table.write_bits(*change)
+        return {'done': True}
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
+
+
+class EthernetWords:
+    """The words of an EtherNet/IP server that takes one client, over the shim's connection."""
+
+    def __init__(self, plc: EthernetPlc, setup: Setup) -> None:
+        self._plc = plc
+        self._family = setup.family
+        self._dialect = dialect_of(setup.family, Access(setup.access) if setup.access else None)
+
+    def read(self, case: Case) -> dict[str, Any]:
+        """Return what is there."""
+        address, codec = codec_of(case, self._family)
+        request = self._dialect.read(address, codec.words)
+        data = self._dialect.read_data(address, codec.words, self._execute(*request))
+        return {'values': list(codec.decode(data))}
+
+    def write(self, case: Case, values: Values) -> dict[str, Any]:
+        """Put values there."""
+        address, codec = codec_of(case, self._family)
+        self._execute(*self._dialect.write(address, codec.encode(wanted(values, codec.type))))
+        return {'done': True}
+
+    def _execute(self, cmd: int, data: bytes) -> bytes:
+        reply = self._plc.execute(bytes((cmd, 0, 0x34, 0x12)) + data)
+        if reply[1]:
+            raise ValueError(f'refused: {reply.hex(" ")}')
+        return reply[4:]
+
+    def close(self) -> None:
+        """End the connection."""
+        self._plc.close()
+
+
+Partner = Player | Df1dSlave | EthernetWords
+
+
+@contextmanager
+def tapped(folder: Path, capture: Path | None) -> Iterator[tuple[str, str]]:
+    """Give the names of both ends of a line, of which all is kept; ">" comes from the first."""
+    first, second = (str(folder / name) for name in ('first', 'second'))
+    save = capture or folder / 'line.cap'
+    save.unlink(missing_ok=True)
+    with Process('sniff', '--tap', f'pty:{first}', f'pty:{second}', '--save', str(save),
+                 '--summary') as tap:
+        tap.wait_for('listening')
+        yield first, second
+
+
+def free_port() -> int:
+    """Return a TCP port of the loopback that nobody has."""
+    with socket.socket() as trial:
+        trial.bind(('127.0.0.1', 0))
+        number: int = trial.getsockname()[1]
+        return number
+
+
+@contextmanager
+def df1d(program: str, device: str, check: Checksum, folder: Path) -> Iterator[int]:
+    """Run df1d on a device; give its TCP port."""
+    port = free_port()
+    config = folder / 'df1d.xml'
+    config.write_text(
+        f'<?xml version="1.0"?>\n<df1d_config><connection><name>interop</name>'
+        f'<duplex>full</duplex><error_detect>{check.value.lower()}</error_detect>'
+        f'<device>{device}</device><baud>19200</baud><port>{port}</port>'
+        '<duplicate_detect>yes</duplicate_detect><max_nak>3</max_nak><max_enq>3</max_enq>'
+        '<ack_timeout>1000</ack_timeout></connection></df1d_config>\n')
+    with subprocess.Popen([program, '-f', str(config)], stderr=subprocess.DEVNULL) as process:
+        try:
+            until_open(port)
+            yield port
+        finally:
+            process.terminate()
+
+
+def until_open(port: int) -> None:
+    """Wait until somebody listens."""
+    end = time.monotonic() + 10
+    while True:
+        try:
+            socket.create_connection(('127.0.0.1', port)).close()
+            return
+        except OSError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.05)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One exchange: who it is with, and what stands at our end."""
+
+    name: str
+    family: PlcType
+    check: Checksum
+    ours: str  # plc, node (Serve), client
+    start: Callable[[Setup, str, ExitStack], Partner]
+    only: tuple[str, ...] = ()  # addresses
+    access: str = ''
+
+    @property
+    def text(self) -> str:
+        """Return the name of its capture."""
+        role = {'plc': 'simulator', 'node': 'serve', 'client': 'node_client'}[self.ours]
+        return f'{self.name}_{role}_{self.family.value}_{self.check.value}'.lower()
+
+
+def carry_out(run: Run, save: Path | None) -> list[tuple[str, str, bool]]:
+    """Return for each address what came of it, and whether that is good."""
+    cases = [case for case in CASES if not run.only or case.address in run.only]
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        capture = save / f'{run.text}.cap' if save else None
+        first, second = stack.enter_context(tapped(folder, capture))
+        # The initiator has the first end, so that its bytes are those with ">".
+        mine, theirs = (first, second) if run.ours == 'client' else (second, first)
+        setup = Setup(run.family, run.check, mine, cases, folder, run.access, run.ours == 'node')
+        # All words have their first values before anything is said, so a capture is complete.
+        if run.ours == 'client':
+            partner = run.start(setup, theirs, stack)
+            stack.callback(partner.close)
+            given = [partner.write(case, case.before) for case in cases]
+            ours: End = NodeEnd(setup)
+            stack.callback(ours.close)
+            return [client_case(ours, partner, *entry) for entry in zip(cases, given)]
+        ours = PlcEnd(setup) if run.ours == 'plc' else NodeEnd(setup)
+        stack.callback(ours.close)
+        for case in cases:
+            ours.give(case, case.before)
+        partner = run.start(setup, theirs, stack)
+        stack.callback(partner.close)
+        return [server_case(ours, partner, case) for case in cases]
+
+
+def share_line(run: Run, mode: str, rounds: int) -> Tally:
+    """Let two programs of a product share the line of our node."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        ends = stack.enter_context(tapped(folder, None))
+        setup = Setup(run.family, run.check, '', (), folder, mode=mode)
+        return share(setup, ends, run.start, rounds, stack)
+
+
+def judge(run: Run, case: str) -> None:
+    """Let conform judge who answers us, by all of its cases or by one."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        mine, theirs = stack.enter_context(tapped(folder, None))
+        cases = [entry for entry in CASES if not run.only or entry.address in run.only]
+        partner = run.start(Setup(run.family, run.check, mine, cases, folder), theirs, stack)
+        stack.callback(partner.close)
+        for entry in cases:
+            partner.write(entry, entry.before)
+        subprocess.run(
+            [sys.executable, '-m', 'abdf1_ros', 'conform', 'peer', '--port', mine, '--check',
+             run.check.value, '--station', str(THEIRS), '--family', run.family.value, '--words',
+             'N7:30', '--yes', '--answer-time', '4', *(('--only', case) if case else ())],
+            check=False)
+
+
+def server_case(ours: End, partner: Partner, case: Case) -> tuple[str, str, bool]:
+    """Let the other end read, write and read words of ours."""
+    told, good = [], True
+    answer = partner.read(case)
+    told.append(f'read {verdict(answer, case.before)}')
+    good &= 'cannot' in answer or same(case.before, answer.get('values'))
+    answer = partner.write(case, case.after)
+    if 'cannot' in answer:
+        told.append(f'write: cannot ({answer["cannot"]})')
+    elif 'error' in answer:
+        told.append(f'write {answer["error"]}')
+        good = False
+    else:
+        there = ours.take(case, case.after)
+        told.append('write good' if same(case.after, there) else f'write WRONG: {there}')
+        good &= same(case.after, there)
+        answer = partner.read(case)
+        told.append(f'read {verdict(answer, case.after)}')
+        good &= 'cannot' in answer or same(case.after, answer.get('values'))
+    return case.address, '; '.join(told), good
+
+
+def client_case(ours: End, partner: Partner, case: Case,
+                answer: dict[str, Any]) -> tuple[str, str, bool]:
+    """Read, write and read words of the other end."""
+    told, good = [], True
+    if 'cannot' in answer:
+        return case.address, f'cannot ({answer["cannot"]})', True
+    if 'error' in answer:
+        return case.address, f'its own write: {answer["error"]}', False
+    got = ours.take(case, case.before)
+    told.append('read good' if same(case.before, got) else f'read WRONG: {got}')
+    good &= same(case.before, got)
+    if case.is_structure:
+        return case.address, f'{told[0]}; write: cannot (belongs to the processor)', good
+    ours.give(case, case.after)
+    got = ours.take(case, case.after)
+    answer = partner.read(case)
+    told.append(f'write {verdict(answer, case.after)}')
+    told.append('read good' if same(case.after, got) else f'read WRONG: {got}')
+    return case.address, '; '.join(told), good and same(case.after, got) and same(
+        case.after, answer.get('values'))
+
+
+def verdict(answer: dict[str, Any], expected: Values) -> str:
+    """Return what an answer to a read is worth."""
+    if 'values' in answer:
+        values = answer['values']
+        return 'good' if same(expected, values) else f'WRONG: {values}, should be {expected}'
+    return f'cannot ({answer["cannot"]})' if 'cannot' in answer else str(answer['error'])
+
+
+def df1py3_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with df1py3, which knows CRC and SLC commands."""
+    def start(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        return Player(options.python, 'df1py3_client', port)
+
+    return [Run('df1py3', PlcType.SLC, Checksum.CRC, ours, start) for ours in ('plc', 'node')]
+
+
+def libpccc_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with libpccc over df1d, and with a PLC of ours behind df1d."""
+    def client(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        number = stack.enter_context(df1d(options.df1d, port, setup.check, setup.folder))
+        return Player(options.python, 'libpccc_client', options.library, str(number))
+
+    def slave(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        number = stack.enter_context(df1d(options.df1d, port, setup.check, setup.folder))
+        return Df1dSlave(number, setup)
+
+    return [
+        *(Run('libpccc', PlcType.SLC, check, ours, client)
+          for ours in ('plc', 'node') for check in Checksum),
+        *(Run('df1d', family, check, 'client', slave)
+          for family in (PlcType.SLC, PlcType.PLC5) for check in Checksum)]
+
+
+def abdf1_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with AbDf1; its library is made for one check."""
+    def player(port: str, own: int, station: int, cases: Sequence[Case]) -> Partner:
+        return Player(options.python, 'abdf1_ioc', options.library, port, str(own),
+                      str(station), *(f'{case.address} {case.count}' for case in cases))
+
+    def client(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        return player(port, 0, OURS if setup.serves else THEIRS, setup.cases)
+
+    def server(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        return player(port, THEIRS, THEIRS, setup.cases)
+
+    check = Checksum(options.check)
+    # It reads from its first to its last record of a file, so words between Serve rows matter;
+    # what it serves it lets others write one element at a time.
+    return [
+        Run('abdf1', PlcType.PLC5, check, 'plc', client),
+        Run('abdf1', PlcType.PLC5, check, 'node', client, ('N7:0', 'F8:0', 'S:10')),
+        Run('abdf1', PlcType.PLC5, check, 'client', server,
+            ('N7:30', 'N7:40/3', 'F8:6', 'S:10'))]
+
+
+def ethernet_client(program: str, python: str, *args: str
+                    ) -> Callable[[Setup, str, ExitStack], Partner]:
+    """Return what starts an EtherNet/IP client with the shim before the line."""
+    def start(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        line = DuplexLine(port, setup.check)
+        stack.callback(line.close)
+        listening = stack.enter_context(socket.create_server(('127.0.0.1', 0)))
+        station = OURS if setup.serves else THEIRS
+        threading.Thread(target=serve, daemon=True, args=(
+            listening, lambda command: line.execute(command, 0, station))).start()
+        name = f'127.0.0.1:{listening.getsockname()[1]}'
+        return Player(python, program, *(name if arg == 'HOST' else arg for arg in args))
+
+    return start
+
+
+def pycomm3_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with pycomm3's driver for SLC and MicroLogix."""
+    start = ethernet_client('pycomm3_client', options.python, 'HOST')
+    # It reads whole elements for their members, of which a Serve row may have one word only.
+    rows = tuple(case.address for case in CASES if '.' not in case.address)
+    return [Run('pycomm3', PlcType.SLC, check, ours, start, rows if ours == 'node' else ())
+            for ours in ('plc', 'node') for check in Checksum]
+
+
+def libplctag_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with libplctag as client, and with its ab_server."""
+    names = {PlcType.SLC: 'slc500', PlcType.PLC5: 'plc5'}
+    runs = [
+        Run('libplctag', family, check, ours,
+            ethernet_client('libplctag_client', options.python, options.library, 'HOST', name))
+        for family, name in names.items() for ours in ('plc', 'node') for check in Checksum]
+    if not options.ab_server:
+        return runs
+
+    def server(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        number = free_port()
+        kind = {PlcType.SLC: 'SLC500', PlcType.PLC5: 'PLC/5'}[setup.family]
+        process = stack.enter_context(subprocess.Popen(
+            [options.ab_server, f'--plc={kind}', f'--port={number}', '--tag=N7[100]',
+             '--tag=F8[20]'], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL))
+        stack.callback(process.terminate)
+        until_open(number)
+        plc = EthernetPlc('127.0.0.1', number)
+        line = DuplexLine(port, setup.check)
+        ended = threading.Event()
+        thread = threading.Thread(target=ask, args=(line, plc.execute, ended.is_set))
+        thread.start()
+        stack.callback(thread.join)
+        stack.callback(ended.set)
+        return EthernetWords(plc, setup)
+
+    # As a PLC-5 it refuses libplctag's own writes of floats: one counts words, the other floats.
+    return runs + [
+        run for check in Checksum for run in (
+            Run('ab_server', PlcType.SLC, check, 'client', server, ('N7:0', 'N7:20', 'F8:0')),
+            Run('ab_server', PlcType.PLC5, check, 'client', server, ('N7:0', 'N7:20'),
+                'WordRange'))]
+
+
+def main() -> int:
+    """Carry out the runs with one product."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--save', type=Path, help='a folder for the captures')
+    parser.add_argument('--python', default=sys.executable, help='that has the product')
+    parser.add_argument('--conform', metavar='CASE', nargs='?', const='',
+                        help='let conform judge those that answer us, by one case or all')
+    parser.add_argument('--share', metavar='ROUNDS', type=int,
+                        help='let two of them share the line of our node')
+    parser.add_argument('--only', default='', help='only runs whose name has this in it')
+    products = parser.add_subparsers(dest='product', required=True)
+    products.add_parser('df1py3').set_defaults(runs=df1py3_runs)
+    entry = products.add_parser('libpccc')
+    entry.set_defaults(runs=libpccc_runs)
+    entry.add_argument('--library', required=True, help='libpccc.so.1.1')
+    entry.add_argument('--df1d', required=True, help='the program df1d')
+    entry = products.add_parser('abdf1')
+    entry.set_defaults(runs=abdf1_runs)
+    entry.add_argument('--library', required=True, help='libAbDf1.so')
+    entry.add_argument('--check', choices=[check.value for check in Checksum], default='CRC',
+                       help='the check that the library was made for')
+    products.add_parser('pycomm3').set_defaults(runs=pycomm3_runs)
+    entry = products.add_parser('libplctag')
+    entry.set_defaults(runs=libplctag_runs)
+    entry.add_argument('--library', required=True, help='libplctag.so')
+    entry.add_argument('--ab-server', help='the program ab_server')
+    options = parser.parse_args()
+    if options.save:
+        options.save.mkdir(parents=True, exist_ok=True)
+    all_good = True
+    for run in options.runs(options):
+        if options.only not in run.text:
+            continue
+        if options.share is not None:
+            for mode in ('Peer', 'Master') if run.ours == 'plc' else ():
+                tally = share_line(run, mode, options.share)
+                print(f'{run.text}, {mode}: {tally}', flush=True)
+                all_good &= tally.is_good
+        elif options.conform is None:
+            print(f'{run.text}:', flush=True)
+            for address, text, good in carry_out(run, options.save):
+                print(f'  {"good" if good else "BAD "} {address:<10} {text}', flush=True)
+                all_good &= good
+        elif run.ours == 'client':
+            print(f'{run.text}:', flush=True)
+            judge(run, options.conform)
+    return not all_good
+
+
+if __name__ == '__main__':
+    sys.exit(main())
