@@ -54,13 +54,15 @@ class Addressing(ABC):
     How the places of one family's data table are written and counted.
 
     ``title`` is what people call it, ``files`` are the file types that it can have.
-    ``has_sections`` tells whether each type has file numbers of its own.
+    ``has_sections`` tells whether each type has file numbers of its own, ``is_by_file`` whether
+    commands of other such families find a file by the same number.
     """
 
     plc_type: ClassVar[PlcType]
     title: ClassVar[str]
     files: ClassVar[Mapping[FileType, Layout]]
     has_sections: ClassVar[bool] = False
+    is_by_file: ClassVar[bool] = False
 
     @abstractmethod
     def parse(self, text: str, access: Access | None = None) -> Address:
@@ -143,6 +145,32 @@ class Address:
     def area_size(self) -> int:
         """Return how many words the area can have at most."""
         return self.addressing.area_size(self)
+
+    def may_share_file(self, other: Address) -> bool:
+        """
+        Tell whether both may lie in one file, or slot, of a PLC.
+
+        A PLC finds a file by its number, whatever type or family a command names. Where nobody
+        can tell they may.
+        """
+        mine, others = self.area, other.area
+        if None not in (mine.slot, others.slot) and mine.slot != others.slot:
+            return False
+        if not self._is_found_like(other):
+            return True
+        is_by_type = self.addressing.has_sections or mine.file_type.is_function \
+            or others.file_type.is_function
+        return mine.file == others.file and (
+            not is_by_type or mine.file_type is others.file_type)
+
+    def counts_like(self, other: Address) -> bool:
+        """Tell whether one offset means one word, where both lie in the same file."""
+        return self._is_found_like(other) and self.layout.words == other.layout.words \
+            and self.area.slot == other.area.slot
+
+    def _is_found_like(self, other: Address) -> bool:
+        return self.plc_type == other.plc_type \
+            or self.addressing.is_by_file and other.addressing.is_by_file
 
     def at_offset(self, offset: int) -> Address:
         """Return the address of word ``offset`` of the same area."""

@@ -55,6 +55,7 @@ class FileAddressing(Addressing):
     """What the addresses of both families have in common."""
 
     last_file: ClassVar[int]
+    is_by_file = True
 
     def parse(self, text: str, access: Access | None = None) -> Address:
         """Read an address; an error says what would be right."""

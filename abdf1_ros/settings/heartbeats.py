@@ -29,6 +29,8 @@ import difflib
 from typing import Protocol
 
 from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.text import shown
@@ -47,6 +49,8 @@ _FALLBACK_AFTER = (200, 60_000)
 _TIMEOUTS = (100, 3_600_000)
 
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
+# The processor reads or writes their words itself.
+_NO_COUNTING = (FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +137,15 @@ def heartbeat_type_fault(kind: ValueType, has_bit: bool) -> str:
     if kind in _COUNTING and not has_bit:
         return ''
     return 'a heartbeat is a word of type int16 or uint16, such as N7:0'
+
+
+def heartbeat_file_fault(address: Address) -> str:
+    """Return why no heartbeat may count in this file, empty if one may (rule 1)."""
+    kind = address.file_type
+    if not kind.is_structure and kind not in _NO_COUNTING:
+        return ''
+    return f'{address} has a meaning to the processor, and a heartbeat counts through all ' \
+        'values; take a word of its own in an N or B file, such as N7:0'
 
 
 def read_fallback(row: Row, command: str, kind: ValueType, length: int,

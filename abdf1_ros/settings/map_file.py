@@ -108,12 +108,15 @@ def _no_topic(topic: str, mappings: Sequence[Mapping]) -> str:
 
 def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping],
                      mappings: Sequence[Mapping]) -> str:
-    """Return why a row cannot confirm control by a heartbeat, empty if it can (rule 22)."""
+    """Return why a row cannot confirm a heartbeat's control, empty if it can (rules 21, 22)."""
     beat = tags.get(mapping.confirms)
     first = next(other for other in mappings if other.confirms == mapping.confirms)
-    is_right = beat and beat.heartbeat and beat.station == mapping.station and first is mapping
-    return '' if is_right else 'should be the tag of a good Heartbeat row of station ' \
-        f'{mapping.station} that no row before it confirms'
+    if not (beat and beat.heartbeat and beat.station == mapping.station and first is mapping):
+        return 'should be the tag of a good Heartbeat row of station ' \
+            f'{mapping.station} that no row before it confirms'
+    ours = next((row for row in mappings if _changes(row) and row.shares_words(mapping)), None)
+    return f'cannot be confirmed by {mapping.address}, which {shown(ours.tag)} writes: nobody ' \
+        'vouches for himself; name a bit that the program of the PLC sets' if ours else ''
 
 
 def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping]) -> str:
@@ -225,5 +228,15 @@ class _Clashes:
         for other in self._changing if _changes(mapping) else ():
             if (_owns(mapping) or _owns(other)) and mapping.shares_words(other):
                 clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '
-                                        f'{mapping.address} shares some with the row')
+                                        f'{mapping.address}{_why_same(mapping, other)} shares '
+                                        'some with the row')
                 return
+
+
+def _why_same(mapping: Mapping, other: Mapping) -> str:
+    """Return why words that two rows call by different names are the same."""
+    if mapping.station != other.station:
+        return ' (a broadcast has the words of every station)'
+    if mapping.address.area != other.address.area:
+        return ' (a PLC finds a file by its number, whatever Type or PLC_Type a row gives it)'
+    return ''

@@ -38,6 +38,7 @@ from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.heartbeats import (
     DEFAULT_PERIOD,
+    heartbeat_file_fault,
     heartbeat_type_fault,
     read_fallback,
     read_heartbeat,
@@ -157,6 +158,8 @@ class RowReader:
             heartbeat = read_heartbeat(row, fault)
             if text := heartbeat_type_fault(mapping.type, mapping.address.bit is not None):
                 fault('Type' if row.get('Type') else 'Address', text)
+            elif text := heartbeat_file_fault(mapping.address):
+                fault('Address', text)
             mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
         else:
             for column in ('Requires', 'Requires_Timeout'):

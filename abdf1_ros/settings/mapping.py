@@ -22,11 +22,12 @@ from enum import Enum
 import math
 from typing import Any
 
-from abdf1_ros.pccc.access import Access
+from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.pccc.access import Access, CIF_FILES
 from abdf1_ros.pccc.address import Address, BITS
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.families import dialect_of
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
@@ -151,11 +152,32 @@ class Mapping:
         return self.publish_while is not None and self.publish_while.tag is None
 
     def shares_words(self, other: Mapping) -> bool:
-        """Tell whether both have words of one station in common; for bits, the same bits."""
+        """
+        Tell whether both may have words of one PLC in common; for bits, the same bits.
+
+        A broadcast has the words of every station.
+        """
+        if self.serves != other.serves or self.station != other.station \
+                and BROADCAST not in (self.station, other.station):
+            return False
+        # Where they count in other ways nobody can tell which words they are.
+        return any(not mine.counts_like(theirs) or self._meets(other)
+                   for mine in self._places(other) for theirs in other._places(self)
+                   if mine.may_share_file(theirs))
+
+    def _places(self, other: Mapping) -> list[Address]:
+        """Return the addresses that the first word may have for the commands of another row."""
+        if self.access is not Access.CIF or other.access is Access.CIF:
+            return [self.address]
+        return [parse_address(f'N{file}:0', PlcType.SLC).at_offset(self.address.offset)
+                for file in CIF_FILES]
+
+    def _meets(self, other: Mapping) -> bool:
+        """Tell whether both have a word, or for bits a bit, of one number."""
         if self.type is not ValueType.BOOL or other.type is not ValueType.BOOL:
-            return self.extent.meets(other.extent)
-        return self.extent.meets(other.extent) and self._first_bit < other._first_bit \
-            + other.length and other._first_bit < self._first_bit + self.length
+            return self.extent.first < other.extent.end and other.extent.first < self.extent.end
+        return self._first_bit < other._first_bit + other.length \
+            and other._first_bit < self._first_bit + self.length
 
     @property
     def _first_bit(self) -> int:

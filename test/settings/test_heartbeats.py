@@ -63,6 +63,75 @@ def test_rule_1_nobody_else_writes_the_word(command: str) -> None:
                      'N10:0 shares some with the row of item 1 (line 2, tag "beat")']
 
 
+BY_NUMBER = ' (a PLC finds a file by its number, whatever Type or PLC_Type a row gives it)'
+
+
+@pytest.mark.parametrize('own', [
+    BEAT, BEAT | {'Command': 'Write', 'Fallback': '0', 'Fallback_After': '500'}])
+@pytest.mark.parametrize(('cells', 'why'), [
+    ({'Station': '255', 'Address': 'N10:0'}, ' (a broadcast has the words of every station)'),
+    ({'Station': '255', 'Address': 'B10:0', 'PLC_Type': 'SLC'},
+     ' (a broadcast has the words of every station)'),
+    ({'Address': 'D10:0'}, BY_NUMBER), ({'Address': 'B10:0/3'}, BY_NUMBER),
+    ({'Address': 'N10:0', 'PLC_Type': 'SLC'}, BY_NUMBER),
+    # Elements of another length: which words they are nobody can tell.
+    ({'Address': 'F10:7'}, BY_NUMBER), ({'Address': 'T10:5.PRE'}, BY_NUMBER),
+    ({'Address': '020', 'PLC_Type': 'PLC2'}, BY_NUMBER)])
+def test_rules_1_and_12_same_words_under_other_names(
+        own: dict[str, str], cells: dict[str, str], why: str) -> None:
+    rows = [own, {'Tag': 'other', 'Command': 'Write'} | cells]
+    found = faults(*(row(**cells) for cells in rows))
+    address = str(one(**rows[1]).address)
+    assert found == ['3:3 (Address): Item: 2, a heartbeat or a Fallback has its words for itself; '
+                     f'{address}{why} shares some with the row of item 1 (line 2, tag "beat")']
+    rows[1]['Tag'] = 'a'  # whichever comes first
+    assert len(faults(*(row(**cells) for cells in reversed(rows)))) == 1
+
+
+@pytest.mark.parametrize('cells', [
+    {'Station': '255', 'Address': 'N10:1'}, {'Station': '255', 'Address': 'N11:0'},
+    {'Address': 'D10:1'}, {'Address': 'N11:0', 'PLC_Type': 'SLC'}, {'Address': 'F8:0'},
+    {'Address': 'D9:0', 'PLC_Type': 'SLC'},
+    {'Address': '000', 'PLC_Type': 'PLC2', 'Access': 'CIF'},  # file 7 or 9
+    {'Command': 'Serve', 'Address': 'N10:0'}])
+def test_rules_1_and_12_other_words(cells: dict[str, str]) -> None:
+    assert tags_of(row(**BEAT), row(**{'Tag': 'other', 'Command': 'Write'} | cells)) == [
+        'beat', 'other']
+
+
+def test_rule_12_common_interface_file_is_file_9_or_7() -> None:
+    cif = {'Tag': 'cif', 'Command': 'Write', 'PLC_Type': 'PLC2', 'Access': 'CIF'}
+    for address in ('N9:3', 'N7:3'):
+        beat = row(**BEAT | {'Address': address}, PLC_Type='SLC')
+        assert tags_of(beat, row(**cif, Address='003')) == ['beat']
+        assert tags_of(beat, row(**cif, Address='004')) == ['beat', 'cif']
+    own = cif | {'Tag': 'own', 'Address': '003', 'Fallback': '0', 'Fallback_After': '500'}
+    assert tags_of(row(**own), row(**cif, Address='003')) == ['own']
+    assert tags_of(row(**own), row(**cif, Address='004')) == ['own', 'cif']
+    # Without CIF the numbers are counted in another way.
+    assert tags_of(row(**own), row(**cif | {'Access': ''}, Address='004')) == ['own']
+
+
+def test_rule_12_slots_and_sections_are_files_of_their_own() -> None:
+    own = {'Command': 'Write', 'Fallback': '0', 'Fallback_After': '500', 'PLC_Type': 'SLC'}
+    first = row(Tag='a', Address='O:1.0', **own)
+    assert tags_of(first, row(Tag='b', Address='O:2.0', **own)) == ['a', 'b']
+    flat = row(Tag='b', Address='O:7', Access='Flat', **own)
+    assert tags_of(first, flat) == ['a']  # which slot that is nobody can tell
+    own['PLC_Type'] = 'PLC3'
+    rows = [row(Tag=kind, Address=f'{kind}10:0', **own) for kind in ('N', 'B')]
+    assert tags_of(*rows) == ['N', 'B']
+
+
+@pytest.mark.parametrize('address', [
+    'S:1', 'I:001', 'O:001', 'T4:0.ACC', 'C5:0.PRE', 'R6:0.POS', 'PD10:0'])
+def test_rule_1_file_with_a_meaning_is_no_place_to_count(address: str) -> None:
+    found = faults(row(**BEAT | {'Address': address}, Type='int16'))
+    assert any('take a word of its own in an N or B file, such as N7:0' in text
+               for text in found), found
+    assert found[0].startswith('2:3 (Address): Item: 1, ')
+
+
 def test_rule_1_words_of_another_station_are_others() -> None:
     assert tags_of(row(**BEAT), row(Tag='b', Command='Write', Address='N10:0', Station='2'),
                    row(Tag='c', Command='Read', Address='N10:0')) == ['beat', 'b', 'c']
@@ -222,6 +291,16 @@ def test_rule_22_what_a_bit_cannot_confirm(cells: dict[str, str]) -> None:
     assert faults(row(**cells), row(**BEAT), row(**WRITE)) == [
         f'2:24 (Confirms): Item: 1, "{cells["Confirms"]}" should be the tag of a good Heartbeat '
         f'row of station {station} that no row before it confirms']
+
+
+@pytest.mark.parametrize('ours', [
+    BEAT | {'Address': 'B12:0'}, BEAT | {'Address': 'N12:0'}, WRITE | {'Address': 'B12:0/2'},
+    WRITE | {'Address': 'B12:0', 'Station': '255'}])
+def test_rule_21_no_bit_that_we_write_confirms(ours: dict[str, str]) -> None:
+    rows = {entry['Tag']: row(**entry) for entry in (BIT, BEAT, WRITE, ours)}
+    assert faults(*rows.values()) == [
+        f'2:24 (Confirms): Item: 1, "beat" cannot be confirmed by B12:0/2, which {ours["Tag"]} '
+        'writes: nobody vouches for himself; name a bit that the program of the PLC sets']
 
 
 def test_rule_22_a_heartbeat_is_confirmed_once() -> None:
