@@ -28,8 +28,8 @@ _WAITING = (
     'ros/test_process.py', 'faults/', 'cli/monitor/test_command.py', 'examples/', 'ros/',
     'test_docs', 'test_', 'cli/')
 _COMPUTING = (
-    'noise/', 'driver/test_interlocks_property.py', 'df1/test_multidrop_line.py', 'soak/',
-    'df1/test_peer_line.py', 'driver/', 'df1/', 'fuzz/', '')
+    'lab/noise/', 'driver/test_interlocks_property.py', 'df1/test_multidrop_line.py', 'lab/soak/',
+    'df1/test_peer_line.py', 'driver/', 'df1/', 'lab/fuzz/', '')
 
 _HERE = Path(__file__).parent
 
