@@ -56,10 +56,10 @@ class Publish(Enum):
     CHANGE = 'Change'
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mapping:
     """
-    One checked row.
+    One checked row; no two are equal, so a row can be a key.
 
     ``item`` counts data rows from 1, ``place`` is file and line. ``name`` is the tag and
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
@@ -73,7 +73,7 @@ class Mapping:
     """
 
     item: int
-    place: Place = field(compare=False)
+    place: Place
     tag: str
     name: str
     command: Command
@@ -98,11 +98,11 @@ class Mapping:
     fallback: Fallback | None = None
     publish_while: PublishWhile | None = None
     confirms: str = ''
-    remarks: tuple[Problem, ...] = field(default=(), compare=False)
+    remarks: tuple[Problem, ...] = ()
     # The codec and the dialect are made once: every read needs them.
-    codec: Codec = field(init=False, repr=False, compare=False)
-    dialect: Dialect = field(init=False, repr=False, compare=False)
-    extent: Extent = field(init=False, repr=False, compare=False)
+    codec: Codec = field(init=False, repr=False)
+    dialect: Dialect = field(init=False, repr=False)
+    extent: Extent = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Make codec and extent, and find the dialect."""

@@ -136,7 +136,7 @@ class Interlocks:
         for row in self.fallbacks:
             self._plc(row).fallbacks.append(row)
             self._plc(row).rows.append(row)
-        self._by_mapping = {id(row.mapping): row for row in self.fallbacks}
+        self._by_mapping = {row.mapping: row for row in self.fallbacks}
         self._stations = stations
         self._writes = writes
         writes.message_ended, writes.message_expired = self.message_ended, self.message_expired
@@ -252,12 +252,12 @@ class Interlocks:
 
     def is_overruled(self, write: Write) -> bool:
         """Tell whether a message comes after the end, or before a fallback of its row (5, 9)."""
-        row = self._by_mapping.get(id(write.mapping))
+        row = self._by_mapping.get(write.mapping)
         return row is not None and (self._are_all_due or write.requested <= row.sent)
 
     def message_ended(self, write: Write, outcome: Outcome) -> None:
         """Take note how a message ended that had the line."""
-        row = self._by_mapping.get(id(write.mapping))
+        row = self._by_mapping.get(write.mapping)
         if row is not None:
             row.message_ended(write.requested, outcome)
             if self._are_all_due:
@@ -272,7 +272,7 @@ class Interlocks:
 
     def message_expired(self, write: Write) -> None:
         """Take note that a message was too old to have the line: nobody waits for it any more."""
-        row = self._by_mapping.get(id(write.mapping))
+        row = self._by_mapping.get(write.mapping)
         if row is not None:
             self._look_again(row)
 
@@ -315,10 +315,10 @@ class Interlocks:
         self._plan()
         return None if best is None else self._begin(best[1], best[2], youngest, now)
 
-    def _ready(self, plc: _Plc, youngest: dict[int, float], now: float) -> list[OwnRow]:
+    def _ready(self, plc: _Plc, youngest: dict[Mapping, float], now: float) -> list[OwnRow]:
         """Return the rows of a PLC that want to write now."""
         due = [row for row in plc.fallbacks
-               if row.due <= now and row.judge(now, youngest.get(id(row.mapping), -math.inf))]
+               if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
         held_up = [row for row in due if self._writing.is_held_up(row.mapping)]
         for row in held_up:  # by a message that is under way (rule 9); _release ends it
             row.is_held_up, row.due = True, math.inf
@@ -364,7 +364,8 @@ class Interlocks:
             return -math.inf
         return max(plc.pause_end, self._stations.next_message(plc.station))
 
-    def _begin(self, plc: _Plc, row: OwnRow, youngest: dict[int, float], now: float) -> OwnWrite:
+    def _begin(self, plc: _Plc, row: OwnRow, youngest: dict[Mapping, float],
+               now: float) -> OwnWrite:
         expires = math.inf
         if isinstance(row, FallbackRow):
             self._writes.drop('fallback', now, row.mapping)
@@ -375,9 +376,9 @@ class Interlocks:
         self._plan(plc)
         return OwnWrite(row, write, self._writing, self, expires)
 
-    def _good_until(self, plc: _Plc, row: HeartbeatRow, youngest: dict[int, float]) -> float:
+    def _good_until(self, plc: _Plc, row: HeartbeatRow, youngest: dict[Mapping, float]) -> float:
         """Return until when a heartbeat may be sent (clock value in s): later it may be wrong."""
-        ends = [fallback.deadline(youngest.get(id(fallback.mapping), -math.inf))
+        ends = [fallback.deadline(youngest.get(fallback.mapping, -math.inf))
                 for fallback in plc.fallbacks]
         return min([row.executor_until(self._executor), row.topics_until(self._messages), *ends])
 
@@ -397,7 +398,7 @@ class Interlocks:
             if row.mapping.station in busy:
                 passed_over.append(entry)
                 continue
-            is_waiting = id(row.mapping) in self._writes.youngest()
+            is_waiting = row.mapping in self._writes.youngest()
             if row.is_under_way or is_waiting and not row.has_failed \
                     or self._writing.is_held_up(row.mapping) \
                     or not self._stations[row.mapping.station].replies_in_time:
@@ -471,7 +472,7 @@ class Interlocks:
             return
         youngest = self._writes.youngest()
         for row in self._ours.fallbacks:
-            if row.due <= now and row.judge(now, youngest.get(id(row.mapping), -math.inf)):
+            if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf)):
                 write = row.take(now)
                 self._store(write)
                 self._fallback_ended(row, write, Outcome.WRITTEN, now)

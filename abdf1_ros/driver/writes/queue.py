@@ -142,17 +142,13 @@ class WriteQueue:
             held_up.add(station)
         return None
 
-    def youngest(self) -> dict[int, float]:
-        """
-        Return when the youngest message of each row with Fallback was published.
-
-        By the ``id`` of the mapping, of messages that wait or are under way.
-        """
-        found: dict[int, float] = {}
+    def youngest(self) -> dict[Mapping, float]:
+        """Return when the youngest message that waits or is under way was published, by row."""
+        found: dict[Mapping, float] = {}
         for write in itertools.chain(self.waiting, self._writing.under_way):
             if write.mapping.fallback is not None and not write.is_own:
-                key = id(write.mapping)
-                found[key] = max(write.requested, found.get(key, -math.inf))
+                known = found.get(write.mapping, -math.inf)
+                found[write.mapping] = max(write.requested, known)
         return found
 
     def expire(self, now: float) -> None:
