@@ -78,10 +78,12 @@ MESSAGES: dict[Message, Cause] = {
         'it carries an STS.',
         'Harmless once in a while, when Src and Dst are right. Often: Timeout or Cmd_Timeout is '
         'too short for this PLC, or a gateway holds replies back. Another Dst than our Station: '
-        'a second master, or a station number that two devices have.'),
+        'a second master, a station number that two devices have, or, in Mode Peer, a gateway '
+        'that puts its own number into Dst: give Station that number.'),
     Message.ERR_RCVD_NAK_SYMBOL: Cause(
-        'A station answered a command with DLE NAK, which slaves of Allen-Bradley never do.',
-        'Is it set to full duplex, or is it another make? The command is repeated.'),
+        'A station answered a message with DLE NAK, which slaves of Allen-Bradley never do; in '
+        'Mode Peer it arrived damaged, or the PLC has no room.',
+        'Slaves: set to full duplex, or of another make? The message is repeated.'),
     Message.NTC_RCVD_MSG_TOO_LONG: Cause(
         'More bytes than a message can have came without an end: noise, or a lost DLE ETX.',
         'As for 2506; also check Data_Bits and Parity.'),
@@ -183,7 +185,7 @@ COUNTERS: dict[str, str] = {
     'crc_errors': 'See 2506.',
     'stale_messages': 'See 2510.',
     'duplicate_messages': 'See 2524.',
-    'invalid_messages': 'See 2505, 2512, 2513 and 2518.',
+    'invalid_messages': 'See 2505, 2510, 2512, 2513 and 2518.',
     'read_errors': 'The adapter was unplugged, or the device server has closed the connection. '
                    'The port is opened again by itself.',
     'chars_sent': 'Stays the same: the port is closed, or there is nothing to send.',

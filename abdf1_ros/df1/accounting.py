@@ -54,13 +54,18 @@ def wrong_message(packet: Packet, station: int) -> Event:
 
 
 class Accounting:
-    """The accounts of one link: its counters, the records of stations, what it reports."""
+    """
+    The accounts of one link: its counters, the records of stations, what it reports.
+
+    ``number`` is our own, None where messages to any number are ours.
+    """
 
     def __init__(self, counters: Counters, stations: ActiveStationList,
-                 report: ReportEvent) -> None:
+                 report: ReportEvent, number: int | None) -> None:
         self.counters = counters
         self.report = report
         self._stations = stations
+        self._number = number
 
     def note(self, message: Message, *args: int, station: int | None) -> None:
         """Report a numbered error or notice at a station."""
@@ -82,10 +87,22 @@ class Accounting:
         else:
             self.counters.commands_received += 1
 
-    def stale(self, reply: Packet) -> None:
-        """Count and report a reply that no command waits for."""
-        self.counters.stale_messages += 1
+    def unexpected(self, reply: Packet) -> None:
+        """
+        Count and report a reply that no command waits for (S0, message 2510).
+
+        It is stale (S0, counter 2548) where it may answer one of before, and otherwise invalid
+        (2550, "incorrect addressing"): not for us, or of a station that we do not ask.
+        """
+        may_answer = self._number in (None, reply.dst) and reply.src in self._stations
+        self.counters.stale_messages += may_answer
+        self.counters.invalid_messages += not may_answer
         self.report(wrong_message(reply, reply.src))
+
+    def nak_received(self, station: int | None) -> None:
+        """Report that a message of ours has been answered with DLE NAK."""
+        self.note(Message.NTC_RCVD_NAK_SYMBOL, station=station)
+        self.note(Message.ERR_RCVD_NAK_SYMBOL, station=station)
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """

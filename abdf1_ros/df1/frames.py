@@ -268,6 +268,15 @@ class FrameDecoder:
         self.noise += len(self.waiting) + len(data)
         self.waiting.clear()
 
+    def broken_off(self) -> Frame:
+        """Return the message that is coming in as what it is if nothing follows."""
+        data = bytes(self.link_data)
+        if self._step != self._check:
+            return Frame(data, self._station, FrameFault.NO_ETX)
+        return Frame(data, self._station, FrameFault.BAD_CHECK,
+                     int.from_bytes(self.waiting, 'little'),
+                     self._checksum.of_message(data, self._station))
+
     def next_symbol(self) -> Symbol | None:
         """Return the next whole symbol, or None when more bytes are needed."""
         while self.waiting:

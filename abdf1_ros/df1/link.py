@@ -114,13 +114,13 @@ class EqualNode:
 
     def __init__(self, machine: Machine, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],
-                 report: Callable[[Event], None]) -> None:
+                 report: Callable[[Event], None], number: int | None) -> None:
         self._machine = machine
         self._counters = machine.counters
         self._stations = stations
         self._serve = serve
         self._report = report
-        self._accounting = Accounting(machine.counters, stations, report)
+        self._accounting = Accounting(machine.counters, stations, report, number)
         self._note = self._accounting.note
 
     def status(self) -> LinkStatus:
@@ -128,7 +128,8 @@ class EqualNode:
         return NO_STATUS
 
     def _count_symbol(self, symbol: Heard) -> None:
-        """Count DLE ACK, NAK and ENQ."""
+        """Count DLE ACK, NAK, EOT and ENQ."""
         self._counters.acks_received += symbol is Control.ACK
         self._counters.naks_received += symbol is Control.NAK
+        self._counters.eots_received += symbol is Control.EOT
         self._counters.enqs_received += symbol is Control.ENQ

@@ -72,7 +72,7 @@ class HalfDuplexMaster:
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source``, one after the other, for ever."""
-        self._line.forwards.clear()
+        self._line.begin()
         while True:
             # In turns, or slaves that send all the time would keep our own commands from the line.
             if self._line.forwards:
@@ -123,7 +123,7 @@ class HalfDuplexMaster:
             station.overdue += 1
             return
         station.overdue = 0
-        self._line.take_unwanted(command.dst, reply)
+        self._line.take_unwanted(reply)
 
     def _collect(self, number: int, command: Packet, started: float,
                  reply_size: int = 0) -> Generator[Step, Heard, Packet]:
@@ -137,7 +137,7 @@ class HalfDuplexMaster:
             if packet is not None and self._line.answers(packet, command):
                 return packet
             if packet is not None:
-                self._line.take_unwanted(number, packet)
+                self._line.take_unwanted(packet)
             pause = self._settings.poll_pause
             passed_over += isinstance(answer, Frame)
             may_be_next = isinstance(answer, Frame) and passed_over <= MOST_QUEUED

@@ -66,9 +66,8 @@ BROADCAST_PAUSE = 0.05
 # Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
 MAX_FORWARDS = 16
 
-# The limit with the replies among them, which are always acknowledged. Only a slave that sends
-# replies to no command can exceed it; those are dropped.
-MAX_KEPT = 2 * MAX_FORWARDS
+# Commands passed on whose replies may still come; of more, the oldest have been waiting longest.
+_MOST_PASSED_ON = 2 * MAX_FORWARDS
 
 # Messages that a slave may have queued before the reply to our command. They are taken even when
 # the time of the command is up. Otherwise, on a slow line, each reply would stay queued after an
@@ -127,13 +126,19 @@ class MasterLine:
         self.stations = stations
         # Takes a reply that came too late for its poll; returns whether a command waited for it.
         self.take_reply: Callable[[int, Packet], bool] = lambda number, reply: False
-        self.accounting = Accounting(machine.counters, stations, report)
+        self.accounting = Accounting(machine.counters, stations, report, settings.station)
         self.note = self.accounting.note
         self._report = report
         self._serve = serve
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was to be passed on."""
         self.forwards: deque[Packet] = deque()
+        # Commands between slaves, whose replies are passed on as well.
+        self._passed_on: deque[Packet] = deque(maxlen=_MOST_PASSED_ON)
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf,
                 reflex: Reflex | None = None) -> Generator[Step, Heard, float]:
@@ -174,8 +179,7 @@ class MasterLine:
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
         """Note why something has to be sent again, at worst what was ``expected``; return it."""
         if answer is Control.NAK:
-            self.note(Message.NTC_RCVD_NAK_SYMBOL, station=number)
-            self.note(Message.ERR_RCVD_NAK_SYMBOL, station=number)
+            self.accounting.nak_received(number)
             return Message.ERR_RCVD_NAK_SYMBOL
         if isinstance(answer, Frame) and answer.fault is not None:
             return self._note_fault(answer, number)
@@ -194,7 +198,7 @@ class MasterLine:
         if isinstance(answer, Frame):
             packet = yield from self.receive(number, answer)
             if packet is not None:
-                self.take_unwanted(number, packet)
+                self.take_unwanted(packet)
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
         """Poll an inactive station; report whatever was heard that is not a good answer."""
@@ -262,7 +266,7 @@ class MasterLine:
                 if not symbol.is_misplaced:
                     self.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=number)
         if symbol.is_broken_off:
-            return Frame(b'', fault=FrameFault.NO_ETX)
+            return self.machine.decoder.broken_off()
         self._last_code = self._last_code or symbol.last_byte
         return symbol
 
@@ -305,7 +309,7 @@ class MasterLine:
         if packet.is_reply and packet.dst == self.settings.station and station.accepts(packet):
             self.accounting.received(packet)
             if not self.take_reply(packet.src, packet):
-                self.take_unwanted(packet.src, packet)
+                self.take_unwanted(packet)
         return True
 
     def _speaks_for(self, number: int, src: int) -> bool:
@@ -359,25 +363,28 @@ class MasterLine:
             self.stations.heard(reply.src, self.machine.now)  # others were, when it came
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 
-    def take_unwanted(self, number: int, packet: Packet) -> None:
+    def take_unwanted(self, packet: Packet) -> None:
         """
         Take a message that answers nothing of ours (S0, DispatchAbDf1Message).
 
-        It is served, kept to be passed on, or dropped and counted.
+        It is served, kept to be passed on, or dropped and counted: a reply to another node, too,
+        that answers no command which we have passed on. Its DST is damaged, or nobody waits.
         """
         is_ours = packet.dst == self.settings.station
-        is_kept = self.settings.accept_slave_messages and len(self.forwards) < MAX_KEPT
-        if is_kept and not is_ours:
+        is_kept = self.settings.accept_slave_messages
+        command = next((command for command in self._passed_on if packet.answers(command)), None)
+        if is_kept and command is not None:
+            self._passed_on.remove(command)
             self.forwards.append(packet)
-            return
-        if is_kept and not packet.is_reply and self._serve is not None:
+        elif packet.is_reply:
+            self.accounting.unexpected(packet)
+        elif is_kept and not is_ours:
+            self.forwards.append(packet)
+        elif is_kept and self._serve is not None:
             self.forwards.append(self._serve(packet))
-            return
-        if packet.is_reply and is_ours:
-            self.counters.stale_messages += 1
         else:
             self.counters.invalid_messages += not is_ours
-        self._report(wrong_message(packet, number))
+            self._report(wrong_message(packet, packet.src))
 
     def forward(self, busy: Container[int] = (),
                 collect: Callable[[int, Packet], Procedure] | None = None
@@ -395,6 +402,8 @@ class MasterLine:
         if not self.stations.admits_message(packet.dst, self.machine.now):
             self._refuse(packet)
             return None
+        if not packet.is_reply and number != BROADCAST:
+            self._passed_on.append(packet)
         with self._probe_of(packet.dst):
             try:
                 if number != BROADCAST and not self.stations[number].active:

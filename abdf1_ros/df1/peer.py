@@ -142,7 +142,7 @@ class FullDuplexPeer(EqualNode):
     def __init__(self, machine: Machine, settings: PeerSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None) -> None:
-        super().__init__(machine, stations, serve, report)
+        super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._forget()
@@ -235,7 +235,7 @@ class FullDuplexPeer(EqualNode):
                 break
             if response is Code.NAK:
                 naks += 1
-                self._note(Message.NTC_RCVD_NAK_SYMBOL, station=packet.dst)
+                self._accounting.nak_received(packet.dst)
                 if is_probe or not self._may_repeat(naks, packet.dst):
                     break
                 if naks > 1:
@@ -352,8 +352,8 @@ class FullDuplexPeer(EqualNode):
             self._expect_repetition()
             self._count_symbol(symbol)
             return self._respond(self._last_response)
+        self._count_symbol(symbol)
         if symbol is Control.ACK or symbol is Control.NAK:
-            self._count_symbol(symbol)
             return b''
         self._last_response = frames.NAK
         if isinstance(symbol, Unknown) and not symbol.is_misplaced:
@@ -404,10 +404,12 @@ class FullDuplexPeer(EqualNode):
         """Give a reply to its command, if that still waits."""
         self._expire()
         self._accounting.received(packet)
-        entry = self._outstanding.pop((packet.src, packet.tns), None)
-        if entry is None:
-            self._accounting.stale(packet)
+        key = packet.src, packet.tns
+        entry = self._outstanding.get(key)
+        if entry is None or not packet.answers(entry.task.command):
+            self._accounting.unexpected(packet)
             return
+        del self._outstanding[key]
         self._stations.heard(packet.src, self._machine.now)
         self._accounting.complete(entry.task, packet, keeps_others_waiting=True)
 

@@ -163,7 +163,7 @@ class StandardPollingMaster:
 
     def run(self, source: TaskSource) -> Procedure:
         """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
-        self._line.forwards.clear()
+        self._line.begin()
         self._outstanding.clear()
         self._given.clear()
         self._unproven.clear()
@@ -274,7 +274,7 @@ class StandardPollingMaster:
         if packet is not None and self._take_reply(number, packet):
             return
         if packet is not None:
-            self._line.take_unwanted(number, packet)
+            self._line.take_unwanted(packet)
         for station, entry in self._waiting_for(number):
             if self._is_over(entry, isinstance(answer, Frame)):
                 self._overdue(station)

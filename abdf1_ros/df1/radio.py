@@ -182,7 +182,7 @@ class RadioNode(EqualNode):
                  serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None,
                  random: Random | None = None) -> None:
-        super().__init__(machine, stations, serve, report)
+        super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
         self._random = random or Random()
         self._forget()
@@ -253,6 +253,9 @@ class RadioNode(EqualNode):
         if command.tries == command.most:
             del self._under_way[number]
             self._accounting.late(number, keeps_others_waiting=True)
+            if self._stations[number].active:  # not after the one try of a probe
+                self._counters.nak_limit_exceeded += 1
+                self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.retries, station=number)
             self._stations.lost(number, self._machine.now)
             self._note(Message.ERR_INACTIVE_STATION, number, station=number)
             task.fail(StationInactive(number))
@@ -395,7 +398,7 @@ class RadioNode(EqualNode):
                 self._counters.duplicate_messages += 1
             else:
                 self._accounting.received(packet)
-                self._accounting.stale(packet)
+                self._accounting.unexpected(packet)
             return
         del self._under_way[packet.src]
         self._accounting.received(packet)

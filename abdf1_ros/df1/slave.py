@@ -138,6 +138,8 @@ class HalfDuplexSlave:
             self._report(Event(Message.NTC_RCVD_NAK_SYMBOL))
             self._release(LineReset())
             self._queue.clear()  # the reset of the whole line (M 2-7, 3-11)
+        elif symbol is Control.EOT:
+            self.counters.eots_received += 1
         elif isinstance(symbol, Unknown) and not symbol.is_misplaced:
             self._report(Event(Message.NTC_INVALID_SYMBOL, (symbol.byte,)))
         return b''

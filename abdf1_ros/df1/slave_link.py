@@ -53,7 +53,7 @@ class SlaveLink:
         self._stations = stations
         self._cmd_timeout = cmd_timeout
         self._poll_timeout = poll_timeout
-        self._accounting = Accounting(machine.counters, stations, report)
+        self._accounting = Accounting(machine.counters, stations, report, settings.station)
         self._slave = HalfDuplexSlave(settings, serve, machine.counters, self, report)
         self._source: TaskSource | None = None
         self._outstanding: Outstanding | None = None
@@ -142,7 +142,7 @@ class SlaveLink:
         """Take a reply; one that fits nothing is stale."""
         entry = self._outstanding
         if entry is None or not reply.answers(entry.task.command):
-            self._accounting.stale(reply)
+            self._accounting.unexpected(reply)
             return
         self._outstanding = None
         if not is_local_status(reply.sts):

@@ -589,6 +589,21 @@ def test_message_without_etx_ends_by_a_pause() -> None:
     assert script.counts()['invalid_messages'] == 1
 
 
+@pytest.mark.parametrize(('checksum', 'number', 'counter'), [
+    (Checksum.CRC, 2506, 'crc_errors'), (Checksum.BCC, 2507, 'bcc_errors')])
+def test_message_without_the_end_of_its_check_has_a_wrong_check(
+        checksum: Checksum, number: int, counter: str) -> None:
+    whole = message_frame(REPLY.encode(), checksum)
+    received = whole[-2] if checksum is Checksum.CRC else 0
+    expected = divmod(checksum.of_message(REPLY.encode()), 256)
+    script = MasterScript(replace(SETTINGS, checksum=checksum))
+    sent = Expect(master_frame(SLAVE, COMMAND.encode(), checksum))
+    assert script.run(COMMAND, sent, SAYS_ACK, POLLED, Answer(whole[:-1], 0.1), Silence(0.4),
+                      POLLED, Answer(whole, 0.1), ACKED) == REPLY
+    assert script.numbers()[:2] == [(number, 0, received, *expected), (2522, 1, number)]
+    assert script.counts()[counter] == 1  # S0, messages 2506 and 2507, not 2518
+
+
 def test_message_without_etx_ends_by_another_symbol() -> None:
     script = MasterScript(SETTINGS)
     broken = Answer(frame(REPLY)[:-4] + EOT)

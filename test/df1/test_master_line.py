@@ -19,7 +19,7 @@ import itertools
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import master_frame, Poll, STX, Symbol
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS, MAX_KEPT
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.slave import multidrop
@@ -367,20 +367,29 @@ def test_message_to_pass_on_is_dropped_with_the_line() -> None:
     assert rig[7].heard == []
 
 
-def test_replies_to_nothing_are_not_kept_without_end() -> None:
-    settings = replace(SETTINGS, nak_on_command_timeout=False, cmd_timeout=4.0)
-    rig = bench(False, 7, 8, dead=(8,), settings=settings)
-    for tns in range(200):
-        rig[7].outbox.append(Packet(8, 7, 0x4F, 0, tns))
+@BOTH
+def test_reply_for_a_node_that_has_asked_nothing_is_not_passed_on(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    reply = Packet(8, 7, 0x4F, 0, 0x0102)  # S0, counter 2550: incorrect addressing
+    rig[7].outbox.append(reply)
     rig.start()
-    # The reply that the master polls for never comes, by taking away the turn of replies.
-    rig[7].slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
-    rig.ask(7, run=3.9)
-    received = rig.master.counts()['replies_received']
-    assert received > MAX_KEPT
-    assert len(rig.master.link._line.forwards) == MAX_KEPT
-    assert rig.master.counts()['invalid_messages'] == received - MAX_KEPT
-    assert (2510, 7, 8, MAX_KEPT) in rig.master.numbers()
+    poll(rig, 7, 8)
+    assert rig[8].heard == []
+    assert rig.master.counts()['invalid_messages'] == 1
+    assert (2510, 7, 8, 0x0102) in rig.master.numbers()
+
+
+@BOTH
+def test_reply_is_passed_on_once(standard: bool) -> None:
+    rig = bench(standard, 7, 8)
+    command = rig.message(7, 8)
+    rig.start()
+    poll(rig, 7, 8)
+    assert rig[7].heard == [command.reply()]
+    rig[8].outbox.append(command.reply())
+    poll(rig, 7, 8)
+    assert rig[7].heard == [command.reply()]
+    assert rig.master.counts()['invalid_messages'] == 1
 
 
 class Endless:

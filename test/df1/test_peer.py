@@ -153,7 +153,8 @@ def test_nak_is_answered_by_the_message_until_the_limit(retries: int) -> None:
     assert task.sent
     assert peer.numbers() == [
         *(entry for count in range(1, retries + 1)
-          for entry in ((2517,), (2521, count, 2511))), (2517,), (2519, retries), (2509, 1)]
+          for entry in ((2517,), (2511,), (2521, count, 2511))),
+        (2517,), (2511,), (2519, retries), (2509, 1)]
     assert peer.counts() == {name: count for name, count in {
         'messages_sent': 1 + retries, 'commands_sent': 1, 'naks_received': 1 + retries,
         'nak_retries': retries, 'nak_limit_exceeded': 1}.items() if count}
@@ -976,6 +977,7 @@ def test_other_control_between_messages_is_passed_over(control: bytes) -> None:
     peer = bench()
     assert peer.hear_packet(REPLY) == ACK
     assert peer.hear(control) == b''
+    assert peer.counts().get('eots_received', 0) == (control == EOT)  # S0, counter 2538
     assert peer.hear(ENQ) == NAK
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(OUR_REPLY)
 
@@ -1054,7 +1056,7 @@ def test_messages_of_the_vectors_get_their_response_and_commands_are_served(
         assert (answer, peer.served) == (NAK, [])
     elif entry.packet.is_reply:
         assert (answer, peer.served) == (ACK, [])
-        assert peer.counts()['stale_messages'] == 1
+        assert peer.counts()['invalid_messages'] == 1  # of nobody that we have asked
     else:
         assert peer.served == [entry.packet]
         assert answer == ACK + peer.frame(entry.packet.reply())
@@ -1149,21 +1151,29 @@ def test_reply_of_the_last_moment() -> None:
     answer(peer, task)
 
 
-@pytest.mark.parametrize('other', [
-    REPLY._replace(tns=REPLY.tns ^ 0x0100), REPLY._replace(src=2),
-    REPLY._replace(tns=REPLY.tns ^ 1, cmd=0x46)])
-def test_reply_of_another_transaction_or_station_is_stale(other: Packet) -> None:
+@pytest.mark.parametrize(('other', 'counter'), [
+    (REPLY._replace(tns=REPLY.tns ^ 0x0100), 'stale_messages'),
+    (REPLY._replace(tns=REPLY.tns ^ 1, cmd=0x46), 'stale_messages'),
+    (REPLY._replace(src=2), 'invalid_messages')])  # S0, counter 2550: incorrect addressing
+def test_reply_of_another_transaction_or_station_is_dropped(other: Packet, counter: str) -> None:
     peer, task = acknowledged()
     assert peer.hear_packet(other) == ACK
     assert task.result is None
-    assert peer.counts()['stale_messages'] == 1
+    assert peer.numbers() == [(2510, other.src, other.dst, other.tns)]
+    counts = peer.counts()
+    assert counts[counter] == counts.get('stale_messages', 0) + counts.get('invalid_messages', 0)
     answer(peer, task)
 
 
-def test_reply_to_any_dst_counts() -> None:
-    peer, task = acknowledged()
-    assert peer.hear_packet(REPLY._replace(dst=0)) == ACK
-    assert task.result == REPLY._replace(dst=0)
+def test_reply_for_another_node_is_dropped() -> None:
+    peer = PeerBench(PeerSettings(station=COMMAND.src, cmd_timeout=CMD_TIMEOUT))
+    task = peer.begin(COMMAND)
+    assert peer.said() == peer.frame(COMMAND)
+    assert peer.hear(ACK, peer.frame(REPLY._replace(dst=0))) == ACK
+    assert peer.numbers() == [(2510, 1, 0, REPLY.tns)]
+    assert peer.counts()['invalid_messages'] == 1  # S0, counter 2550: incorrect addressing
+    peer.wait(CMD_TIMEOUT)
+    assert isinstance(task.result, CommandTimeout)
 
 
 def test_reply_with_another_command_code() -> None:

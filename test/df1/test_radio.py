@@ -129,10 +129,13 @@ def test_command_without_reply_is_repeated_as_it_is_until_the_limit(retries: int
     assert bench.wait(30.0) == [framed(COMMAND)] * (retries + 1)
     assert isinstance(task.result, StationInactive)
     assert not bench.stations[PLC].active
-    assert bench.numbers() == [*[2521] * retries, 2508, 2509]
+    assert bench.numbers() == [*[2521] * retries, 2508, 2519, 2509]
     again = bench.begin(COMMAND._replace(tns=7))
     assert len(bench.wait(30.0)) == 1  # one try for a silent station
     assert isinstance(again.result, StationInactive)
+    counters = bench.machine.counters
+    # S0, counters 2541 and 2542: "message retries ... due to ... other communications error".
+    assert (counters.nak_retries, counters.nak_limit_exceeded) == (retries, 1)
 
 
 def test_commands_to_other_stations_go_out_meanwhile_where_radios_avoid_collisions() -> None:

@@ -227,20 +227,30 @@ def test_reply_with_a_wrong_command_code() -> None:
     assert bench.counts()['invalid_messages'] == 1
 
 
-@pytest.mark.parametrize('reply', [
-    own(2).reply(), own().reply()._replace(src=9), own().reply()._replace(dst=9)])
-def test_reply_that_fits_nothing_is_stale(reply: Packet) -> None:
+@pytest.mark.parametrize(('reply', 'counter'), [
+    (own(2).reply(), 'stale_messages'),
+    (own().reply()._replace(src=9), 'invalid_messages'),  # S0, counter 2550
+    (own().reply()._replace(dst=9), 'invalid_messages')])
+def test_reply_that_fits_nothing_is_dropped(reply: Packet, counter: str) -> None:
     bench, task = acknowledged()
+    bench.stations.add((OTHER,))
     assert bench.hear(bench.frame(reply)) == ACK
     assert task.result is None
     assert bench.numbers() == [(2510, reply.src, reply.dst, reply.tns)]
-    assert bench.counts()['stale_messages'] == 1
+    assert bench.counts()[counter] == 1
 
 
 def test_reply_without_any_command_is_stale() -> None:
     bench = SlaveBench(SETTINGS)
+    bench.stations.add((OTHER,))
     assert bench.hear(bench.frame(own().reply())) == ACK
     assert bench.counts()['stale_messages'] == 1
+
+
+def test_eot_of_other_stations_is_counted() -> None:
+    bench = SlaveBench(SETTINGS)
+    assert bench.hear(EOT, EOT) == b''
+    assert bench.counts() == {'eots_received': 2}  # S0, counter 2538
 
 
 def test_repeated_reply_is_acknowledged_and_passed_over() -> None:
