@@ -21,17 +21,25 @@ A blocking client, without ROS: read and write a PLC from any program.
         plc.read('N7:0', 10)
         plc.write('B3:0/1', True)
 
-docs/library.md has more. Errors are those of ``abdf1_ros.errors``.
+    with Client.from_files('net.csv', 'map.csv') as plant:
+        plant.read('line_speed')
+
+docs/library.md has more. Times are seconds, as in Python's own modules (the files have
+milliseconds). Errors are those of ``abdf1_ros.errors``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from enum import Enum
+import math
+from numbers import Real
+import os
 import random
+from traceback import print_exception
 from types import TracebackType
-from typing import overload, Self, TypeVar
+from typing import Any, overload, Self, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
@@ -48,20 +56,27 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.steps import AddressedValues
-from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.pccc.values import Values, ValueType, WordOrder
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.text import shown
 
-# While waiting, check so often (s) that the port is still open.
-_GLANCE = 0.2
+if TYPE_CHECKING:
+    from abdf1_ros.tagged_client import TaggedClient
 
+_GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
 _MODES = {'full': 'Peer', 'half': 'Master'}
-_PARITIES = ('None', 'Even', 'Odd')
+_PARITIES = {name: name for name in ('None', 'Even', 'Odd')}
+_LONGEST = 60.0  # s
 
 _Result = TypeVar('_Result')
+_Kind = TypeVar('_Kind')
 _Choice = TypeVar('_Choice', bound=Enum)
+
+_ours: set[str] = set()  # the lines that this program has open
 
 
 def opened(settings: PortSettings) -> Callable[[], Port]:
@@ -73,6 +88,8 @@ def opened(settings: PortSettings) -> Callable[[], Port]:
     try:
         ports = [open_port(settings)]
     except OSError as error:
+        if line_of(settings.name) in _ours:
+            error.strerror = 'this program has it open already; is a close() missing?'
         error.filename = error.filename or settings.name
         raise
     return lambda: ports.pop() if ports else open_port(settings)
@@ -89,11 +106,12 @@ class OpenLine:
     def __init__(self, line: LinkSettings, port: PortSettings, absent: Sequence[int] = (),
                  routes: Mapping[int, int] | None = None,
                  plc_type: PlcType = PlcType.PLC5) -> None:
-        self._lost: str | None = None
         self._requests = Requests(line, absent, random.randrange(0x10000), routes, plc_type)
         self._link = LinkThread(
-            self._requests.machine, opened(port), on_state=self._port_changed)
+            self._requests.machine, opened(port), on_fault=print_exception)
         self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nobody to stop it
+        self._line = line_of(port.name)
+        _ours.add(self._line)
         self._link.start()
 
     def __enter__(self) -> Self:
@@ -126,26 +144,24 @@ class OpenLine:
               future: Future[_Result] | None = None) -> Future[_Result]:
         """Begin to carry out a request; ``future`` is where its result goes."""
         future = future or Future()
+        future.set_running_or_notify_cancel()  # nobody can call it off any more
         self._requests.add(station, work, future.set_result, future.set_exception)
         self._link.wake()
         return future
 
     def wait(self, future: Future[_Result]) -> _Result:
         """Return the result of a request; raises what it raises, PortLost at the latest."""
-        while True:
-            try:
-                return future.result(_GLANCE)
-            except TimeoutError:
-                if self._lost is not None and not future.done():
-                    raise PortLost(self._lost) from None
+        while not future.done() and self._link.is_alive():
+            wait([future], _GLANCE)
+        if not future.done():
+            raise PortLost(self._link.state.text)
+        return future.result()
 
     def close(self) -> None:
         """End what is under way and close the port; every request has ended after this."""
         self._link.stop()
-
-    def _port_changed(self, state: PortState) -> None:
-        if not state.is_open:
-            self._lost = state.text
+        self._requests.close()
+        _ours.discard(self._line)
 
 
 class Client(OpenLine):
@@ -158,31 +174,39 @@ class Client(OpenLine):
     asked what it is. ``timeout`` and ``cmd_timeout`` are seconds: for each answer, and for a
     reply. All calls block, may come from any thread, and raise RemoteError where the PLC refuses,
     LinkError where it does not answer (``sent`` tells whether it may have executed the command),
-    and FormatError for what is wrong in the call.
+    and FormatError for what is wrong in the call, before anything is sent.
     """
 
-    def __init__(self, port: str, *, plc_type: str | None = None, station: int = 1,
-                 duplex: str = 'full', baud: int = 9600, parity: str = 'None', check: str = 'CRC',
-                 own_station: int = 0, processor: str | None = None, access: str | None = None,
-                 timeout: float = 1.0, cmd_timeout: float = 1.0) -> None:
-        self.station = _number('station', station)
-        self._access = None if access is None else _choice(Access, access)
+    def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,
+                 station: int = 1, duplex: str = 'full', baud: int = 9600, parity: str = 'None',
+                 check: str = 'CRC', own_station: int = 0, processor: str | None = None,
+                 access: str | None = None, timeout: float = 1.0,
+                 cmd_timeout: float = 1.0) -> None:
+        self.station = _whole('station', station, 0, MAX_STATION)
+        self._access = None if access is None else _member('access', Access, access)
         self._kinds: dict[int, tuple[PlcType, Processor | None]] = {}
         self._kind: tuple[PlcType, Processor | None] | None = None
         if plc_type is not None:
-            if (kind := PlcType(plc_type.upper())) not in FAMILIES:
-                raise FormatError(f'plc_type {plc_type} should be one of '
-                                  f'{", ".join(map(str, FAMILIES))}')
-            self._kind = kind, None if processor is None else _choice(Processor, processor)
+            kind = _choice('plc_type', {family.value: family for family in FAMILIES}, plc_type)
+            self._kind = kind, None if processor is None else _member(
+                'processor', Processor, processor)
         elif processor is not None:
             raise FormatError('processor needs plc_type; without both the PLC is asked')
-        if duplex not in _MODES or parity not in _PARITIES:
-            raise FormatError(f'duplex {duplex} should be full or half, parity {parity} one of '
-                              f'{", ".join(_PARITIES)}')
-        settings = PortSettings(port, baud, parity=parity)
+        settings = PortSettings(
+            text_of('port', port), _whole('baud', baud, 1),
+            parity=_choice('parity', _PARITIES, parity))
         super().__init__(LinkSettings(
-            _MODES[duplex], _number('own_station', own_station), _choice(Checksum, check),
-            LineTiming(settings.char_time), timeout=timeout, cmd_timeout=cmd_timeout), settings)
+            mode=_choice('duplex', _MODES, duplex), checksum=_member('check', Checksum, check),
+            station=_whole('own_station', own_station, 0, MAX_STATION),
+            timing=LineTiming(settings.char_time), timeout=_seconds('timeout', timeout),
+            cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings)
+
+    @staticmethod
+    def from_files(net_file: str | os.PathLike[str],
+                   map_file: str | os.PathLike[str]) -> TaggedClient:
+        """Return what reads and writes the rows of a map CSV by their tags."""
+        from abdf1_ros.tagged_client import TaggedClient  # a program without files does without
+        return TaggedClient(text_of('net_file', net_file), text_of('map_file', map_file))
 
     @overload
     def read(self, address: str, length: None = None, kind: str | None = None, *,
@@ -202,17 +226,13 @@ class Client(OpenLine):
         """
         number, target = self._target(
             address, 1 if length is None else length, kind, word_order, station)
-        values = self.ask(number, steps.read(target))
-        if isinstance(values, str):
-            return values
-        found = [*map(bool, values)] if target.codec.type is ValueType.BOOL else [*values]
-        return found[0] if length is None else found
+        found = plain(self.ask(number, steps.read(target)), target.codec.type)
+        return found[0] if length is None and not isinstance(found, str) else found
 
     def write(self, address: str, values: float | str | Sequence[float], kind: str | None = None,
               *, word_order: str = 'Low', station: int | None = None) -> None:
         """Write a value, or several from an address on; returns when the PLC has confirmed all."""
-        if not isinstance(values, str | Sequence):
-            values = [values]
+        values = values_of(values)
         is_packed = isinstance(values, str) and kind is not None
         length = (len(values) + 1) // 2 if is_packed else \
             1 if isinstance(values, str) else len(values)
@@ -224,15 +244,17 @@ class Client(OpenLine):
         return self.ask(self._of(station), steps.identify())
 
     def _of(self, station: int | None) -> int:
-        return self.station if station is None else _number('station', station)
+        return _whole('station', self.station if station is None else station, 0, MAX_STATION)
 
     def _target(self, address: str, length: int, kind: str | None, word_order: str,
                 station: int | None) -> tuple[int, AddressedValues]:
         number = self._of(station)
+        place, count = text_of('address', address), _whole('length', length)
+        chosen = None if kind is None else _member('kind', ValueType, kind)
+        order = _member('word_order', WordOrder, word_order)
         plc_type, processor = self._kind or self._asked(number)
-        return number, AddressedValues.of(
-            address, plc_type, length, None if kind is None else _choice(ValueType, kind),
-            word_order=_choice(WordOrder, word_order), access=self._access, processor=processor)
+        return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
+                                          access=self._access, processor=processor)
 
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return the family of a station, which is asked once."""
@@ -245,15 +267,57 @@ class Client(OpenLine):
         return self._kinds[station]
 
 
-def _number(name: str, station: int) -> int:
-    if not 0 <= station <= MAX_STATION:
-        raise FormatError(f'{name} {station} should be a number from 0 to {MAX_STATION}')
-    return station
+def plain(values: Values, kind: ValueType) -> list[float] | str:
+    """Return values as a program without arrays takes them."""
+    if isinstance(values, str):
+        return values
+    return [*map(bool, values)] if kind is ValueType.BOOL else [*values]
 
 
-def _choice(kinds: type[_Choice], text: str) -> _Choice:
-    """Return the member of an enum with this value, in any letter case."""
-    for member in kinds:
-        if str(member.value).lower() == text.lower():
-            return member
-    raise FormatError(f'{text} should be one of {", ".join(str(m.value) for m in kinds)}')
+def values_of(values: Any) -> Sequence[float] | str:
+    """Return what is to be written; arrays and numbers of numpy become Python's."""
+    found = values.tolist() if hasattr(values, 'tolist') else values
+    found = [found] if isinstance(found, Real) else found
+    if isinstance(found, str) or (
+            isinstance(found, Sequence) and not isinstance(found, bytes)
+            and all(isinstance(value, Real) for value in found)):
+        return found
+    raise FormatError(f'{shown(repr(values))} should be a number, several, or a text')
+
+
+def _whole(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> int:
+    number = value.__index__() if hasattr(value, '__index__') else None  # numpy's numbers too
+    if number is None or isinstance(value, bool) or not low <= number <= high:
+        bounds = f' from {low} to {high}' if high < math.inf else ''
+        raise FormatError(f'{name} {shown(repr(value))} should be a whole number{bounds}')
+    return int(number)
+
+
+def _seconds(name: str, value: Any) -> float:
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if is_number and 0.0 < value <= _LONGEST:
+        return float(value)
+    is_ms = is_number and _LONGEST < value <= 1000 * _LONGEST
+    hint = f'; {value / 1000:g} for {value:g} ms' if is_ms else ''
+    raise FormatError(f'{name} {shown(repr(value))} should be seconds above 0, up to '
+                      f'{_LONGEST:.0f}{hint}')
+
+
+def text_of(name: str, value: Any) -> str:
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    if not isinstance(value, str) or not value:
+        raise FormatError(f'{name} {shown(repr(value))} should be a text')
+    return value
+
+
+def _member(name: str, kinds: type[_Choice], value: Any) -> _Choice:
+    return _choice(name, {str(member.value): member for member in kinds}, value)
+
+
+def _choice(name: str, known: Mapping[str, _Kind], value: Any) -> _Kind:
+    """Return what is meant by a value, in any letter case."""
+    for text, meaning in known.items():
+        if isinstance(value, str) and text.lower() == value.lower():
+            return meaning
+    raise FormatError(f'{name} {shown(repr(value))} should be one of {", ".join(known)}')

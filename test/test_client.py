@@ -15,10 +15,13 @@
 """The blocking client on a line with simulated PLCs, and what it does without."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+import math
 from pathlib import Path
 import subprocess
 import sys
 import time
+from typing import Any
 
 from abdf1_ros.client import Client
 from abdf1_ros.counters import Counters
@@ -29,8 +32,10 @@ from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+import numpy
 import pytest
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
@@ -73,6 +78,9 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('B3:0/1') is True
         assert plc.read('B3:0/0', 3) == [False, True, False]
         assert plc.read('F8:0', 2) == [0.0, 1.5]
+        plc.write(address='N7:8', values=numpy.array([3, 4], numpy.int16))
+        plc.write('N7:10', numpy.float32(5.0))
+        assert plc.read('N7:8', numpy.int64(3)) == [3, 4, 5]
         assert plc.read('T4:1.PRE') == 500
         assert plc.read('T4:0.ACC', 4) == [0, 0, 500, 0]  # to T4:1.ACC, past a control word
         assert plc.read('ST9:0') == 'recipe 7'
@@ -117,20 +125,27 @@ def test_errors_are_those_of_the_bridge(port: str) -> None:
     ('N7:0', {'length': 300}, '300 elements do not fit at N7:0; .* N7:255'),
     ('N7:0', {'length': 0}, '0 elements do not fit'),
     ('F8:0', {'kind': 'int16'}, 'F8:0 can be float32'),
-    ('N7:0', {'kind': 'int'}, 'int should be one of bool, int16'),
+    ('N7:0', {'kind': 'int'}, "kind 'int' should be one of bool, int16"),
+    ('N7:0', {'kind': 7}, 'kind 7 should be one of'), (None, {}, 'address None should be a text'),
+    ('N7:0', {'length': 3.0}, '^length 3.0 should be a whole number$'),
+    ('N7:0', {'length': '3'}, "length '3' should be a whole number"),
+    ('N7:0', {'station': '1'}, "station '1' should be"),
+    ('N7:0', {'word_order': None}, 'word_order None should be one of Low, High'),
     ('T4:0.PRE', {'length': 2, 'kind': 'string'}, 'T4:0.PRE can be int16, uint16')])
 def test_what_is_wrong_in_a_call_is_told_before_anything_is_sent(
-        port: str, address: str, arguments: dict[str, int | str], text: str) -> None:
+        port: str, address: Any, arguments: dict[str, Any], text: str) -> None:
     with client(port, plc_type='SLC') as plc:
         with pytest.raises(FormatError, match=text):
-            plc.read(address, **arguments)  # type: ignore[call-overload]
+            plc.read(address, **arguments)
         assert plc.counters.chars_sent == 0
 
 
 @pytest.mark.parametrize(('address', 'values', 'text'), [
     ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),
-    ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string')])
-def test_what_must_not_be_written(port: str, address: str, values: int, text: str) -> None:
+    ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string'),
+    ('N7:0', None, 'None should be a number, several, or a text'), ('N7:0', [[1]], 'should be a'),
+    ('N7:0', {1: 2}, 'should be a'), ('N7:0', b'1', 'should be a'), ('N7:0', ['1'], 'should be')])
+def test_what_must_not_be_written(port: str, address: str, values: Any, text: str) -> None:
     with client(port, plc_type='SLC') as plc:
         with pytest.raises(FormatError, match=text):
             plc.write(address, values)
@@ -139,19 +154,108 @@ def test_what_must_not_be_written(port: str, address: str, values: int, text: st
 
 def test_arguments_of_the_line(tmp_path: Path) -> None:
     port = str(tmp_path / 'none')
-    with pytest.raises(FormatError, match='plc_type s7 should be one of PLC2, PLC3, PLC5, SLC'):
-        Client(port, plc_type='s7')
-    with pytest.raises(FormatError, match='duplex both should be full or half'):
-        Client(port, duplex='both')
-    for wrong, text in (({'station': 255}, 'station 255 should be a number from 0 to 254'),
-                        ({'own_station': -1}, 'own_station -1'), ({'parity': 'odd'}, 'parity odd'),
-                        ({'processor': '5/02'}, 'processor needs plc_type')):
+    for wrong, text in (
+            ({'plc_type': 's7'}, "plc_type 's7' should be one of PLC2, PLC3, PLC5, SLC"),
+            ({'plc_type': 5}, 'plc_type 5 should be one of'),
+            ({'duplex': 'both'}, "^duplex 'both' should be one of full, half$"),
+            ({'parity': 'mark'}, "^parity 'mark' should be one of None, Even, Odd$"),
+            ({'check': 'CRC16'}, "check 'CRC16' should be one of BCC, CRC"),
+            ({'station': 255}, 'station 255 should be a whole number from 0 to 254'),
+            ({'station': '1'}, "station '1' should be a whole number"),
+            ({'own_station': -1}, 'own_station -1'),
+            ({'baud': '19200'}, "baud '19200' should be a whole number"),
+            ({'baud': True}, 'baud True'), ({'baud': 0}, 'baud 0'),
+            ({'timeout': 300}, 'timeout 300 should be seconds above 0, up to 60; 0.3 for 300 ms'),
+            ({'cmd_timeout': '1'}, "cmd_timeout '1' should be seconds above 0, up to 60$"),
+            ({'timeout': 0}, 'timeout 0 '), ({'timeout': math.nan}, 'timeout nan'),
+            ({'processor': '5/02'}, 'processor needs plc_type')):
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
-    with pytest.raises(FormatError, match='CRC16 should be one of BCC, CRC'):
-        Client(port, check='CRC16')
+    with pytest.raises(FormatError, match='port None should be a text'):
+        Client(None)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):
-        Client(port)
+        Client(Path(port), parity='odd', timeout=60)
+
+
+def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
+    with client(port, plc_type='SLC') as plc, \
+            pytest.raises(OSError, match=r'this program has it open already; is a close\(\) mis'):
+        client(port)
+    for _ in range(2):  # a call after the end ends at once
+        with pytest.raises(LinkError, match='port lost: closed by this program') as error:
+            plc.read('N7:0')
+        assert not error.value.sent
+        plc.close()
+    with client(port, plc_type='SLC') as plc:
+        assert plc.read('N7:0') == 0
+
+
+def test_line_that_comes_back_is_used_again(tmp_path: Path,
+                                            plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+    name = tmp_path / 'line'
+    with ExitStack() as first:
+        port = first.enter_context(plc_line(name, *plcs))
+        here = client(port, plc_type='SLC')
+        with here:
+            here.write('N7:0', 5)
+            first.close()
+            with pytest.raises(LinkError):
+                here.read('N7:0')
+            with plc_line(name, *plcs):
+                end = time.monotonic() + PATIENCE
+                while time.monotonic() < end:
+                    with suppress(LinkError):
+                        assert here.read('N7:0') == 5
+                        return
+                    time.sleep(0.05)
+    raise AssertionError('the line did not come back')
+
+
+MAP = """\
+Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max
+speed,ReadWrite,N7:0,1,SLC,1,0.1,0,50
+doors,Read,B3:0/0,1,SLC,3,,,
+recipe,Write,N7:10,2,PLC5,2,,,
+name,ReadWrite,ST9:0,1,SLC,,,,
+all,Write,N7:20,255,PLC5,1,,,
+alive,Heartbeat,N7:21,1,SLC,1,,,
+"""
+
+
+def files(folder: Path, port: str, rows: str = MAP, more: str = '') -> tuple[Path, Path]:
+    net, rows_file = folder / 'net.csv', folder / 'map.csv'
+    net.write_text(f'Com_Port,Baud,Mode\n{port},115200,{more or "Master"}\n', encoding='utf-8')
+    rows_file.write_text(rows, encoding='utf-8')
+    return net, rows_file
+
+
+def test_rows_of_a_map_are_read_and_written_by_their_tags(
+        port: str, tmp_path: Path, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+    with Client.from_files(*files(tmp_path, port)) as plant:
+        assert list(plant.rows) == ['speed', 'doors', 'recipe', 'name']
+        plant.write('speed', 12.34)
+        assert stored(plcs[0], 'N7:0') == (123).to_bytes(2, 'little')
+        assert plant.read('speed') == pytest.approx(12.3)
+        plant.write('recipe', (1, 2))
+        assert stored(plcs[1], 'N7:11') == b'\2\0'
+        plant.write('name', 'left')
+        assert (plant.read('name'), plant.read('doors')) == ('left', [False] * 3)
+        for call, text in (
+                (lambda: plant.write('speed', 51), 'value 51 at index 0 is outside Min 0, Max 50'),
+                (lambda: plant.read('recipe'), "'recipe' should be .* that is read: speed, doors"),
+                (lambda: plant.write('doors', [1, 1, 1]), 'that is written: speed, recipe, name'),
+                (lambda: plant.read('N7:0'), "tag 'N7:0' should be that of a row")):
+            with pytest.raises(FormatError, match=text):
+                call()
+
+
+def test_faults_of_the_files_are_told_before_the_port_is_opened(tmp_path: Path) -> None:
+    rows = MAP + 'bad,Read,N7:x,1,SLC,1,,,\nours,Read,N7:30,5,SLC,1,,,\n'
+    with pytest.raises(ConfigurationError) as error:
+        Client.from_files(*files(tmp_path, '/dev/none', rows))
+    assert [problem.place.line for problem in error.value.problems] == [8, 9]
+    with pytest.raises(FormatError, match='Mode Slave: a client asks'):
+        Client.from_files(*files(tmp_path, '/dev/none', more='Slave'))
 
 
 @pytest.fixture

@@ -21,6 +21,7 @@ They use the same links, with the same rules, as the driver.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
@@ -31,7 +32,7 @@ from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
-from abdf1_ros.errors import Abdf1Error, LinkError, PortLost
+from abdf1_ros.errors import LinkError, PortLost
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
@@ -47,18 +48,18 @@ class _RequestJob(Job):
                  fail: Callable[[Exception], None]) -> None:
         self.station = station
         self._work, self._succeed, self.fail = work, succeed, fail
-        self._result: Any = None
 
     def steps(self, now: float) -> Steps[None]:
-        """Carry out the request."""
-        self._result = yield from self._work
+        """Carry out the request and report its end; a bug in it ends no other request."""
+        try:
+            result = yield from self._work
+        except Exception as error:
+            self.fail(error)
+        else:
+            self._succeed(result)
 
     def ended(self, error: Exception | None) -> None:
-        """Report the end."""
-        if error is None:
-            self._succeed(self._result)
-        elif isinstance(error, Abdf1Error):
-            self.fail(error)
+        """Do nothing: the steps have reported it."""
 
 
 class Requests:
@@ -81,6 +82,7 @@ class Requests:
         self.machine = make_machine(line, self._run, self.counters)
         self._tasks = JobTasks(line.station, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
+        self._lost: LinkError = PortLost('not opened yet')
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = make_link(line, DriverSettings(nak_on_command_timeout=False),
                                self.machine, self.stations, Server(DataTable(plc_type)).serve,
@@ -91,17 +93,26 @@ class Requests:
         """
         Ask for ``work`` with a station; may be called from any thread, then wake the link.
 
-        Exactly one of ``succeed`` and ``fail`` is called, in the link thread.
+        Exactly one of ``succeed`` and ``fail`` is called, in the link thread; ``fail`` at once
+        while the port is lost, and after ``close``.
         """
-        self._waiting.put(_RequestJob(station, work, succeed, fail))
+        request = _RequestJob(station, work, succeed, fail)
+        if not self._waiting.put(request):
+            _refuse(request, self._lost)
+
+    def close(self) -> None:
+        """Refuse what waits, and all that comes; to be called when the link has ended."""
+        self._end(PortLost('closed by this program'))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the next command of the request under way, or the first of the next one."""
         under_way = self._tasks.first(busy)
         if under_way is not None:
             return self._tasks.take(under_way, now)
-        request = next(self._waiting.take(), None)
-        return self._tasks.start(request, now) if request else None
+        for request in self._waiting.take():
+            with suppress(StopIteration):  # it has ended before its first command
+                return self._tasks.start(request, now)
+        return None
 
     def next_due(self) -> float | None:
         """Return None: nothing comes by itself."""
@@ -111,6 +122,7 @@ class Requests:
         """Do nothing: requests wait as long as they have to."""
 
     def _run(self) -> Procedure:
+        self._waiting.open()
         try:
             yield from self._link.run(self)
         except PortLost as error:
@@ -118,9 +130,14 @@ class Requests:
             raise
 
     def _end(self, error: LinkError) -> None:
-        """Leave no request without an end."""
+        """Leave no request without an end; further ones end at once."""
+        self._lost = error
         self._tasks.fail(error)
-        for request in self._waiting.take():
-            error = PortLost(*error.args)
-            error.sent = False
-            request.fail(error)
+        for request in self._waiting.close():
+            _refuse(request, error)
+
+
+def _refuse(request: _RequestJob, reason: LinkError) -> None:
+    error = PortLost(*reason.args)
+    error.sent = False
+    request.fail(error)

@@ -20,7 +20,7 @@ from typing import Any
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, PortLost, StationInactive
+from abdf1_ros.errors import CommandTimeout, LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.steps import echo, identify
@@ -91,18 +91,20 @@ def test_request_of_several_commands_is_not_interrupted() -> None:
 
 
 def test_errors_end_only_their_own_request() -> None:
-    def unusable() -> Steps[None]:
-        yield diagnostics.CMD, diagnostics.Echo(b'').encode()
-        raise FormatError('no use')
+    def broken(at: int) -> Steps[None]:
+        for _ in range(at):
+            yield diagnostics.CMD, diagnostics.Echo(b'').encode()
+        raise TypeError('a bug')
 
     bench = Bench()
     bench.add(9, identify())
-    bench.add(1, unusable())
+    bench.add(1, broken(0))
+    bench.add(1, broken(1))
     bench.add(1, echo(b'x'))
     bench.run()
-    absent, useless = bench.ends.errors
+    absent, *bugs = bench.ends.errors
     assert isinstance(absent, StationInactive)
-    assert str(useless) == 'no use'
+    assert [str(bug) for bug in bugs] == ['a bug', 'a bug']
     assert bench.ends.results == [None]
 
 
@@ -144,6 +146,16 @@ def test_lost_port_ends_all_requests() -> None:
     assert str(first) == str(second) == 'port lost: unplugged'
     assert isinstance(first, LinkError) and first.sent
     assert isinstance(second, LinkError) and not second.sent
+
+    bench.add(1, identify())  # nobody knows when the port comes back
+    assert str(bench.ends.errors[2]) == 'port lost: unplugged'
+    bench.line.start()
+    bench.add(1, identify())
+    bench.run()
+    assert len(bench.ends.results) == 1
+    bench.requests.close()
+    bench.add(1, identify())
+    assert str(bench.ends.errors[3]) == 'port lost: closed by this program'
 
 
 def test_nothing_is_due_by_itself() -> None:

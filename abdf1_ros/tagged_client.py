@@ -1,0 +1,82 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The rows of a map CSV, read and written by their tags from any program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from abdf1_ros.client import OpenLine, plain, text_of, values_of
+from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import steps
+from abdf1_ros.pccc.steps import AddressedValues
+from abdf1_ros.plan.usable_rows import line_problems
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.limits import raw_values
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import load_network
+from abdf1_ros.text import first
+
+
+class TaggedClient(OpenLine):
+    """
+    The line of a net CSV, whose words are read and written by the tags of a map CSV.
+
+    ``rows`` are its Read, Write and ReadWrite rows by tag. Values are those of the topics: scaled,
+    and written within Min and Max. Nothing is done by itself: no heartbeat, no fallback, and no
+    value is withheld. Errors are those of ``Client``, at the start ConfigurationError with every
+    fault of the files.
+    """
+
+    def __init__(self, net_file: str, map_file: str) -> None:
+        network = load_network(net_file)
+        if network.mode == 'Slave':
+            raise FormatError(f'{net_file}: Mode Slave: a client asks, and a slave may not')
+        mappings, problems = load_mappings(map_file)
+        problems += [problem for _, problem in line_problems(mappings, network)]
+        if problems:
+            raise ConfigurationError(problems)
+        self.rows = {row.tag: row for row in mappings if not row.serves
+                     and (row.polls or row.writes) and row.station <= MAX_STATION}
+        super().__init__(network.line, PortSettings.of(network), routes={
+            row.station: row.via for row in mappings if row.via is not None})
+
+    def read(self, tag: str) -> float | str | list[float]:
+        """Return the value of a Read or ReadWrite row; a list where its Length is above 1."""
+        row = self._row(tag, 'read', lambda row: row.polls)
+        values = self.ask(row.station, steps.read(_target_of(row)))
+        if row.scaling is not None:
+            values = row.scaling.publish(values)
+        found = plain(values, row.type)
+        return found[0] if row.length == 1 and not isinstance(found, str) else found
+
+    def write(self, tag: str, values: float | str | Sequence[float]) -> None:
+        """Write to a Write or ReadWrite row; returns when the PLC has confirmed all."""
+        row = self._row(tag, 'written', lambda row: row.writes)
+        self.ask(row.station, steps.write(_target_of(row), raw_values(row, values_of(values))))
+
+    def _row(self, tag: str, what: str, fits: Callable[[Mapping], bool]) -> Mapping:
+        row = self.rows.get(text_of('tag', tag))
+        if row is None or not fits(row):
+            known = first([row.tag for row in self.rows.values() if fits(row)])
+            raise FormatError(f'tag {tag!r} should be that of a row that is {what}: {known}')
+        return row
+
+
+def _target_of(row: Mapping) -> AddressedValues:
+    return AddressedValues(row.address, row.codec, row.dialect)
