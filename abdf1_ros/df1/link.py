@@ -88,11 +88,13 @@ class LinkStatus:
     """
     Details that only some kinds of links have.
 
-    ``last_poll`` is the clock value (s) of the last poll of a slave, or of its start; ``scans``
-    are the times of a master's poll lists, by their names.
+    ``last_poll`` is the clock value (s) of the last poll of a slave, or of its start;
+    ``same_number`` that of the last packet of another radio modem node that has our number, too;
+    ``scans`` are the times of a master's poll lists, by their names.
     """
 
     last_poll: float | None = None
+    same_number: float | None = None
     scans: Mapping[str, ScanTimes] = field(default_factory=dict)
 
 

@@ -22,7 +22,9 @@ a PLC knows it as a repetition.
 
 Ours: a node waits until the line is quiet, and then for a time by chance, before it sends; that
 time grows with each try, as everybody may have waited for the same end. A repetition of a command
-is answered with the reply that we have given, as that may be what was lost.
+is answered with the reply that we have given, as that may be what was lost. A packet with our
+number as SRC that we have not sent is of another node with that number: no reply is taken for ours
+that may be the reply to its command.
 
 A node that stores and forwards sends a packet again, once, if it has both its SRC and its DST in
 its table, and not among the last packets.
@@ -40,7 +42,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, MAX_LINK_DATA
-from abdf1_ros.df1.link import EqualNode, LinkSettings
+from abdf1_ros.df1.link import EqualNode, LinkSettings, LinkStatus
 from abdf1_ros.df1.machine import (
     Heard,
     HELD_BACK,
@@ -60,6 +62,9 @@ from abdf1_ros.messages import Event, Message
 # always send TNS 0.
 _MOST_HEARD = 20
 _RECENT = 10.0
+
+# Packets of ours that may come back, from nodes that send them on.
+_MOST_SENT = 256
 
 # Replies and packets of others that wait for a quiet line; with more, the newest are dropped.
 _MOST_WAITING = 16
@@ -160,13 +165,16 @@ class _Command:
     """
     A command that waits for its reply, which is overdue at ``deadline`` (clock value in s).
 
-    It has been sent ``tries`` times, and is sent ``most`` times.
+    It has been sent ``tries`` times, and is sent ``most`` times. It ``is_doubtful`` where another
+    node with our number has asked the same station under the same TNS: nobody can tell whose
+    reply comes.
     """
 
     task: Task
     most: int
     tries: int = 0
     deadline: float = -math.inf
+    is_doubtful: bool = False
 
 
 class RadioNode(EqualNode):
@@ -185,7 +193,12 @@ class RadioNode(EqualNode):
         super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
         self._random = random or Random()
+        self._same_number: float | None = None
         self._forget()
+
+    def status(self) -> LinkStatus:
+        """Return when another node with our number was heard."""
+        return LinkStatus(same_number=self._same_number)
 
     def _forget(self) -> None:
         self._waiting: deque[bytes] = deque()  # link data to be sent
@@ -193,6 +206,8 @@ class RadioNode(EqualNode):
         self._executed: defaultdict[int, deque[_Executed]] = defaultdict(
             lambda: deque(maxlen=MOST_UNDER_WAY))  # by SRC
         self._under_way: dict[int, _Command] = {}  # by station
+        self._sent: deque[bytes] = deque(maxlen=_MOST_SENT)
+        self._begun = self._machine.now
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve others, for ever."""
@@ -280,6 +295,7 @@ class RadioNode(EqualNode):
             self._count_try(command)
             command.task.sent, expires = True, command.task.expires
         self._counters.messages_sent += 1
+        self._sent.append(data)
         try:
             symbol = yield Step(frame, _MOMENT, expires=expires)
         except CommandExpired:
@@ -337,7 +353,8 @@ class RadioNode(EqualNode):
             return
         packet = Packet.decode(symbol.data)
         if packet.src in self._settings.numbers:
-            return  # ours, sent on by another node
+            self._hear_our_number(packet, symbol.data)
+            return
         is_ours = packet.dst in self._settings.numbers
         is_known = self._is_known(symbol.data)
         between = {packet.src, packet.dst}
@@ -353,6 +370,17 @@ class RadioNode(EqualNode):
             self._take_reply(packet, is_repetition=is_known)
         else:
             self._take_command(packet)
+
+    def _hear_our_number(self, packet: Packet, data: bytes) -> None:
+        """Take a packet of ours, sent on by another node, or of a node that has our number."""
+        if data in self._sent or self._machine.now < self._begun + _RECENT:
+            return  # just after a start it may be one of before
+        self._same_number = self._machine.now
+        self._counters.invalid_messages += 1
+        self._report(wrong_message(packet, packet.dst))
+        command = self._under_way.get(packet.dst)
+        if command is not None and command.task.command.duplicate_key == packet.duplicate_key:
+            command.is_doubtful = True
 
     def _take_command(self, command: Packet) -> None:
         """Execute a command once, and give its reply once more when it is repeated."""
@@ -393,7 +421,8 @@ class RadioNode(EqualNode):
     def _take_reply(self, packet: Packet, *, is_repetition: bool) -> None:
         """Give a reply to the command that waits for it."""
         command = self._under_way.get(packet.src)
-        if command is None or not packet.answers(command.task.command):
+        is_ours = command is not None and command.task.sent and not command.is_doubtful
+        if command is None or not is_ours or not packet.answers(command.task.command):
             if is_repetition:
                 self._counters.duplicate_messages += 1
             else:

@@ -388,8 +388,8 @@ class Session:
                                    for line in self.guest_lines if line.fault], self.notes.error)
         self._tell_news('types of PLCs', diagnostics.wrong_types(), self.notes.warning)
         self._tell_deaf_stations(diagnostics.deaf_stations(now))
-        echo = diagnostics.echo_text()
-        self._tell_news('echo', [f'{self.port}: {echo}'] if echo else [], self.notes.error)
+        fault = diagnostics.line_fault(now)
+        self._tell_news('line', [f'{self.port}: {fault}'] if fault else [], self.notes.error)
         levels = diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels

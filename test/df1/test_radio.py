@@ -174,6 +174,48 @@ def test_command_is_not_repeated_that_has_its_reply_before_the_line_is_quiet() -
     assert bench.machine.counters.nak_retries == 0
 
 
+def test_node_with_our_number_is_told() -> None:
+    bench = Bench()
+    sent = bench.begin(COMMAND)
+    bench.wait(10.5)
+    bench.hear(framed(sent.command))  # sent on by another node
+    assert (bench.link.status().same_number, 2510 in bench.numbers()) == (None, False)
+    bench.hear(framed(COMMAND._replace(dst=OTHER, tns=9)))
+    assert bench.link.status().same_number == bench.now
+    assert (bench.numbers()[-1], bench.machine.counters.invalid_messages) == (2510, 1)
+
+
+def test_packet_of_ours_from_before_the_start_is_nobody_elses() -> None:
+    bench = Bench()
+    bench.wait(9.0)
+    bench.hear(framed(COMMAND))
+    assert (bench.link.status().same_number, bench.numbers()) == (None, [])
+
+
+@pytest.mark.parametrize(('other', 'is_taken'), [
+    (COMMAND._replace(data=b'\x67\x01'), False), (COMMAND._replace(tns=1), True),
+    (COMMAND._replace(dst=OTHER), True)])
+def test_reply_that_may_be_for_another_node_with_our_number_is_not_taken(
+        other: Packet, is_taken: bool) -> None:
+    bench = Bench()
+    bench.wait(11.0)
+    task = bench.begin(COMMAND)
+    bench.wait(0.5)
+    bench.hear(framed(other), framed(COMMAND.reply()))
+    bench.wait(30.0)
+    assert isinstance(task.result, Packet) == is_taken
+
+
+def test_reply_that_comes_before_the_command_has_left_is_not_its_reply() -> None:
+    bench = Bench()
+    task = bench.begin(COMMAND)
+    bench.hear(framed(COMMAND.reply()))  # while we wait for a quiet line
+    assert task.result is None
+    assert bench.wait(0.5) == [framed(COMMAND)]
+    bench.hear(framed(COMMAND.reply(b'\x01')))
+    assert task.result == COMMAND.reply(b'\x01')
+
+
 def test_reply_to_an_earlier_try_ends_the_command() -> None:
     bench = Bench()
     task = bench.begin(COMMAND)

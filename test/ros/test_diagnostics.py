@@ -21,6 +21,8 @@ import time
 from typing import Any
 
 from abdf1_ros.cli.monitor import plant, view
+from abdf1_ros.df1.frames import message_frame
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.interlocks.fallback import FallbackCause
@@ -112,6 +114,18 @@ def test_counters_of_a_radio_modem_port_without_a_number_are_shown(
     values = {entry.key: entry.value for entry in bench.status('link').values}
     for name in ('undelivered for lack of handshake', 'refused for lack of memory'):
         assert values.get(f'messages {name}') == expected
+
+
+def test_node_on_the_air_with_our_number_is_an_error_for_a_minute(
+        make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(mode='Radio')
+    machine, packet = bench.driver.machine, Packet(2, Network().station, 0x0F, 0, 1, b'\x68')
+    machine.start(NOW - 20)
+    machine.receive_data(message_frame(packet.encode(), Network().checksum), NOW)
+    level, text = bench.says('link', NOW + 59)
+    assert (level, text.split(':')[:2]) == (
+        ERROR, ['ERROR', ' another node on the air has our number, 5'])
+    assert 'our number' not in bench.says('link', NOW + 61)[1]
 
 
 def test_names_and_hardware_ids(bench: Bench) -> None:

@@ -59,6 +59,9 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
 
+# For so long (s) another node with our number is told after its last packet.
+_SAME_NUMBER_TOLD = 60.0
+
 # A station that takes no commands and has not been heard for so long (s) is silent.
 _HEARD_LATELY = 10.0
 
@@ -193,8 +196,8 @@ class Diagnostics:
             return WARN, f'port open, but not polled for {now - polled:.0f} s'
         active = sum(station.active for station in self._driver.stations)
         total = sum(1 for _ in self._driver.stations)
-        if echo := self.echo_text():
-            return ERROR, echo
+        if fault := self.line_fault(now):
+            return ERROR, fault
         if deaf := len(self.deaf_stations(now)):
             return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
         if total and not active:
@@ -204,8 +207,12 @@ class Diagnostics:
         heard = sum(station.last_heard is not None for station in self._driver.stations)
         return OK, f'port open, {heard} of {total} stations have answered'
 
-    def echo_text(self) -> str:
-        """Return what to tell of a line that echoes where that does harm, mostly nothing."""
+    def line_fault(self, now: float) -> str:
+        """Return what is wrong with who is on the line, mostly nothing: an echo, or our number."""
+        told = self._driver.link.status().same_number
+        if told is not None and now - told < _SAME_NUMBER_TOLD:
+            return (f'another node on the air has our number, {self._driver.network.station}: its '
+                    'replies and ours cannot be told apart; give each node its own Station')
         mode = self._driver.network.mode  # by radio a node that sends on gives our packets back
         nobody_answers = not any(station.active for station in self._driver.stations)
         does_harm = self._driver.machine.echoes and mode != 'Radio' and (
