@@ -36,8 +36,8 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
-from abdf1_ros.ros.parameters.declared import unknown_overrides
-from abdf1_ros.ros.parameters.files import parameter_files, parameter_tree
+from abdf1_ros.ros.parameters.declared import take_given, unknown_names
+from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
@@ -59,7 +59,6 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
-import yaml
 
 NODE_NAME = 'lines'
 
@@ -139,11 +138,14 @@ class Line:
     One bridge with the thread of its callbacks.
 
     ``faults`` say why it does not run; ``restarts`` counts internal errors that ended it. All
-    is called by one thread. ``graph`` and ``port_owners`` are those of the process.
+    is called by one thread. ``graph``, ``port_owners`` and ``files``, its parameter files, are
+    those of the process.
     """
 
-    def __init__(self, name: LineName, graph: Graph, port_owners: PortOwners) -> None:
+    def __init__(self, name: LineName, graph: Graph, port_owners: PortOwners,
+                 files: Sequence[str]) -> None:
         self.name = name
+        self._files = files
         self._graph = graph
         self._port_owners = port_owners
         self.node: BridgeNode | None = None
@@ -166,7 +168,7 @@ class Line:
         try:
             self.node = BridgeNode(
                 self.name.name, namespace=self.name.namespace, has_timer=False,
-                graph=self._graph, port_owners=self._port_owners,
+                graph=self._graph, port_owners=self._port_owners, files=self._files,
                 parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
         except ConfigurationError as error:
             self.faults = tuple(map(str, error.problems))
@@ -262,9 +264,9 @@ def _telling(node: BridgeNode) -> Iterator[None]:
         node.get_logger().error(f'its end fails: {bug_text(error)}')
 
 
-def _options(node: Node) -> tuple[list[str], bool]:
+def _options(node: Node, files: Sequence[str]) -> tuple[list[str], bool]:
     """Return which lines are wanted, and whether all have to run; raises ConfigurationError."""
-    problems = unknown_overrides(node, OPTIONS)
+    problems = unknown_names(node, take_given(node), files, OPTIONS)
     anything = ParameterDescriptor(dynamic_typing=True)
     wanted, is_strict = (node.declare_parameter(name, default, anything).value
                          for name, default in OPTIONS.items())
@@ -282,9 +284,9 @@ def _options(node: Node) -> tuple[list[str], bool]:
 class LinesNode(Node):
     """Tell of all lines on /diagnostics; ``~/reload`` tries those again that do not run."""
 
-    def __init__(self) -> None:
-        super().__init__(NODE_NAME)
-        self.wanted, self.is_strict = _options(self)
+    def __init__(self, files: Sequence[str]) -> None:
+        super().__init__(NODE_NAME, automatically_declare_parameters_from_overrides=True)
+        self.wanted, self.is_strict = _options(self, files)
         self.is_asked_again = False
         self._publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/reload', self._reload)
@@ -315,10 +317,10 @@ class LinesNode(Node):
 class Lines:
     """All lines, from their start to their end."""
 
-    def __init__(self, names: Sequence[LineName], node: LinesNode) -> None:
+    def __init__(self, names: Sequence[LineName], node: LinesNode, files: Sequence[str]) -> None:
         port_owners = PortOwners()
         graph = Graph(node)
-        self.lines = [Line(name, graph, port_owners) for name in names]
+        self.lines = [Line(name, graph, port_owners, files) for name in names]
         self._node = node
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
@@ -409,7 +411,11 @@ def sections(path: str) -> list[LineName]:
     """
     found: dict[LineName, int] = {}
     problems = []
-    for name, line in _sections_of('', parameter_tree(path), 1):
+    for full_name, line, _ in node_sections(parameter_tree(path)):
+        namespace, _, node_name = full_name.rpartition('/')
+        if node_name == NODE_NAME:
+            continue
+        name = LineName(namespace or '/', node_name)
         first = found.setdefault(name, line)
         if first != line:
             problems.append(Problem(Place(path, line), (
@@ -418,20 +424,6 @@ def sections(path: str) -> list[LineName]:
     if problems:
         raise ConfigurationError(problems)
     return [*found]
-
-
-def _sections_of(above: str, tree: yaml.Node | None, line: int) -> Iterator[tuple[LineName, int]]:
-    if not isinstance(tree, yaml.MappingNode):
-        return
-    keys = [(str(key.value).strip('/'), key.start_mark.line + 1, below)
-            for key, below in tree.value]
-    if any(key == 'ros__parameters' for key, _, _ in keys):
-        namespace, _, name = above.rpartition('/')
-        if '*' not in above and name != NODE_NAME:
-            yield LineName(namespace or '/', name), line
-        return
-    for key, number, below in keys:
-        yield from _sections_of(f'{above}/{key}', below, number)
 
 
 def chosen(names: Sequence[LineName], wanted: Sequence[str]) -> list[LineName]:
@@ -477,8 +469,9 @@ def _make(given: Sequence[str]) -> Program:
         raise ConfigurationError([Problem('arguments', (
             'the sections of the parameter file name the nodes; __node and __ns would give all '
             'of them one name'))])
-    names = dict.fromkeys(name for path in parameter_files(given) for name in sections(path))
+    files = parameter_files(given)
+    names = dict.fromkeys(name for path in files for name in sections(path))
     _allow_files()
-    node = LinesNode()
-    lines = Lines(chosen([*names], node.wanted), node)
+    node = LinesNode(files)
+    lines = Lines(chosen([*names], node.wanted), node, files)
     return Program(lines.run, lines.destroy)

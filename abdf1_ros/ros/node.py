@@ -34,7 +34,9 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
-from abdf1_ros.ros.parameters.declared import Configuration, configure, declare_again, read_again
+from abdf1_ros.ros.parameters.declared import Configuration, configure, read_again
+from abdf1_ros.ros.parameters.files import parameter_files
+from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_FAULT,
@@ -93,18 +95,21 @@ class BridgeNode(Node):
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
     ``check`` is to be called every 0.1 s, in any one thread; with ``has_timer`` the executor
-    does it. ``graph`` and ``port_owners`` are those of all lines of the process.
+    does it. ``graph`` and ``port_owners`` are those of all lines of the process, ``files`` its
+    parameter files.
     """
 
     def __init__(self, name: str = NODE_NAME, *, has_timer: bool = True,
                  graph: Graph | None = None, port_owners: PortOwners | None = None,
-                 **kwargs: Any) -> None:
-        super().__init__(name, **kwargs)
+                 files: Sequence[str] = (), **kwargs: Any) -> None:
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self._is_stuck = self._is_ending = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
-            configuration = configure(self)
+            configuration = configure(self, files)
+            self._shown = ShownFiles(self)
+            self._shown.show(configuration.network, configuration.shown_rows())
             self._hold_ports(configuration.port)
             self._set_up(configuration, graph or Graph(self))
         except Exception:  # other lines of this process go on
@@ -229,7 +234,7 @@ class BridgeNode(Node):
             response.message = ENDS
             return response
         try:
-            configuration = read_again(self, self.session.configuration.parameters)
+            configuration = read_again(self.session.configuration)
             self._hold_ports(self.port, configuration.port)
         except ConfigurationError as error:
             for problem in error.problems:
@@ -258,7 +263,7 @@ class BridgeNode(Node):
         if self._is_ending:  # since then
             self.session.begin_end()
         self.session.start_guests()
-        declare_again(self, configuration)
+        self._shown.show(configuration.network, configuration.shown_rows())
         self._hold_ports(self.port)
         return True
 
@@ -308,7 +313,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _make(given: Sequence[str]) -> Program:
-    node = BridgeNode()
+    node = BridgeNode(files=parameter_files(given))
     return Program(partial(_run, node), node.destroy_node)
 
 

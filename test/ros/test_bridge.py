@@ -28,7 +28,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rcl_interfaces.msg import Parameter
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.duration import Infinite
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import MultiArrayLayout, String, UInt8MultiArray, UInt16MultiArray  # noqa: I101
@@ -567,18 +567,3 @@ def test_no_parameter_can_be_set(bridge: Bridge) -> None:
     for name, result in zip(names, response.results, strict=True):
         assert not result.successful, name
         assert 'read-only' in result.reason, name
-
-
-def test_parameters_are_described_with_their_ranges(bridge: Bridge) -> None:
-    names = ['default_period', 'diagnostics_period', 'net.station', 'net.baud', 'strict_map']
-    response = bridge.observer.call(DescribeParameters, '/abdf1/describe_parameters',
-                                    DescribeParameters.Request(names=names))
-    period, diagnostics, station, baud, strict = response.descriptors
-    assert all(descriptor.read_only and descriptor.description
-               for descriptor in response.descriptors)
-    assert (period.integer_range[0].from_value, period.integer_range[0].to_value) == (
-        0, 86_400_000)
-    assert diagnostics.floating_point_range[0].from_value == pytest.approx(0.1)
-    assert (station.integer_range[0].from_value, station.integer_range[0].to_value) == (0, 254)
-    assert '1200, 2400, 4800, 9600, 19200' in baud.description
-    assert not strict.integer_range

@@ -22,10 +22,10 @@ from typing import Any
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
+from abdf1_ros.ros.parameters.shown import map_cells, ShownFiles
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.network import Network
 import pytest
-from rcl_interfaces.msg import ParameterEvent
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -54,7 +54,8 @@ def make_node(context: Context) -> Iterator[Nodes]:
     def make(values: dict[str, Any] | None = None, cli_args: list[str] | None = None) -> Node:
         overrides = [Parameter(name, value=value) for name, value in (values or {}).items()]
         nodes.append(Node('parameters', context=context, parameter_overrides=overrides,
-                          cli_args=cli_args, use_global_arguments=False))
+                          cli_args=cli_args, use_global_arguments=False,
+                          automatically_declare_parameters_from_overrides=True))
         return nodes[-1]
 
     yield make
@@ -122,28 +123,40 @@ def test_every_parameter_is_declared_read_only_with_a_description(
     before = set(node.get_parameters_by_prefix(''))
     configure(node)
     names = set(node.get_parameters_by_prefix('')) - before
-    assert names >= {f'net.{field}' for field in (
-        'station', 'mode', 'plc_type', 'error_code', 'nak_retries', 'enq_retries', 'cmd_timeout',
-        'com_port', 'baud', 'data_bits', 'stop_bits', 'parity', 'timeout', 'tx_delay',
-        'handshake')}
-    assert len([name for name in names if name.startswith('map.')]) == 2 * len(COLUMNS)
     for name in names:
         descriptor = node.describe_parameter(name)
         assert descriptor.read_only, name
         assert descriptor.description, name
         assert descriptor.name == name
+    period, pause = map(node.describe_parameter, ('default_period', 'diagnostics_period'))
+    assert (period.integer_range[0].from_value, period.integer_range[0].to_value) == (
+        0, 86_400_000)
+    assert pause.floating_point_range[0].from_value == pytest.approx(0.1)
+
+
+def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
+        make_node: Nodes, files: dict[str, str]) -> None:
+    node = make_node(files | {'net.baud': '38400'})
+    shown, configuration = ShownFiles(node), configure(node)
+    before = set(node.get_parameters_by_prefix(''))
+    for _ in range(2):  # files that are read again are shown anew
+        shown.show(configuration.network, configuration.shown_rows())
+    names = set(node.get_parameters_by_prefix('')) - before
+    assert names >= {f'net.{field}' for field in (
+        'station', 'mode', 'plc_type', 'error_code', 'nak_retries', 'enq_retries', 'cmd_timeout',
+        'com_port', 'baud', 'data_bits', 'stop_bits', 'parity', 'timeout', 'tx_delay',
+        'handshake')}
+    assert len([name for name in names if name.startswith('map.')]) == 2 * len(COLUMNS)
+    assert node.get_parameter('net.baud').value == 38400
+    assert '1200, 2400, 4800, 9600, 19200' in node.describe_parameter('net.baud').description
+    (station,) = node.describe_parameter('net.station').integer_range
+    assert (station.from_value, station.to_value) == (0, 254)
+    for name in names:
+        assert node.describe_parameter(name).description, name
+        (result,) = node.set_parameters([Parameter(name, value='1')])
+        assert not result.successful and '~/reload' in result.reason
     assert node.describe_parameter('map.line.door.plc_type').description == \
         next(column.description for column in MAP_COLUMNS if column.name == 'PLC_Type')
-
-
-def test_rows_are_shown_without_an_event_for_each_cell(
-        make_node: Nodes, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    node = make_node(files)
-    events: list[ParameterEvent] = []
-    monkeypatch.setattr(node._parameter_event_publisher, 'publish', events.append)
-    configure(node)
-    told = {parameter.name for event in events for parameter in event.new_parameters}
-    assert 'net.baud' in told and not any(name.startswith('map.') for name in told)
 
 
 def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) -> None:
@@ -255,30 +268,32 @@ def test_bad_row_is_left_out_unless_the_map_is_strict(
     assert problems_of(make_node(files | {'strict_map': True})) == [str(problem)]
 
 
-def test_mappings_are_shown_with_their_defaults(make_node: Nodes, files: dict[str, str]) -> None:
-    node = make_node(files)
-    configure(node)
-    shown = {name: parameter.value
-             for name, parameter in node.get_parameters_by_prefix('map.line.door').items()}
-    assert shown.keys() == {column.lower() for column in COLUMNS}
-    assert {name: value for name, value in shown.items() if value} == {
-        'tag': 'line/door', 'command': 'Read', 'address': 'I:017/12', 'station': '1',
-        'plc_type': 'PLC5', 'length': '1', 'type': 'bool', 'topic': 'line/door',
-        'publish': 'Always', 'word_order': 'Low', 'access': 'Typed'}
+def test_mappings_are_shown_with_their_defaults(configured: Callable[..., Configuration]) -> None:
+    cells = {name: value for name, value, _ in map_cells(configured().shown_rows())}
+    assert {name: value for name, value in cells.items() if value and 'door' in name} == {
+        f'map.line.door.{column}': value for column, value in {
+            'tag': 'line/door', 'command': 'Read', 'address': 'I:017/12', 'station': '1',
+            'plc_type': 'PLC5', 'length': '1', 'type': 'bool', 'topic': 'line/door',
+            'publish': 'Always', 'word_order': 'Low', 'access': 'Typed'}.items()}
 
 
-def test_mappings_can_be_kept_out_of_the_parameters(
-        make_node: Nodes, files: dict[str, str]) -> None:
-    node = make_node(files | {'expose_map_parameters': False})
-    assert len(configure(node).mappings) == 2
-    assert not node.get_parameters_by_prefix('map')
+@pytest.mark.parametrize(('rows', 'given', 'is_shown'), [
+    (100, {}, True), (101, {}, False), (101, {'expose_map_parameters': True}, True),
+    (1, {'expose_map_parameters': False}, False)])
+def test_maps_of_up_to_a_hundred_rows_are_shown_unless_the_user_says_otherwise(
+        configured: Callable[..., Configuration], files: dict[str, str], rows: int,
+        given: dict[str, Any], is_shown: bool) -> None:
+    write_csv(Path(files['map_file']), MAP_HEADER,
+              [f'row{row},Read,N7:{row},1,SLC,,,' for row in range(rows)])
+    assert len(configured(**given).shown_rows()) == rows * is_shown
 
 
 def test_mappings_are_in_their_file_alone(make_node: Nodes, files: dict[str, str]) -> None:
     node = make_node(files | {'map.recipe.max': '5'})
     configuration = configure(node)
     assert configuration.mappings[0].maximum == 999
-    assert node.get_parameter('map.recipe.max').value == '999'
+    assert ('map.recipe.max', '999') in [
+        (name, value) for name, value, _ in map_cells(configuration.shown_rows())]
     assert configuration.ignored == ['map.recipe.max']
 
 
@@ -320,6 +335,26 @@ def test_misspelt_parameter_is_an_error(
     (problem,) = caught.value.problems
     assert str(problem).startswith(f'parameter {name}: there is no such parameter; ')
     assert right in str(problem)
+
+
+@pytest.mark.parametrize(('section', 'name', 'expected'), [
+    ('parameters', 'low_letancy', '3:5: low_letancy: there is no such parameter; did you mean '
+                                  'low_latency?'),
+    ('/parameters', 'gain', '3:5: gain: there is no such parameter; another version may have it'),
+    ('"/**"', 'gain', None), ('camera', 'low_letancy', None),
+    ('parameters', 'use_sim_time', None), ('parameters', 'map.door.max', None)])
+def test_section_that_names_the_node_has_no_unknown_parameter(
+        make_node: Nodes, files: dict[str, str], tmp_path: Path, section: str, name: str,
+        expected: str | None) -> None:
+    path = tmp_path / 'shared.yaml'
+    path.write_text(f'{section}:\n  ros__parameters:\n    {name}: true\n', encoding='utf-8')
+    node = make_node(files)
+    if expected is None:
+        assert configure(node, [str(path)]).mappings
+        return
+    with pytest.raises(ConfigurationError) as caught:
+        configure(node, [str(path)])
+    assert [str(problem) for problem in caught.value.problems] == [f'{path}:{expected}']
 
 
 def test_parameter_of_another_node_is_none_of_our_business(

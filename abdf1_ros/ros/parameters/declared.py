@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Sequence
+from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import difflib
 import os
@@ -31,18 +32,14 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.files import FileWatch
-from abdf1_ros.ros.parameters.store import forget, overrides, show
-from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.ros.parameters.files import names_in_sections_of
+from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
 from abdf1_ros.settings.station_lists import parse_stations
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-)
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
@@ -103,15 +100,18 @@ class Parameters:
         60.0, 'Mode Slave: s without a poll after which own commands fail; 0: never', 0.0,
         3600.0)
     expose_map_parameters: bool = _parameter(
-        True, 'show every mapping as read-only parameters map.<tag>.<column>')
+        True, 'show every mapping as read-only parameters map.<tag>.<column>; where this is not '
+        f'given, of maps of up to {MOST_SHOWN_ROWS} rows')
     trace_file: str = _parameter(
         '', 'path of a capture of all that passes the port, for sniff; empty: none')
     trace_limit: float = _parameter(
         10.0, 'MB that the capture takes on the disk at most', 0.01, 10_000.0)
 
 
-Cell = tuple[str, str, str]
-"""Of the map: name of its parameter, value, description of its column."""
+Given = MappingType[str, Any]
+"""What the user has set, by name of the parameter."""
+
+_OF_RCLPY = 'use_sim_time', 'start_type_description_service'
 
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
@@ -127,7 +127,8 @@ class Configuration:
     """
     All that the node needs to know.
 
-    ``map_problems`` are those of rows left out, ``ignored`` are names of overrides without effect.
+    ``map_problems`` are those of rows left out; ``given`` is what the user has set, ``ignored``
+    are names in it without effect.
     """
 
     parameters: Parameters
@@ -135,6 +136,7 @@ class Configuration:
     port: str
     mappings: list[Mapping]
     map_problems: list[Problem]
+    given: Given
     polling: PollingSettings | None = None
     ignored: list[str] = field(default_factory=list)
     files: FileWatch = field(default_factory=FileWatch)
@@ -148,6 +150,11 @@ class Configuration:
             DriverSettings(**same), default_period=self.parameters.default_period / 1000,
             polling=self.polling, first_tns=random.randrange(0x10000))
 
+    def shown_rows(self) -> Sequence[Mapping]:
+        """Return the rows to be shown as parameters: all or none."""
+        is_few = len(self.mappings) <= MOST_SHOWN_ROWS or 'expose_map_parameters' in self.given
+        return self.mappings if is_few and self.parameters.expose_map_parameters else ()
+
     def __str__(self) -> str:
         """Return one line that tells what the node runs with."""
         network, parameters = self.network, self.parameters
@@ -159,50 +166,55 @@ class Configuration:
                 f'{written} to write')
 
 
-def configure(node: Node) -> Configuration:
+def take_given(node: Node) -> Given:
     """
-    Declare all parameters and read both files.
+    Return what the user has set, by name, and leave it to be declared.
 
-    Raises ConfigurationError with every fault that keeps the node from running.
+    The node is to be made with ``automatically_declare_parameters_from_overrides``: otherwise
+    rclpy drops in silence what nobody declares.
     """
+    declared: Any = node.get_parameters_by_prefix('')
+    given = {name: parameter.value for name, parameter in declared.items()
+             if name not in _OF_RCLPY}
+    for name in given:
+        node.undeclare_parameter(name)
+    return given
+
+
+def configure(node: Node, files: Sequence[str] = ()) -> Configuration:
+    """
+    Declare the node's own parameters and read both files; ``ShownFiles`` shows what is in these.
+
+    ``files`` are the parameter files of the process. Raises ConfigurationError with every fault
+    that keeps the node from running.
+    """
+    given = take_given(node)
     known = [entry.name for entry in fields(Parameters)]
     known += [entry.parameter for entry in FIELDS.values()]
-    problems = unknown_overrides(node, known, 'net.')
-    parameters = _declare_own(node, problems)
-    configuration = _from_files(
-        node, parameters, problems, _declare_network, is_strict=parameters.strict_map)
-    _declare_map(node, configuration)
-    return configuration
+    problems = unknown_names(node, given, files, known, 'net.')
+    parameters = _declare_own(node, given, problems)
+    return _from_files(given, parameters, problems, is_strict=parameters.strict_map)
 
 
-def read_again(node: Node, parameters: Parameters) -> Configuration:
+def read_again(before: Configuration) -> Configuration:
     """
-    Read both files again; ``declare_again`` shows what comes from them.
+    Read both files again.
 
     Raises ConfigurationError with every fault, also of single rows: a running node is not stopped
     for a mistake in a file.
     """
-    return _from_files(node, parameters, [], _overridden_network, is_strict=True)
+    return _from_files(before.given, before.parameters, [], is_strict=True)
 
 
-def declare_again(node: Node, configuration: Configuration) -> None:
-    """Declare anew what comes from the files."""
-    forget(node, 'net.')
-    _declare_network(node, configuration.network)
-    forget(node, 'map.')
-    _declare_map(node, configuration)
-
-
-def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
-                overridden: Callable[[Node, Network], Network], *, is_strict: bool,
-                ) -> Configuration:
+def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *,
+                is_strict: bool) -> Configuration:
     network = Network()
     mappings: list[Mapping] = []
     map_problems: list[Problem] = []
     files = FileWatch((parameters.net_file, parameters.map_file))
     try:
-        network = overridden(
-            node, load_network(_needed('net_file', parameters.net_file, problems)))
+        network = _overridden(
+            given, load_network(_needed('net_file', parameters.net_file, problems)))
     except ConfigurationError as error:
         problems += error.problems
     try:
@@ -225,22 +237,17 @@ def _from_files(node: Node, parameters: Parameters, problems: list[Problem],
             problems += error.problems
     if problems:
         raise ConfigurationError(problems)
-    return Configuration(parameters, network, port, mappings, map_problems, polling,
-                         _ignored_overrides(node, mappings), files)
+    return Configuration(parameters, network, port, mappings, map_problems, given, polling,
+                         _ignored(given, mappings), files)
 
 
-def _overridden_network(node: Node, network: Network) -> Network:
-    """Return the network with what overrides it; nothing is declared."""
-    given = overrides(node)
-    return _overriding({name: given[entry.parameter].value for name, entry in FIELDS.items()
-                        if entry.parameter in given}, network)
-
-
-def _overriding(values: dict[str, Any], network: Network) -> Network:
-    """Return the network with ``values`` by the names of its fields."""
+def _overridden(given: Given, network: Network) -> Network:
+    """Return the network with what overrides it."""
+    texts = {name: text_of(given[entry.parameter]) for name, entry in FIELDS.items()
+             if entry.parameter in given}
     return make_network({  # as text: 5.0 equals 5, but is not a station
-        name: (_text(value), f'parameter {FIELDS[name].parameter}')
-        for name, value in values.items() if _text(value) != str(getattr(network, name))}, network)
+        name: (text, f'parameter {FIELDS[name].parameter}') for name, text in texts.items()
+        if text != str(getattr(network, name))}, network)
 
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:
@@ -259,30 +266,45 @@ def _resolved(path: str) -> str:
     return str(Path(path).resolve()) if path else ''
 
 
-def unknown_overrides(node: Node, known: Collection[str], begins: str = ' ') -> list[Problem]:
+def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collection[str],
+                  begins: str = ' ') -> list[Problem]:
     """
-    Return the parameters of ours that a user has given and that do not exist.
+    Return the parameters that a user has given and that do not exist.
 
-    rclpy drops them silently. Others may belong to other nodes of a shared parameter file, so
-    only those are found whose names look like ours, or begin so. ``map.*`` may come back from a
-    dump of our parameters, see ``_ignored_overrides``.
+    In a section of a parameter file that names the node, all are meant for it. Others may belong
+    to other nodes, so only those are found whose names look like ours, or begin so. ``map.*`` may
+    come back from a dump of our parameters, see ``_ignored``.
     """
-    problems = []
-    for name in overrides(node):
-        close = difflib.get_close_matches(name, known, 1, 0.75)
-        if name not in known and (close or name.startswith(begins)):
-            hint = f'did you mean {close[0]}?' if close else f'{begins}* are its columns'
-            problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
+    problems, found = [], set(_OF_RCLPY)
+    for name, place in names_in_sections_of(node.get_fully_qualified_name(), files):
+        found.add(name)
+        if not (name in known or name in _OF_RCLPY or name.startswith('map.')):
+            problems.append(Problem(place, (
+                f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
+    for name in given:
+        if name in found or name in known:
+            continue
+        if hint := _nearest(name, known, begins, 0.75):
+            problems.append(
+                Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     return problems
 
 
-def _ignored_overrides(node: Node, mappings: list[Mapping]) -> list[str]:
-    """Return the names of overrides ``map.*`` that say something else than the map."""
-    given = {name: _text(parameter.value) for name, parameter in overrides(node).items()
-             if name.startswith('map.')}
-    repeated = {name for name, value, _ in _map_cells(mappings) if given.get(name) == value} \
-        if given else set()
-    return sorted(given.keys() - repeated)
+def _nearest(name: str, known: Collection[str], begins: str, likeness: float) -> str:
+    close = difflib.get_close_matches(name, known, 1, likeness)
+    if close:
+        return f'did you mean {close[0]}?'
+    if name.startswith(begins):
+        return f'{begins}* are its columns'
+    return 'another version may have it' if likeness < 0.75 else ''
+
+
+def _ignored(given: Given, mappings: list[Mapping]) -> list[str]:
+    """Return the names of ``map.*`` that say something else than the map."""
+    texts = {name: text_of(value) for name, value in given.items() if name.startswith('map.')}
+    repeated = {name for name, value, _ in map_cells(mappings) if texts.get(name) == value} \
+        if texts else set()
+    return sorted(texts.keys() - repeated)
 
 
 def _polling(parameters: Parameters, mappings: list[Mapping],
@@ -304,28 +326,19 @@ def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
     return stations
 
 
-def _declare(node: Node, name: str, default: Any, description: str, low: float | None = None,
-             high: float | None = None) -> Any:
+def _declare(node: Node, given: Given, name: str, default: Any,
+             descriptor: ParameterDescriptor) -> Any:
     """
     Declare a parameter and return its value, whatever the user has given.
 
     rclpy shows types and ranges to the user, but we check them, with better messages. A path is
     shown resolved and returned as it was given.
     """
-    given = overrides(node).get(name)
-    if name in _PATHS and given is not None and isinstance(given.value, str):
-        descriptor = ParameterDescriptor(description=description, read_only=True)
-        path = os.path.expanduser(given.value)  # in net_file:=~/net.csv the shell leaves it
+    if name in _PATHS and isinstance(value := given.get(name), str):
+        path = os.path.expanduser(value)  # in net_file:=~/net.csv the shell leaves it
+        descriptor.dynamic_typing = False
         node.declare_parameter(name, _resolved(path), descriptor, ignore_override=True)
         return path
-    descriptor = ParameterDescriptor(
-        description=description, read_only=True, dynamic_typing=True)
-    if low is not None and high is not None:
-        if isinstance(default, int):
-            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
-        else:
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=float(low), to_value=float(high))]
     try:
         return node.declare_parameter(name, default, descriptor).value
     except ParameterException:
@@ -333,12 +346,13 @@ def _declare(node: Node, name: str, default: Any, description: str, low: float |
         return node.declare_parameter(name, default, descriptor).value
 
 
-def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
+def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameters:
     values: dict[str, Any] = {}
     for entry in fields(Parameters):
         low, high = entry.metadata['low'], entry.metadata['high']
-        value = _declare(
-            node, entry.name, entry.default, entry.metadata['description'], low, high)
+        default: Any = entry.default
+        value = _declare(node, given, entry.name, default, descriptor_of(
+            default, entry.metadata['description'], low, high, read_only=True))
         kind = type(entry.default)
         if kind is float and type(value) is int:
             value = float(value)
@@ -355,31 +369,3 @@ def _declare_own(node: Node, problems: list[Problem]) -> Parameters:
             value = entry.default
         values[entry.name] = value
     return Parameters(**values)
-
-
-def _declare_network(node: Node, network: Network) -> Network:
-    """Declare net.*, defaults from the file; return the network with what overrides it."""
-    values = {}
-    for name, entry in FIELDS.items():
-        choices = f' ({", ".join(map(str, entry.choices))})' if entry.choices else ''
-        values[name] = _declare(node, entry.parameter, getattr(network, name),
-                                entry.description + choices, entry.low, entry.high)
-    return _overriding(values, network)
-
-
-def _text(value: Any) -> str:
-    """Return a value as a CSV would hold it; YAML makes a bool of Yes and No."""
-    if isinstance(value, bool):
-        return 'Yes' if value else 'No'
-    return str(value)
-
-
-def _map_cells(mappings: list[Mapping]) -> list[Cell]:
-    return [(f'map.{mapping.name.replace("/", ".")}.{column.name.lower()}',
-             mapping.cell(column.name), column.description)
-            for mapping in mappings for column in MAP_COLUMNS]
-
-
-def _declare_map(node: Node, configuration: Configuration) -> None:
-    if configuration.parameters.expose_map_parameters:
-        show(node, _map_cells(configuration.mappings))

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 import re
@@ -93,3 +93,35 @@ def _sections(tree: yaml.Node | None) -> Iterator[tuple[str, int]]:
         if key.value != _PARAMETERS:
             yield str(key.value), key.start_mark.line + 1
             yield from _sections(below)
+
+
+def node_sections(tree: yaml.Node | None, above: str = '', line: int = 1,
+                  ) -> Iterator[tuple[str, int, yaml.Node]]:
+    """
+    Yield the sections of a parameter file: full name of the node, line, and its parameters.
+
+    Those with wildcards are no nodes.
+    """
+    for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
+        name, number = str(key.value).strip('/'), key.start_mark.line + 1
+        if name != _PARAMETERS:
+            yield from node_sections(below, f'{above}/{name}', number)
+        elif '*' not in above:
+            yield above, line, below
+
+
+def names_in_sections_of(node: str, files: Iterable[str]) -> Iterator[tuple[str, Place]]:
+    """Yield the parameters in sections that name a node, by its full name; where each stands."""
+    for path in files:
+        for name, _, parameters in node_sections(parameter_tree(path)):
+            if name == node:
+                for parameter, mark in _parameter_names(parameters):
+                    yield parameter, Place(path, mark.line + 1, mark.column + 1)
+
+
+def _parameter_names(tree: yaml.Node, above: str = '') -> Iterator[tuple[str, Any]]:
+    for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
+        if isinstance(below, yaml.MappingNode):
+            yield from _parameter_names(below, f'{above}{key.value}.')
+        else:
+            yield f'{above}{key.value}', key.start_mark

@@ -1,0 +1,108 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is in both files, shown as parameters; ``~/reload`` shows it anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from abdf1_ros.settings.columns import MAP_COLUMNS
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import FIELDS, Network
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+# rclpy sends an event for every parameter: 120,000 for 5000 rows, in 12 s.
+MOST_SHOWN_ROWS = 100
+
+_Cell = tuple[str, Any, ParameterDescriptor]
+
+_REASON = 'read-only: it shows what the files say; ~/reload takes new files'
+
+
+def descriptor_of(default: bool | float | str, description: str, low: float | None = None,
+                  high: float | None = None, *, read_only: bool = False) -> ParameterDescriptor:
+    """Return the descriptor of a parameter that takes any type: we check types, rclpy does not."""
+    descriptor = ParameterDescriptor(
+        description=description, read_only=read_only, dynamic_typing=True)
+    if low is not None and high is not None:
+        if isinstance(default, int):
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(low), to_value=float(high))]
+    return descriptor
+
+
+def text_of(value: Any) -> str:
+    """Return a value as a CSV would hold it; YAML makes a bool of Yes and No."""
+    if isinstance(value, bool):
+        return 'Yes' if value else 'No'
+    return str(value)
+
+
+def map_cells(mappings: Iterable[Mapping]) -> Iterator[tuple[str, str, str]]:
+    """Yield each cell of a map: name of its parameter, value, description of its column."""
+    for mapping in mappings:
+        for column in MAP_COLUMNS:
+            yield (f'map.{mapping.name.replace("/", ".")}.{column.name.lower()}',
+                   mapping.cell(column.name), column.description)
+
+
+def _net_cells(network: Network) -> Iterator[_Cell]:
+    for name, entry in FIELDS.items():
+        choices = f' ({", ".join(map(str, entry.choices))})' if entry.choices else ''
+        value = getattr(network, name)
+        yield entry.parameter, value, descriptor_of(
+            value, entry.description + choices, entry.low, entry.high)
+
+
+class ShownFiles:
+    """
+    The parameters ``net.*`` and ``map.*`` of a node.
+
+    Nobody else can set them. They are not read-only for rclpy, which would never undeclare them.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._is_showing = False
+        self._shown: list[str] = []
+        node.add_on_set_parameters_callback(self._judge)
+
+    def show(self, network: Network, mappings: Iterable[Mapping]) -> None:
+        """Show the settings of the link, and these rows, instead of those before."""
+        for name in self._shown:
+            self._node.undeclare_parameter(name)
+        cells: Any = [*_net_cells(network), *(
+            (name, value, descriptor_of(value, description))
+            for name, value, description in map_cells(mappings))]
+        self._is_showing = True
+        try:
+            self._node.declare_parameters('', cells, ignore_override=True)
+        finally:
+            self._is_showing = False
+        self._shown = [name for name, _, _ in cells]
+
+    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        is_ours = any(parameter.name.startswith(('net.', 'map.')) for parameter in parameters)
+        return SetParametersResult(successful=self._is_showing or not is_ours, reason=_REASON)
