@@ -52,7 +52,6 @@ from abdf1_ros.df1.frames import (
     NOISE,
     Symbol,
 )
-from abdf1_ros.df1.line_rate import LineRate
 from abdf1_ros.df1.outgoing import Outgoing
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 from abdf1_ros.errors import CommandExpired
@@ -188,7 +187,7 @@ class Machine:
     ``unsent`` asks the port how many bytes have still to leave, as far as it can tell;
     ``position`` counts the bytes given out so far. Once the other end ``embeds`` responses, a long
     message is given out in portions, and a response goes between two of them (M 4-3), as products
-    do with Embedded Responses = Auto-detect. ``rate`` is what the line has shown of its speed.
+    do with Embedded Responses = Auto-detect.
     ``send_before`` is the clock value (s) after which ``withdraw`` is due in place of
     ``data_to_send``. ``late`` is the sum of the seconds by which it was called after a deadline of
     its procedure: so long this process, or its host, has not run.
@@ -213,7 +212,6 @@ class Machine:
         self._make_procedure = procedure
         self._timing = timing or LineTiming()
         self._outgoing = Outgoing(checksum, self._timing.char_time)
-        self.rate = LineRate(self._timing.char_time, duplex is Duplex.HALF)
         self._pause_limit = 20 * self._timing.char_time + HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
@@ -290,7 +288,6 @@ class Machine:
         self.stop()
         self.now = now
         self._line_free = now
-        self.rate.forget()
         self._procedure = self._make_procedure(self)
         self._resume(None)
 
@@ -423,15 +420,11 @@ class Machine:
                 self._ahead = frame
                 self.send_at_once(frame)
             if self._is_half_duplex:  # what we have sent has left
-                self.rate.answered(self.counters.chars_received, self.now)
                 self._line_free = min(self._line_free, self.now)
             elif symbol in _RESPONSES:
                 self._take_as_answer()
             if isinstance(symbol, Frame):
                 self.embeds |= symbol.has_response and symbol.fault is None
-                if self._message.number == self.decoder.begun:
-                    self.rate.message(self.counters.chars_received - self._message.heard,
-                                      self.now - self._message.begun)
             self._resume(symbol)
 
     def _keep(self, data: bytes) -> None:
@@ -439,10 +432,8 @@ class Machine:
 
     def _take_as_answer(self) -> None:
         """Conclude from an answer that what we have sent has left, but what is still here."""
-        here = self._still_here
-        if not here:
-            self.rate.answered(self.counters.chars_received, self.now)
-        self._line_free = min(self._line_free, self.now + here * self._timing.char_time)
+        left = self.now + self._still_here * self._timing.char_time
+        self._line_free = min(self._line_free, left)
 
     def _resume(self, heard: Heard | None, error: CommandExpired | None = None) -> None:
         """Run the procedure up to a step that has to wait; None starts it."""
@@ -501,8 +492,6 @@ class Machine:
             self._reply_size, self._due = step.reply_size, free + (step.timeout or 0.0)
             self.deadline = None if step.timeout is None else self._due
         if step.timeout != 0:
-            if step.frame:
-                self.rate.sent(len(step.frame), self.counters.chars_received, self.now)
             return False
         if self._out:
             self.send_at_once(self.data_to_send())

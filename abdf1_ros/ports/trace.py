@@ -25,7 +25,7 @@ import time
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
-from abdf1_ros.ports.serial_device import is_pseudo_terminal, SerialDevice
+from abdf1_ros.ports.serial_device import SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
 
@@ -93,8 +93,7 @@ class PortOpener:
     Open a port, again after each loss.
 
     ``tell`` is that of ``open_port``. After ``trace`` all bytes of the port go into a capture. An
-    error of that is given to ``on_error`` and has no effect on the port. A pseudo-terminal has no
-    speed.
+    error of that is given to ``on_error`` and has no effect on the port.
     """
 
     def __init__(self, settings: PortSettings,
@@ -104,7 +103,6 @@ class PortOpener:
         self._port: Port | None = None
         self._trace: Trace | None = None
         self._begun = 0.0
-        self.has_speed = True
 
     def use(self, settings: PortSettings) -> bool:
         """Open with these settings from now on; return whether they are others."""
@@ -134,7 +132,6 @@ class PortOpener:
     def open(self) -> Port:  # noqa: A003
         """Open the port; raises OSError."""
         self._port = port = open_port(self._settings, self._tell)
-        self.has_speed = not is_pseudo_terminal(self._settings.name)
         return port if self._trace is None else TracedPort(port, self._trace, self._begun)
 
     def close(self) -> None:

@@ -41,7 +41,6 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph, TypeWatch
-from abdf1_ros.ros.diagnostics.line import speed_seen
 from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, UnreadableRows, where
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
 from abdf1_ros.ros.diagnostics.statuses import changed_text, deaf_text, Diagnostics
@@ -138,7 +137,6 @@ class Session:
         self._may_have_left_over = {station.number for station in self.driver.stations}
         self._told: dict[str, Sequence[object]] = {}
         self._has_told_tools = False
-        self._told_speed: float | None = None
         self._port_text = ''
         self._levels: list[bytes] = []
         self._next_diagnostics = self._next_look = self._next_snapshot = 0.0
@@ -376,7 +374,6 @@ class Session:
         self._look_at_files(now)
         self._look_at_names(now)
         self._unreadable.look(now)
-        self._tell_speed(self.driver.machine.rate.seen)
         for text in self._types.look(now):
             self.notes.warning('types of topics', text)
         crowded = diagnostics.interlocks.crowded = self._interlocks.look(now)
@@ -439,19 +436,6 @@ class Session:
                             'topics; give one another name, as in -r __node:=line_2')
         else:
             self.notes.info('the name', f'no other node is called {name} any more')
-
-    def _tell_speed(self, seen: float | None) -> None:
-        """Log once that the line is faster, or slower, than it is set."""
-        if seen is None or self._told_speed is not None and (seen > 1) is (self._told_speed > 1) \
-                or not self._surroundings.opener.has_speed:
-            return
-        self._told_speed = seen
-        text = f'{self.port}: Baud is {self.driver.network.baud}, ' \
-               f'but the line shows {speed_seen(self.driver, has_speed=True)}'
-        if seen > 1:
-            self.notes.info('the speed', text)
-        else:
-            self.notes.warning('the speed', f'{text}: time-outs begin before frames have left')
 
     def publish_diagnostics(self, now: float) -> None:
         """Publish all statuses at the clock value ``now`` (s)."""

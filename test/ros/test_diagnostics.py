@@ -183,16 +183,6 @@ def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) 
     assert bench.says('link') == (ERROR, 'ERROR: gone')
 
 
-@pytest.mark.parametrize(('seen', 'text'), [
-    (None, 'nothing speaks against the set one'), (1.98, 'at least 19000 baud'),
-    (0.5, 'about 4800 baud')])
-def test_link_tells_what_the_line_has_shown_of_its_speed(
-        bench: Bench, seen: float | None, text: str) -> None:
-    bench.driver.machine.rate.seen = seen
-    values = {value.key: value.value for value in bench.status('link').values}
-    assert values['speed seen'] == text
-
-
 def test_last_numbered_error_has_its_age(bench: Bench) -> None:
     def last_error(now: float) -> str:
         return details(bench.status('link', now))['last error']

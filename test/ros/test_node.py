@@ -585,22 +585,6 @@ def test_end_of_another_type_on_a_topic_is_told(
     assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; somebody uses it as' in line
 
 
-@pytest.mark.parametrize('has_speed', [True, False])
-def test_line_that_is_faster_than_baud_says_so_once_unless_it_has_no_speed(
-        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str],
-        monkeypatch: pytest.MonkeyPatch, has_speed: bool) -> None:
-    if has_speed:
-        monkeypatch.setattr('abdf1_ros.ports.trace.is_pseudo_terminal', lambda name: False)
-    bench = make_bench(SPEED)
-    observer.until(lambda: bench.node.driver.machine.rate.seen is not None, 'the speed')
-    bench.diagnostics.clear()
-    link = until_status(bench.diagnostics, 'link', OK)
-    assert details(link)['speed seen'].startswith('at least' if has_speed else 'a pseudo-terminal')
-    bench.node.session._tell_speed(3.0)  # another figure, and no news
-    told = ''.join(capfd.readouterr())
-    assert told.count(', but the line shows at least ') == has_speed
-
-
 def test_plc_of_another_family_than_the_map_says_is_named_in_log_and_diagnostics(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench('level,Read,N7:0,1,SLC,1,')

@@ -19,7 +19,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-from abdf1_ros.df1.line_rate import LineRate
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -238,20 +237,6 @@ def test_station_that_took_no_commands_does_not_answer_by_new_files(
     for _ in range(2):
         bench.diagnostics.next()
     assert 'answers commands' not in capfd.readouterr().err
-
-
-def test_second_wrong_baud_is_told_as_the_first(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
-    bench.node._opener.has_speed = True
-    monkeypatch.setattr(LineRate, 'seen', property(lambda rate: 0.5, lambda *arguments: None),
-                        raising=False)
-    bench.diagnostics.next()
-    bench.diagnostics.next()
-    assert bench.reload()[0]
-    bench.diagnostics.next()
-    bench.diagnostics.next()
-    assert capfd.readouterr().err.count('the line shows about') == 2
 
 
 def test_other_node_of_our_name_stays_known(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

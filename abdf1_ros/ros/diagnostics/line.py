@@ -63,17 +63,6 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
     return f'{wanted}, reads every {milliseconds(fmean(intervals))}'
 
 
-def speed_seen(driver: Driver, has_speed: bool) -> str:
-    """Return the measured speed of the line."""
-    if not has_speed:
-        return 'a pseudo-terminal has none'
-    seen = driver.machine.rate.seen
-    if seen is None:
-        return 'nothing speaks against the set one'
-    rounded = float(f'{driver.network.baud * seen:.1e}')
-    return f'{"at least" if seen > 1 else "about"} {rounded:.0f} baud'
-
-
 def unnumbered_counts(driver: Driver) -> dict[str, str]:
     """Return what a radio modem node counts besides the numbered counters, by its name."""
     counters = driver.counters

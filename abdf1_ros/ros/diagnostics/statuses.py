@@ -36,7 +36,6 @@ from abdf1_ros.ros.diagnostics.line import (
     LoadMeter,
     paces,
     poll_scans,
-    speed_seen,
     unnumbered_counts,
 )
 from abdf1_ros.ros.diagnostics.stations import health_values, processor_fault, wrong_type
@@ -225,7 +224,6 @@ class Diagnostics:
         values = {
             'port': f'{"open" if state and state.is_open else "closed"}',
             'settings': f'{network.baud} baud, {network.error_code}',
-            'speed seen': speed_seen(self._driver, opener is None or opener.has_speed),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
             'poll cycle': milliseconds(self._driver.poll_cycle),
