@@ -18,7 +18,7 @@ Record what a bridge reads from the PLCs into a CSV file that a spreadsheet open
 
 A row is one message: the time of its publishing (UTC), the topic below ~/read/, the PLC address,
 and the values. For more than a table (replay, plots, other nodes' topics) use rosbag2; the
-commands are in recording.md beside this file.
+commands are in docs/recording.md.
 
 Exit status: 0 after Ctrl-C or --seconds, 1 when the bridge is not found, 2 for bad arguments or
 a file that cannot be written.

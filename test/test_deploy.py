@@ -224,6 +224,7 @@ def test_all_that_is_installed_reaches_the_image() -> None:
     wanted = {'package.xml', 'setup.py', 'setup.cfg', 'LICENSE', 'abdf1_ros/ros/node.py',
               'abdf1_ros/df1/frames.py', 'abdf1_ros/py.typed', 'resource/abdf1_ros'}
     wanted |= {f'{folder}/x' for folder in re.findall(r"glob\('(\w+)/", SETUP)}
+    wanted |= set(re.findall(r"\['(\w+/[\w.]+)'\]", SETUP))
     for name in wanted:
         assert any(fnmatch(name, pattern.replace('**/', '*')) or name.startswith(f'{pattern}/')
                    for pattern in allowed), name

@@ -318,7 +318,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--junit', metavar='FILE', help='write the result as JUnit XML too')
     parser.add_argument('--report', action='store_true',
                         help='print the result as text for an issue, with the row for '
-                             'docs/hardware.md')
+                             'docs/tested_with.md')
     parser.add_argument('--pty', metavar='LINK', help='make a pseudo-terminal of this name')
     parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
     parser.add_argument('--echo', action='store_true',

@@ -81,7 +81,7 @@ def as_junit(facts: RunFacts, results: Sequence[CaseResult]) -> str:
 
 
 def as_issue(facts: RunFacts, results: Sequence[CaseResult]) -> str:
-    """Return the run as Markdown, to paste into an issue, and as a row of docs/hardware.md."""
+    """Return the run as Markdown, to paste into an issue, and as a row of docs/tested_with.md."""
     head = [f'- {name}: {value}' for name, value in facts.items()]
     rows = [f'| {result.verdict.value} | {result.case.name} | {result.case.source} | '
             f'{_cell(result)} |' for result in results]
@@ -89,7 +89,7 @@ def as_issue(facts: RunFacts, results: Sequence[CaseResult]) -> str:
            f'conform {facts["target"]}: {summary_of(results)}', facts['abdf1_ros'], '')
     return '\n'.join(('### Conformance run', '', *head, f'- result: {summary_of(results)}', '',
                       '| | case | source | |', '| --- | --- | --- | --- |', *rows, '',
-                      'The row of docs/hardware.md; its empty cells are adapter and report:',
+                      'The row of docs/tested_with.md; its empty cells are adapter and report:',
                       '', f'| {" | ".join(row)} |'))
 
 

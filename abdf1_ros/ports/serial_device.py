@@ -15,7 +15,7 @@
 """
 Serial devices of this machine.
 
-The properties of adapters are in docs/adapters.md.
+The properties of adapters are in docs/connect.md.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ from support.ros_tools import needs, SOURCE
 from support.simulator_process import Files, make_files, READS
 
 EXAMPLE = SOURCE / 'examples' / 'recorder.py'
-COMMANDS = SOURCE / 'examples' / 'recording.md'
+COMMANDS = SOURCE / 'docs' / 'recording.md'
 
 
 @pytest.fixture(scope='module')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What happens to ports, done to a real node and a real simulator; see docs/faults.md."""
+"""What happens to ports, done to a real node and a real simulator; see docs/troubleshooting.md."""
 
 from collections.abc import Iterator
 import os

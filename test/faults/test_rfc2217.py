@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What happens to rfc2217:// device servers, done to a real node; see docs/faults.md."""
+"""What happens to rfc2217:// device servers, done to a real node; see docs/troubleshooting.md."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What happens to a line of two nodes, a master and a slave; see docs/faults.md."""
+"""What happens to a line of two nodes, a master and a slave; see docs/troubleshooting.md."""
 
 from collections.abc import Callable, Iterator
 import re

@@ -19,7 +19,8 @@ import re
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md'),
-                *(ROOT / 'examples').glob('*.md')])
+                ROOT / 'test' / 'RESULTS.md', ROOT / 'test' / 'lab' / 'interop' / 'README.md',
+                *(ROOT / 'vectors').rglob('*.md')])
 NAMES = [page.relative_to(ROOT).as_posix() for page in PAGES]
 
 _BLOCK = re.compile(r'(<!-- runs -->\n\n)?^```(\w*)\n(.*?)^```$', re.DOTALL | re.MULTILINE)

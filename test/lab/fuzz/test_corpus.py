@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The stored inputs of the fuzz targets, without a fuzzer (docs/measured/robustness.md)."""
+"""The stored inputs of the fuzz targets, without a fuzzer (test/RESULTS.md)."""
 
 import importlib
 

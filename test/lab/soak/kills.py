@@ -26,7 +26,7 @@ bridge lives on or ends in order, the time counts until the fallback values are 
     .venv/bin/python test/lab/soak/kills.py --rounds 7 --processes 3
 
 has three cells side by side, each with a seed and a ROS domain of its own, and adds up what they
-have seen in the table of docs/measured/robustness.md. A process alone ends with a line of JSON.
+have seen in the table of test/RESULTS.md. A process alone ends with a line of JSON.
 """
 
 from __future__ import annotations
