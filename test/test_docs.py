@@ -214,7 +214,8 @@ def test_no_sentence_is_said_twice() -> None:
 def printed() -> str:
     """Return all texts of the program, of pyserial's port and of the system, one a line."""
     sources = [*(ROOT / 'abdf1_ros').rglob('*.py'), Path(serial.serialposix.__file__)]
-    texts = [entry.template for entry in Message] + [os.strerror(number) for number in (2, 13, 110)]
+    texts = [entry.template for entry in Message]
+    texts += [os.strerror(number) for number in (2, 13, 110)]
     for source in sources:
         texts += [node.value for node in ast.walk(ast.parse(source.read_text('utf-8')))
                   if isinstance(node, ast.Constant) and isinstance(node.value, str)]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What happens to a line, done to a real node and a real simulator; see docs/troubleshooting.md."""
+"""What happens to a line, done to a real node and simulator; see docs/troubleshooting.md."""
 
 from collections.abc import Iterator
 from pathlib import Path
